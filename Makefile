@@ -1,0 +1,52 @@
+# make demo   the main job on a bundled scene, in a virtual environment of its own
+# make test   style, types, layers and tests
+# make docs   the manual, in docs/_build/html
+# make clean  remove what these made
+
+PYTHON ?= python3
+BIN := .venv/bin
+PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
+PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test docs clean
+
+demo: .venv/demo.stamp
+	$(BIN)/vibrokit run hertz-0.570
+
+test: .venv/test.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest
+
+docs: .venv/docs.stamp
+	$(BIN)/python -m sphinx -b html docs docs/_build/html
+
+clean:
+	rm -rf .venv build dist docs/_build docs/tutorials .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# A stamp says that what its target needs is installed; it ages when a pyproject.toml changes.
+.venv/demo.stamp: pyproject.toml | .venv/bin/python
+	@echo "Installing vibrokit into .venv"
+	$(PIP) --editable .
+	@touch $@
+
+.venv/test.stamp: $(PROJECTS) | .venv/bin/python
+	@echo "Installing vibrokit and what its tests need into .venv"
+	$(PIP) --editable '.[test]' $(addprefix --editable ./,$(PLUGINS))
+	@touch $@
+
+.venv/docs.stamp: pyproject.toml | .venv/bin/python
+	@echo "Installing vibrokit and what its manual needs into .venv"
+	$(PIP) --editable '.[docs]'
+	@touch $@
+
+.venv/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "vibrokit needs Python 3.11 or newer and '$(PYTHON)' is not; install one and say 'make PYTHON=/path/to/it'."; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
+	  || { echo "'$(PYTHON)' comes without the venv module; install it (Debian, Ubuntu: apt install python3-venv) and try again."; exit 1; }
+	$(PYTHON) -m venv .venv

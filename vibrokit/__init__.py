@@ -1,0 +1,87 @@
+"""Stochastic stability of vibro-impact oscillators.
+
+The public names below are loaded on first use, so that importing vibrokit costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
+    from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
+    from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
+    from vibrokit.kernels.order8 import Order8 as Order8
+    from vibrokit.kernels.rk4 import RK4 as RK4
+    from vibrokit.oscillator import Oscillator as Oscillator
+    from vibrokit.parts.barrier import Barrier as Barrier
+    from vibrokit.parts.contact.contact_law import ContactLaw as ContactLaw
+    from vibrokit.parts.contact.custom import CustomLaw as CustomLaw
+    from vibrokit.parts.contact.hertz import Hertz as Hertz
+    from vibrokit.parts.contact.linear import Linear as Linear
+    from vibrokit.parts.excitation.constant import Constant as Constant
+    from vibrokit.parts.excitation.excitation import Excitation as Excitation
+    from vibrokit.parts.excitation.harmonic import Harmonic as Harmonic
+    from vibrokit.parts.noise.noise_model import NoiseModel as NoiseModel
+    from vibrokit.parts.noise.state_dependent import StateDependentNoise as StateDependentNoise
+    from vibrokit.parts.noise.white import WhiteNoise as WhiteNoise
+    from vibrokit.parts.parameter import parameter as parameter
+    from vibrokit.parts.spring.cubic import CubicSpring as CubicSpring
+    from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
+    from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
+    from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.results.files import load_result as load_result
+    from vibrokit.scene_file import load_scene as load_scene
+    from vibrokit.scene_file import save_scene as save_scene
+    from vibrokit.structure.find import find_structure as find_structure
+    from vibrokit.structure.structure import Structure as Structure
+
+__version__ = "0.1.0"
+
+# The same imports once more, for use; tests/test_import.py holds the two lists together.
+_HOMES = {
+    "ActionPlot": "vibrokit.analyzers.action_plot",
+    "Analyzer": "vibrokit.analyzers.analyzer",
+    "LeaveBasin": "vibrokit.analyzers.exits",
+    "FreeFlight": "vibrokit.kernels.free_flight",
+    "Order8": "vibrokit.kernels.order8",
+    "RK4": "vibrokit.kernels.rk4",
+    "Oscillator": "vibrokit.oscillator",
+    "Barrier": "vibrokit.parts.barrier",
+    "ContactLaw": "vibrokit.parts.contact.contact_law",
+    "CustomLaw": "vibrokit.parts.contact.custom",
+    "Hertz": "vibrokit.parts.contact.hertz",
+    "Linear": "vibrokit.parts.contact.linear",
+    "Constant": "vibrokit.parts.excitation.constant",
+    "Excitation": "vibrokit.parts.excitation.excitation",
+    "Harmonic": "vibrokit.parts.excitation.harmonic",
+    "NoiseModel": "vibrokit.parts.noise.noise_model",
+    "StateDependentNoise": "vibrokit.parts.noise.state_dependent",
+    "WhiteNoise": "vibrokit.parts.noise.white",
+    "parameter": "vibrokit.parts.parameter",
+    "CubicSpring": "vibrokit.parts.spring.cubic",
+    "CustomSpring": "vibrokit.parts.spring.custom",
+    "LinearSpring": "vibrokit.parts.spring.linear",
+    "Spring": "vibrokit.parts.spring.spring",
+    "load_result": "vibrokit.results.files",
+    "load_scene": "vibrokit.scene_file",
+    "save_scene": "vibrokit.scene_file",
+    "find_structure": "vibrokit.structure.find",
+    "Structure": "vibrokit.structure.structure",
+}
+
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("errors", "testing"):
+        return import_module(f"vibrokit.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'vibrokit' has no attribute {name!r}; it offers {', '.join(_HOMES)}.")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, "errors", "testing"})

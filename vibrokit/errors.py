@@ -1,0 +1,64 @@
+"""What can go wrong, as exceptions whose text is a full sentence."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class VibrokitError(Exception):
+    """Root of every error that the toolkit raises on purpose."""
+
+
+class ParameterError(VibrokitError, ValueError):
+    """A parameter has a value that it may not have."""
+
+
+class SceneError(VibrokitError, ValueError):
+    """Parts, or the text of a scene file, do not make a scene."""
+
+
+class NoSectionError(SceneError):
+    """A stroboscopic section was asked of excitations without a common period."""
+
+
+class UnknownNameError(VibrokitError, LookupError):
+    """A name that nothing is registered under."""
+
+
+class DerivationError(VibrokitError, TypeError):
+    """A part's formula cannot be turned into equations."""
+
+
+class StepperError(VibrokitError, ValueError):
+    """A stepper cannot integrate this scene, or its settings are out of range."""
+
+
+class StructureError(VibrokitError, ValueError):
+    """A question about attractors or basins that the scene cannot answer."""
+
+
+class IntegrationError(VibrokitError, ArithmeticError):
+    """The integration left the finite numbers or ran out of steps.
+
+    Attributes
+    ----------
+    time : float
+        Time at which the last good state was seen.
+    state : tuple of float
+        That state.
+    """
+
+    def __init__(self, message: str, time: float, state: tuple[float, ...]) -> None:
+        super().__init__(message)
+        self.time = time
+        self.state = state
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return the end of a sentence that names the closest of the known names, or all of them."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    if close:
+        return f"; the nearest is {close[0]!r}."
+    return f"; there {'is' if len(names) == 1 else 'are'} {', '.join(names) or 'none'}."

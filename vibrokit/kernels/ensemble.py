@@ -1,0 +1,165 @@
+"""Runs many trajectories: splits them into blocks and has threads, or any executor, carry the blocks."""
+
+from __future__ import annotations
+
+import concurrent.futures as futures
+import dataclasses
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
+
+_BLOCK = 2048
+_SMALLEST_BLOCK = 64
+
+Array = NDArray[Any]
+Progress = Callable[[int, int], None]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stop:
+    """When a trajectory ends before its budget, tested in the kernel at every section.
+
+    Attributes
+    ----------
+    region : array (2, 2)
+        Bounds of x and of v; outside, the trajectory has left.
+    labels : int16 array (nx, nv)
+        Labels of the cells of the region; a label that is neither negative nor `home` ends the trajectory.
+    home : int
+    points : array (m, 2), point_labels : int64 array (m,), tolerance : float
+        Known places; a trajectory nearer than `tolerance` to one has reached it.
+    """
+
+    region: Array = dataclasses.field(default_factory=lambda: np.array([[-np.inf, np.inf], [-np.inf, np.inf]]))
+    labels: Array = dataclasses.field(default_factory=lambda: np.empty((0, 0), dtype=np.int16))
+    home: int = -1
+    points: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
+    point_labels: Array = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    tolerance: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Where trajectories ended.
+
+    Attributes
+    ----------
+    states : array (count, equations)
+        Last state, at a section. Where the numbers ran out of range: the last good one.
+    intervals : int64 array (count,)
+        Sections passed.
+    status : int64 array (count,)
+        Why it ended: a constant of `vibrokit.kernels.stopping`.
+    label : int64 array (count,)
+        Label of the cell or point that ended it; −1 if none did.
+    """
+
+    states: Array
+    intervals: Array
+    status: Array
+    label: Array
+
+
+def run_ensemble(
+    scene: Scene,
+    flow: Flow,
+    stepper: Stepper,
+    states: Array,
+    budget: int | Array = 1,
+    *,
+    stop: Stop | None = None,
+    start_time: float = 0.0,
+    interval: float | None = None,
+    executor: futures.Executor | None = None,
+    progress: Progress | None = None,
+) -> Ensemble:
+    """Advance trajectories from section to section until each meets a stop test or has spent its budget.
+
+    Parameters
+    ----------
+    scene : Scene
+    flow : Flow
+    stepper : Stepper
+    states : array (count, equations)
+        Starts, in the layout of the flow.
+    budget : int or array (count,)
+        Most intervals to take.
+    stop : Stop, optional
+    start_time : float
+        Time of the start (s).
+    interval : float, optional
+        Time from section to section (s); the scene's own by default.
+    executor : concurrent.futures.Executor, optional
+        Carries the blocks; threads of this process by default. The result is the same to the last bit.
+    progress : callable, optional
+        Called with (blocks done, blocks in all).
+
+    Returns
+    -------
+    Ensemble
+    """
+    kernel = kernel_for(scene, flow, stepper)
+    starts = np.ascontiguousarray(states, dtype=float)
+    budgets = np.ascontiguousarray(np.broadcast_to(np.asarray(budget, dtype=np.int64), len(starts)))
+    span = scene.section_interval if interval is None else interval
+    common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)), stop or Stop())
+    blocks = list(_blocks(len(starts)))
+    tasks = [(kernel, starts[block], budgets[block], *common) for block in blocks]
+    return _joined(list(carry(_advance_block, tasks, executor, progress)), starts.shape[1])
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    workers = os.cpu_count() or 1
+    size = min(_BLOCK, max(_SMALLEST_BLOCK, -(-count // (4 * workers))))
+    size = -(-size // _SMALLEST_BLOCK) * _SMALLEST_BLOCK
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
+
+
+def _advance_block(
+    kernel: Kernel, starts: Array, budget: Array, theta: Array, start_time: float, span: float, settings: Array, stop: Stop
+) -> Ensemble:
+    count = len(starts)
+    ended = Ensemble(np.empty_like(starts), *(np.zeros(count, dtype=np.int64) for _ in range(3)))
+    kernel.module.advance(
+        starts, theta, start_time, span, settings, budget,
+        stop.region, stop.labels, stop.home, stop.points, stop.point_labels, stop.tolerance,
+        ended.states, ended.intervals, ended.status, ended.label,
+    )  # fmt: skip
+    return ended
+
+
+def _joined(parts: list[Ensemble], equations: int) -> Ensemble:
+    if not parts:
+        return Ensemble(np.empty((0, equations)), *(np.zeros(0, dtype=np.int64) for _ in range(3)))
+    names = [field.name for field in dataclasses.fields(Ensemble)]
+    return Ensemble(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def carry(
+    work: Callable[..., Any],
+    tasks: list[tuple[Any, ...]],
+    executor: futures.Executor | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Any]:
+    """Yield ``work(*task)`` for each task, in order; on Ctrl-C nothing more is begun."""
+    pool = executor or futures.ThreadPoolExecutor(max_workers=os.cpu_count())
+    pending = [pool.submit(work, *task) for task in tasks]
+    try:
+        for done, future in enumerate(pending, start=1):
+            yield future.result()
+            if progress is not None:
+                progress(done, len(tasks))
+    finally:
+        for future in pending:
+            future.cancel()
+        if executor is None:
+            pool.shutdown()

@@ -1,0 +1,26 @@
+"""Which components of a flow share one scale when errors are judged."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def error_blocks(states: int, equations: int) -> NDArray[np.int64]:
+    """Return the block of each component.
+
+    States have a scale each. Momenta share one, the action has its own, and so has each block of derivatives: final
+    states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 beside states of
+    size 1, and their error must be small against themselves.
+
+    Parameters
+    ----------
+    states : int
+        Components of the state, n.
+    equations : int
+        Components of the flow: n, n + n², 2n + 1 or 2n + 1 + (2n)².
+    """
+    state = list(range(states))
+    if equations in (states, states + states**2):
+        return np.array(state + [states] * (equations - states))
+    phase = [*state, *[states] * states]
+    matrix = [states + 2 + 2 * (row >= states) + (column >= states) for row in range(2 * states) for column in range(2 * states)]
+    return np.array([*phase, states + 1, *matrix][:equations])

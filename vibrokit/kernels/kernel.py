@@ -1,0 +1,120 @@
+"""Kernel: the compiled code of one flow of one scene, for one stepper."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import hashlib
+import types
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels import store
+from vibrokit.kernels.fingerprint import scene_fingerprint
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_MARKER = "# --- scene above, stepper below ---\n"
+_FORCED, _UNFORCED = "  # forced\n", "  # unforced\n"
+
+
+@dataclasses.dataclass(frozen=True)
+class Kernel:
+    """Generated source and the module compiled from it. Travels to other processes as text.
+
+    Attributes
+    ----------
+    name : str
+        Name of the module, made of what decides its code.
+    source : str
+        Its text.
+    """
+
+    name: str
+    source: str
+
+    @property
+    def module(self) -> types.ModuleType:
+        """The module, imported on first use; its functions compile when they are first called."""
+        return store.load(self.name, self.source)
+
+
+def kernel_for(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
+    """Return the kernel for a flow of a scene: from disk if its like was made before, else derived and written.
+
+    Raises
+    ------
+    StepperError
+        The stepper cannot integrate this flow of this scene.
+    """
+    return _kernel(scene_fingerprint(scene), flow, stepper.name, _Sources(scene, flow, stepper))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Sources:
+    """What a kernel is derived from; never part of the key, which the fingerprint is."""
+
+    scene: Scene
+    flow: Flow
+    stepper: Stepper
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Sources)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+@functools.lru_cache(maxsize=256)
+def _kernel(fingerprint: str, flow: Flow, stepper: str, sources: _Sources) -> Kernel:
+    digest = hashlib.sha256(f"{fingerprint}\n{flow.value}\n{stepper}".encode()).hexdigest()[:24]
+    name = f"vibrokit_{flow.value}_{stepper}_{digest}"
+    source = store.stored(name)
+    if source is None:
+        source = write_source(sources.scene, flow, sources.stepper)
+        store.store(name, source)
+    return Kernel(name, source)
+
+
+def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
+    """Derive the equations and write the module, scene above and stepper below."""
+    from vibrokit.symbolic.source import scene_text  # only here is SymPy needed
+
+    text = scene_text(scene, flow)
+    templates = [read_template(name) for name in stepper.templates]
+    imports = "\n".join(dict.fromkeys(line for template in templates for line in template.imports))
+    body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)
+    pieces = [text.preamble, imports, *stepper.scene_part(text), _for_forcing(body, text.forced)]
+    return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece)
+
+
+class Template(NamedTuple):
+    """A stepper's text: its imports, and its functions."""
+
+    imports: tuple[str, ...]
+    body: str
+
+
+def read_template(name: str) -> Template:
+    """Read a template; what it imports from the sample scene is left out, for the real scene provides it."""
+    head, body = (_TEMPLATES / f"{name}.py").read_text(encoding="utf-8").split(_MARKER, 1)
+    imports = [node for node in ast.parse(head).body if isinstance(node, ast.Import | ast.ImportFrom)]
+    kept = [node for node in imports if ".templates" not in (getattr(node, "module", None) or "")]
+    return Template(tuple(ast.unparse(node) for node in kept), body)
+
+
+def _for_forcing(text: str, forced: bool) -> str:
+    drop, keep = (_UNFORCED, _FORCED) if forced else (_FORCED, _UNFORCED)
+    lines = [line for line in text.splitlines(keepends=True) if not line.endswith(drop)]
+    return "".join(line.replace(keep, "\n") if line.endswith(keep) else line for line in lines)
+
+
+def theta_of(scene: Scene) -> NDArray[np.float64]:
+    """Return the parameters of a scene in the order in which kernels read them."""
+    return np.array([entry.value for entry in scene.entries() if not entry.declared.structural], dtype=float)

@@ -1,0 +1,59 @@
+"""RK4: fixed steps, many trajectories at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar, Self
+
+from vibrokit.errors import StepperError
+from vibrokit.kernels.lanes import lane_step, scalar_step, tabulation
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.scene_text import SceneText
+
+_LARGEST = 10**7
+
+
+@dataclasses.dataclass(frozen=True)
+class RK4(Stepper):
+    """Classical Runge–Kutta, fixed steps, trajectories packed in vector lanes: the fastest for large ensembles.
+
+    Order 4 while nothing touches; a contact that is crossed inside a step costs order: 2.5 for Hertz, 2 for linear
+    stops, 1 where the force jumps at first touch. Choose it for basins, action plots and noise, where many
+    trajectories at 1e-6 are worth more than one at 1e-12; choose `FreeFlight` or `Order8` for orbits and
+    certificates, and wherever a contact is shorter than a few steps.
+
+    Parameters
+    ----------
+    steps : int
+        Steps from section to section (forcing period, or 2π/ω_n without forcing).
+    """
+
+    name: ClassVar[str] = "rk4"
+    templates: ClassVar[tuple[str, ...]] = ("rk4",)
+
+    steps: int = 256
+
+    def __post_init__(self) -> None:
+        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= _LARGEST:
+            raise StepperError(f"RK4: steps is {self.steps!r}; give a whole number from 1 to {_LARGEST}.")
+
+    def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
+        """Steps in this interval, whether the forcing repeats with it, and the step length."""
+        unit = scene.section_interval
+        steps = max(1, round(self.steps * interval / unit))
+        multiple = interval / unit
+        repeats = scene.autonomous or abs(multiple - round(multiple)) < 1e-12 * multiple
+        return float(steps), float(repeats), unit / self.steps
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """The lane-packed step for ensembles, the scalar slopes for single trajectories."""
+        return [text.constants, text.forcing, tabulation(text), text.derivative, lane_step(text), scalar_step(text)]
+
+    def refined(self) -> Self:
+        """Twice the steps."""
+        return dataclasses.replace(self, steps=2 * self.steps)
+
+    def coarsened(self) -> Self:
+        """Half the steps."""
+        return dataclasses.replace(self, steps=max(1, self.steps // 2))

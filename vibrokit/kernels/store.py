@@ -1,0 +1,68 @@
+"""Keeps generated modules on disk, beside what Numba compiled from them."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import os
+import sys
+import tempfile
+import types
+import warnings
+from pathlib import Path
+
+import platformdirs
+
+CACHE_VARIABLE = "VIBROKIT_CACHE"
+
+
+@functools.cache
+def cache_directory() -> Path:
+    """Return the folder of generated modules: ``$VIBROKIT_CACHE``, or the user's cache folder."""
+    chosen = Path(os.environ.get(CACHE_VARIABLE) or platformdirs.user_cache_dir("vibrokit")) / "kernels"
+    try:
+        chosen.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=chosen):
+            return chosen
+    except OSError as error:
+        other = Path(tempfile.mkdtemp(prefix="vibrokit-"))
+        warnings.warn(
+            f"cannot write compiled kernels to {chosen} ({error}); they go to {other} and will be compiled anew by "
+            f"the next process. Set {CACHE_VARIABLE} to a folder that can be written.",
+            stacklevel=2,
+        )
+        return other
+
+
+def stored(name: str) -> str | None:
+    """Return the text of a generated module, or None if it was never written here."""
+    try:
+        return (cache_directory() / f"{name}.py").read_text(encoding="utf-8")
+    except OSError:
+        return None
+
+
+def store(name: str, text: str) -> None:
+    """Write a generated module so that another process sees all of it or nothing."""
+    folder = cache_directory()
+    with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8") as file:
+        file.write(text)
+    try:
+        os.replace(file.name, folder / f"{name}.py")
+    except OSError:
+        os.unlink(file.name)
+        raise
+
+
+@functools.cache
+def load(name: str, text: str) -> types.ModuleType:
+    """Import a generated module, writing it first if this machine does not have it."""
+    if stored(name) != text:
+        store(name, text)
+    specification = importlib.util.spec_from_file_location(name, cache_directory() / f"{name}.py")
+    if specification is None or specification.loader is None:
+        raise ImportError(f"cannot import the generated kernel {name} from {cache_directory()}.")
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    return module

@@ -1,0 +1,225 @@
+"""The stops: what touches, how a step is shortened to end on an event, how a contact is followed to its end.
+
+Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; every change of it happens between steps.
+At most one stop is touched at a time.
+"""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.stopping import RAN_OUT, NOT_FINITE, STALLED
+from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, OPTIONS, ROOTED, SIDES, law, rhs, stop
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
+    EPSILON,
+    ROOT_DEPTH,
+    ROOT_TIME,
+    SPARE,
+    TIME,
+    TRIAL,
+    attempt,
+    misfit,
+    slope,
+    stretch,
+)
+
+# --- scene above, stepper below ---
+
+# What is remembered between steps: lengths of the next step in free flight and in contact, which stop is touched (−1:
+# none), when (nan: unknown), whether its law would pull, whether the next step must run in time, steps tried, and the time to travel.
+FREE_STEP, CONTACT_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN, MEMORY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
+
+
+@njit(**OPTIONS)
+def settle(y, memory, pushing, theta, spare):
+    """Find out what is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
+    memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
+    pushing[:] = False
+    for i in range(BARRIERS):
+        wall, rate = stop(i, theta), SIDES[i] * y[1]
+        depth = SIDES[i] * (y[0] - wall)
+        touched = depth > 0.0
+        if depth == 0.0:
+            pushing[:] = False
+            rhs(y[CLOCK], y, pushing, theta, spare)
+            acceleration = SIDES[i] * spare[1]
+            # A visit too shallow for x to represent is none.
+            seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
+            touched = rate > 0.0 if seen else acceleration > 0.0
+            if touched and ROOTED[i]:
+                memory[SINCE] = y[CLOCK]
+        if touched:
+            memory[TOUCHED] = i
+            memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
+            pushing[i] = memory[PULLED] == 0.0
+            return
+
+
+@njit(**OPTIONS)
+def push_at(i, y, theta):
+    return law(i, max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30), SIDES[i] * y[1], theta)
+
+
+@njit(**OPTIONS)
+def goal_at(goal, i, y, theta):
+    if goal == DEPTH_GOAL:
+        return SIDES[i] * (y[0] - stop(i, theta))
+    if goal == RATE_GOAL:
+        return SIDES[i] * y[1]
+    return push_at(i, y, theta)
+
+
+@njit(**OPTIONS)
+def land(goal, course, sigma, h, y, i, pushing, theta, desk):
+    """Shorten a step, after which a goal has changed its sign, to end on its zero; leave that end in TRIAL.
+
+    Newton's method for the depth, whose derivative in time is the rate, secants for the others; bisection where they
+    leave the bracket.
+    """
+    trial = desk[TRIAL]
+    start, value = goal_at(goal, i, y, theta), goal_at(goal, i, trial, theta)
+    rising = value > 0.0
+    low, high, length, before, last = 0.0, h, h, 0.0, start
+    for _ in range(80):
+        if goal == DEPTH_GOAL and course == TIME:
+            move = -value / (SIDES[i] * trial[1])
+        else:
+            move = -value * (length - before) / (value - last)
+        if length == h and goal == DEPTH_GOAL and course == TIME:
+            move = cubic_root(start, SIDES[i] * y[1], value, SIDES[i] * trial[1], h) - h
+        new = length + move
+        if not min(low, high) < new < max(low, high):
+            new = 0.5 * (low + high)
+        before, last = length, value
+        length = new
+        attempt(course, sigma, length, y, i, pushing, theta, desk)
+        value = goal_at(goal, i, trial, theta)
+        if (value > 0.0) == rising:
+            high = length
+        else:
+            low = length
+        if value == 0.0 or abs(high - low) <= 2.0 * EPSILON * abs(h):
+            break
+        if abs(length - before) <= 4.0 * EPSILON * abs(h):
+            break
+        if goal == DEPTH_GOAL and course == TIME and abs(value) < 1e-9 * abs(h * trial[1]):
+            # So near that one more Newton step is exact to rounding and needs no new attempt.
+            move = -value / (SIDES[i] * trial[1])
+            rhs(trial[CLOCK], trial, pushing, theta, desk[SPARE])
+            for e in range(CLOCK):
+                trial[e] += move * desk[SPARE, e]
+            trial[CLOCK] += move
+            return length + move
+    return length
+
+
+@njit(**OPTIONS)
+def cubic_root(d0, r0, d1, r1, h):
+    """Zero in (0, h) of the cubic with these end values and slopes, d0 and d1 of opposite sign."""
+    low, high = 0.0, 1.0
+    s = d0 / (d0 - d1)
+    for _ in range(40):
+        value = cubic(d0, r0, d1, r1, h, s)
+        if (value > 0.0) == (d1 > 0.0):
+            high = s
+        else:
+            low = s
+        rate = (cubic(d0, r0, d1, r1, h, s + 1e-6) - value) * 1e6
+        new = s - value / rate
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - s) < 1e-7:
+            return new * h
+        s = new
+    return s * h
+
+
+@njit(**OPTIONS)
+def cubic(d0, r0, d1, r1, h, s):
+    """Cubic Hermite interpolant at the fraction s of a step h."""
+    q = 1.0 - s
+    return q * q * ((1.0 + 2.0 * s) * d0 + s * h * r0) + s * s * ((3.0 - 2.0 * s) * d1 - q * h * r1)
+
+
+@njit(**OPTIONS)
+def swing(d0, r0, d1, r1, h):
+    """Largest depth within a step that begins with r0 > 0 and ends with r1 < 0, and the share of the step until then."""
+    low, high = 0.0, 1.0
+    for _ in range(24):
+        s = 0.5 * (low + high)
+        if cubic(d0, r0, d1, r1, h, s + 1e-5) > cubic(d0, r0, d1, r1, h, s - 1e-5):
+            low = s
+        else:
+            high = s
+    return cubic(d0, r0, d1, r1, h, 0.5 * (low + high))
+
+
+@njit(**OPTIONS)
+def press(y, end, memory, pushing, theta, settings, desk):
+    """Follow the contact with the touched stop until it ends or the time is up."""
+    touched = memory[TOUCHED]
+    while y[CLOCK] < end and memory[TOUCHED] == touched:
+        status = press_step(int(touched), y, end, memory, pushing, theta, settings, desk)
+        if status != RAN_OUT:
+            return status
+    return RAN_OUT
+
+
+@njit(**OPTIONS)
+def course_of(i, y, memory, theta, desk):
+    """Choose the course of the next step in contact, and where on it y lies."""
+    depth, rate = SIDES[i] * (y[0] - stop(i, theta)), SIDES[i] * y[1]
+    if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
+        acceleration = desk[0, 1]
+        if rate * rate > 4.0 * abs(acceleration) * depth:
+            return ROOT_DEPTH, np.sqrt(depth)
+    if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
+        return ROOT_TIME, np.sqrt(y[CLOCK] - memory[SINCE])
+    return TIME, 0.0
+
+
+@njit(**OPTIONS)
+def length_of(course, sigma, lapse, i, y, theta):
+    """Length along a course of a step that lasts `lapse`."""
+    if course == ROOT_TIME:
+        return lapse / (np.sqrt(sigma * sigma + lapse) + sigma)
+    if course == ROOT_DEPTH:
+        left = sigma * sigma + SIDES[i] * y[1] * lapse
+        return np.sqrt(left) - sigma if left > 0.02 * sigma * sigma else -sigma
+    return lapse
+
+
+@njit(**OPTIONS)
+def press_step(i, y, end, memory, pushing, theta, settings, desk):
+    """One step in contact, on the course that suits it."""
+    trial = desk[TRIAL]
+    rhs(y[CLOCK], y, pushing, theta, desk[0])
+    course, sigma = course_of(i, y, memory, theta, desk)
+    left = end - y[CLOCK]
+    last = memory[CONTACT_STEP] >= 0.99 * left
+    h = length_of(course, sigma, left if last else memory[CONTACT_STEP], i, y, theta)
+    slope(course, sigma, h, y, i, pushing, theta, desk[0], desk[SPARE])
+    first, error = h, 0.0
+    while True:
+        memory[COUNT] += 1.0
+        if memory[COUNT] > settings[1]:
+            return STALLED
+        attempt(course, sigma, h, y, i, pushing, theta, desk)
+        error = misfit(h, y, memory[SPAN], settings[0], desk)
+        lapse = trial[CLOCK] - y[CLOCK]
+        tiny = abs(lapse) <= EPSILON * (abs(y[CLOCK]) + memory[SPAN]) or abs(h) < 1e-12 * abs(first)
+        if error > 1.0 and not tiny:
+            h *= min(0.7, stretch(error))
+            continue
+        if not np.isfinite(error):
+            return NOT_FINITE
+        if course == ROOT_DEPTH:
+            if trial[CLOCK] > end or SIDES[i] * trial[1] >= 0.0:
+                memory[TIMED] = 2.0 if trial[CLOCK] > end else 1.0
+                return RAN_OUT
+        elif leaves(i, y, h if course == TIME else lapse, memory, theta, trial) and not tiny:
+            h *= 0.5
+            continue
+        break
+    return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, desk)

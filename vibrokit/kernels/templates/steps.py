@@ -1,0 +1,130 @@
+"""One step of order 8, in time or in a variable in which a contact is smooth.
+
+A half-integer law makes the force go like (t − t_c)^(3/2) after a touch at t_c: every method loses its order there. In
+τ = √(t − t_c) the motion is analytic from the touch through the turning point, and in u = √depth it is analytic down
+to the moment the mass leaves, which comes at u = 0 exactly. So the time travels as the last component of the state,
+y = (z, t), and a step may run along any of three courses.
+"""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.error_blocks import error_blocks
+from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
+from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS, SIDES, STATES, rhs, stop
+
+# --- scene above, stepper below ---
+
+TIME, ROOT_TIME, ROOT_DEPTH = 0, 1, 2
+CLOCK = EQUATIONS  # where the time stands in y
+TRIAL, STAGE, SPARE, SIZE, ROWS = STAGES, STAGES + 1, STAGES + 2, STAGES + 3, STAGES + 4  # rows of the desk
+EPSILON = 2.220446049250313e-16
+BLOCKS = error_blocks(STATES, EQUATIONS)
+
+
+@njit(**OPTIONS)
+def slope(course, sigma, reach, y, i, pushing, theta, out, spare):
+    """Rate of y along a course, at sigma; `reach` is the length of the step that asks."""
+    if BARRIERS == 0 or course == TIME:
+        rhs(y[CLOCK], y, pushing, theta, out)
+        out[CLOCK] = 1.0
+    else:
+        root_slope(course, sigma, reach, y, i, pushing, theta, out, spare)
+
+
+@njit(**OPTIONS)
+def root_slope(course, sigma, reach, y, i, pushing, theta, out, spare):
+    wall, side = stop(i, theta), SIDES[i]
+    if course == ROOT_DEPTH:
+        y[0] = wall + side * sigma * sigma
+    x, rate = y[0], side * y[1]
+    depth = side * (x - wall)
+    along = rate if course == ROOT_TIME and rate > 0.0 else 1.0  # depth = along sigma² near the stop
+    least = 64.0 * EPSILON * abs(wall) + (1e-8 * reach) ** 2 * along
+    if depth >= least:
+        weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * np.sqrt(depth) / rate
+        weighted_slope(weight, y, pushing, theta, out)
+    elif course == ROOT_TIME and (rate <= 0.0 or sigma * sigma * rate > 4.0 * least):
+        y[0] = wall + side * least
+        weighted_slope(2.0 * sigma, y, pushing, theta, out)
+    else:
+        # A law's second derivative is infinite at depth 0 while its product with sigma is not: continue the slope
+        # from two depths that x can still represent.
+        y[0] = wall + side * least
+        first = np.sqrt(side * (y[0] - wall) / along)
+        weighted_slope(2.0 * first if course == ROOT_TIME else 2.0 * first / rate, y, pushing, theta, spare)
+        y[0] = wall + side * 4.0 * least
+        second = np.sqrt(side * (y[0] - wall) / along)
+        weighted_slope(2.0 * second if course == ROOT_TIME else 2.0 * second / rate, y, pushing, theta, out)
+        share = (sigma - first) / (second - first)
+        for e in range(CLOCK + 1):
+            out[e] = spare[e] + share * (out[e] - spare[e])
+    y[0] = x
+
+
+@njit(**OPTIONS)
+def weighted_slope(weight, y, pushing, theta, out):
+    rhs(y[CLOCK], y, pushing, theta, out)
+    for e in range(EQUATIONS):
+        out[e] *= weight
+    out[CLOCK] = weight
+
+
+@njit(**OPTIONS)
+def attempt(course, sigma, h, y, i, pushing, theta, desk):
+    """Take a step from y, whose slope is in row 0 of the desk, and leave its end in row TRIAL."""
+    stage = desk[STAGE]
+    for s in range(1, STAGES):
+        stage[:] = 0.0
+        for j in range(s):
+            weight = WEIGHTS[s, j]
+            for e in range(CLOCK + 1):
+                stage[e] += weight * desk[j, e]
+        for e in range(CLOCK + 1):
+            stage[e] = y[e] + h * stage[e]
+        slope(course, sigma + NODES[s] * h, h, stage, i, pushing, theta, desk[s], desk[SPARE])
+    trial = desk[TRIAL]
+    trial[:] = 0.0
+    for s in range(STAGES):
+        for e in range(CLOCK + 1):
+            trial[e] += RESULT[s] * desk[s, e]
+    for e in range(CLOCK + 1):
+        trial[e] = y[e] + h * trial[e]
+    if BARRIERS > 0 and course == ROOT_DEPTH:
+        trial[0] = stop(i, theta) + SIDES[i] * (sigma + h) ** 2
+
+
+@njit(**OPTIONS)
+def misfit(h, y, span, tolerance, desk):
+    """Estimated error of the step in TRIAL, in units of the tolerance: the largest over the components.
+
+    Each block is judged by its own size. A velocity that vanishes is judged by x over `span`, the time to travel.
+    """
+    size, trial = desk[SIZE], desk[TRIAL]
+    size[:] = 0.0
+    for e in range(EQUATIONS):
+        size[BLOCKS[e]] = max(size[BLOCKS[e]], abs(y[e]), abs(trial[e]), abs(h * desk[0, e]))
+    size[BLOCKS[1]] = max(size[BLOCKS[1]], size[BLOCKS[0]] / span)
+    fifth, third = 0.0, 0.0
+    for e in range(CLOCK + 1):
+        a, b = 0.0, 0.0
+        for s in range(STAGES):
+            a += FIFTH[s] * desk[s, e]
+            b += THIRD[s] * desk[s, e]
+        unit = size[BLOCKS[e]] if e < EQUATIONS else min(span, size[0] / (abs(trial[1]) + size[0] / span))
+        if not (np.isfinite(trial[e]) and np.isfinite(a)):
+            return np.inf
+        if unit > 0.0:
+            fifth = max(fifth, abs(a) / unit)
+            third = max(third, abs(b) / unit)
+    if fifth == 0.0:
+        return 0.0
+    return abs(h) * fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third) / tolerance
+
+
+@njit(**OPTIONS)
+def stretch(error):
+    """By how much to lengthen the next step."""
+    if not np.isfinite(error):
+        return 0.1
+    return min(6.0, max(0.15, 0.9 * max(error, 1e-12) ** -0.125))

@@ -1,0 +1,21 @@
+"""Excitation: a force that depends on time alone."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+from vibrokit.parts.part import Part
+
+
+class Excitation(Part):
+    """Force per unit mass that depends on time alone. Abstract."""
+
+    @abstractmethod
+    def force(self, t: Any) -> Any:
+        """Force (m s⁻²) at time `t` (s), as a SymPy expression."""
+
+    @property
+    @abstractmethod
+    def period(self) -> float | None:
+        """Period (s); None if the force is constant."""

@@ -1,0 +1,62 @@
+"""Parts whose formula is text, with constants named by the user."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+from vibrokit.parts.formula import check_parameter_name, parse_formula
+from vibrokit.parts.parameter import Parameter
+
+
+class FormulaPart:
+    """What the custom parts share: a formula as text, and constants that it may use.
+
+    The constants take part in everything as declared parameters do: they are checked to be finite, have symbols,
+    travel in scene files, and can be changed without compiling anew. The formula itself is structural.
+    """
+
+    variables: ClassVar[tuple[str, ...]]
+    formula_name: ClassVar[str] = "formula"
+
+    formula: str
+    constants: tuple[tuple[str, Any], ...]
+
+    def _read(self, formula: str, constants: Mapping[str, Any]) -> None:
+        """Check formula and constants and store them."""
+        for name in constants:
+            check_parameter_name(name, self.variables)
+        parse_formula(formula, self.variables, tuple(constants))
+        checked = tuple(
+            (name, Parameter(name, name, name, "").checked(type(self).__name__, value))
+            for name, value in constants.items()
+        )
+        object.__setattr__(self, "formula", formula)
+        object.__setattr__(self, "constants", checked)
+
+    def _own(self) -> tuple[Parameter, ...]:
+        """Parameters that the class declares besides formula and constants."""
+        return ()
+
+    def declared(self) -> tuple[Parameter, ...]:
+        """Parameters of this part: its own, the formula (structural), then each constant."""
+        formula = Parameter(self.formula_name, "formula", self.formula_name, "", structural=True)
+        return (*self._own(), formula, *(Parameter(name, name, name, "") for name, _ in self.constants))
+
+    def _value(self, declared: Parameter) -> Any:
+        constants = dict(self.constants)
+        return constants[declared.name] if declared.name in constants else getattr(self, declared.attribute)
+
+    def twin(self, values: Mapping[str, Any]) -> Self:
+        """Return an unchecked copy whose constants are `values` by name."""
+        twin = object.__new__(type(self))
+        for declared in self._own():
+            object.__setattr__(twin, declared.attribute, values[declared.name])
+        object.__setattr__(twin, "formula", self.formula)
+        object.__setattr__(twin, "constants", tuple((name, values[name]) for name, _ in self.constants))
+        return twin
+
+    def _evaluate(self, *arguments: Any) -> Any:
+        """The formula as a SymPy expression, at the given variables and this part's constants."""
+        formula = parse_formula(self.formula, self.variables, tuple(name for name, _ in self.constants))
+        return formula.expression({**dict(zip(self.variables, arguments, strict=True)), **dict(self.constants)})

@@ -1,0 +1,38 @@
+"""NoiseModel: the random force."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+from vibrokit.parts.parameter import parameter
+from vibrokit.parts.part import Part
+
+
+class NoiseModel(Part):
+    """Random force of intensity D, in the sense of Itô. Abstract.
+
+    White noise drives the velocity: dv = … dt + amplitude(x, v) √D dW. A model with states of its own (coloured
+    noise) names them in `extra_states`; then the white noise drives the last of these instead, `drift` says how
+    they move without it, and `force` how they push the mass.
+
+    For developers
+    --------------
+    `amplitude` alone makes a complete model. With `extra_states`, write `force` and `drift` as well.
+    """
+
+    extra_states: ClassVar[tuple[str, ...]] = ()
+
+    intensity: float = parameter("D", "m^2 s^-3", minimum=0)
+
+    @abstractmethod
+    def amplitude(self, x: Any, v: Any) -> Any:
+        """Factor before √D dW, as a SymPy expression in displacement and velocity."""
+
+    def force(self, *extra: Any) -> Any:
+        """Force on the mass (m s⁻²) of the extra states."""
+        return 0
+
+    def drift(self, x: Any, v: Any, *extra: Any) -> tuple[Any, ...]:
+        """Rates of the extra states without noise, one for each."""
+        return ()

@@ -1,0 +1,46 @@
+"""Noise whose strength depends on the state."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from vibrokit.parts.formula_part import FormulaPart
+from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.parameter import Parameter
+
+
+class StateDependentNoise(FormulaPart, NoiseModel):
+    """Itô white noise on the velocity, √D g(x, v) dW, with g given as a formula in ``x`` and ``v``.
+
+    Parameters
+    ----------
+    intensity : float
+        D, in m² s⁻³, not negative.
+    amplitude : str
+        Formula of g; read as data, never run.
+    **constants : float
+        Values of the names that the formula uses.
+
+    Examples
+    --------
+    >>> StateDependentNoise(1e-4, "1 + c*x**2", c=0.5)
+    StateDependentNoise(intensity=0.0001, amplitude='1 + c*x**2', c=0.5)
+    """
+
+    variables: ClassVar[tuple[str, ...]] = ("x", "v")
+    formula_name: ClassVar[str] = "amplitude"
+
+    formula: str
+    constants: tuple[tuple[str, Any], ...]
+
+    def __init__(self, intensity: float, amplitude: str, **constants: float) -> None:
+        object.__setattr__(self, "intensity", intensity)
+        self._read(amplitude, constants)
+        self.__post_init__()
+
+    def _own(self) -> tuple[Parameter, ...]:
+        return self._declared[:1]
+
+    def amplitude(self, x: Any, v: Any) -> Any:
+        """Factor before √D dW, as the formula says."""
+        return self._evaluate(x, v)

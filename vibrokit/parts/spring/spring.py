@@ -1,0 +1,16 @@
+"""Spring: the restoring force that acts everywhere."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any
+
+from vibrokit.parts.part import Part
+
+
+class Spring(Part):
+    """Restoring force per unit mass, x″ = … − force(x, v). Abstract."""
+
+    @abstractmethod
+    def force(self, x: Any, v: Any) -> Any:
+        """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression."""

@@ -1,0 +1,104 @@
+"""What can be derived from a contact law, so that nobody has to declare it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import sympy
+
+from vibrokit.parts.barrier import Barrier
+from vibrokit.symbolic.formulas import ask
+
+DEPTH = sympy.Symbol("depth", positive=True)
+RATE = sympy.Symbol("rate", real=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class DerivedContact:
+    """The law of one stop as a formula, and what follows from it.
+
+    Attributes
+    ----------
+    law : sympy.Expr
+        Push as a function of DEPTH > 0 and RATE.
+    conservative : bool
+        True if the force does not depend on the rate.
+    jumps : bool
+        True if the force jumps at first touch: its limit for depth → 0 at non-zero rate is not zero.
+    clamped : bool
+        True if the law could pull and the barrier is not adhesive, so that the force is cut at zero.
+    exponent : sympy.Expr or None
+        Leading power of depth at first touch at non-zero rate; None where it could not be found.
+    rooted : bool
+        True if the force is smooth in √depth but not in depth.
+    smooth : bool
+        True if the force is smooth in √depth at all, so that located contacts keep a stepper's full order.
+    """
+
+    law: sympy.Expr
+    conservative: bool
+    jumps: bool
+    clamped: bool
+    exponent: sympy.Expr | None
+    rooted: bool
+    smooth: bool
+
+
+def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol]) -> DerivedContact:
+    """Ask the law of a barrier for its formula and derive its properties."""
+    law = ask(barrier.law, "force", symbols, (DEPTH, RATE))
+    conservative = RATE not in law.free_symbols
+    analytic = _analytic(law, DEPTH)
+    root = sympy.Symbol("root", positive=True)
+    smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)
+    exponent = _leading_power(law)
+    return DerivedContact(
+        law=law,
+        conservative=conservative,
+        jumps=_jumps(law),
+        clamped=not barrier.adhesive and not law.is_nonnegative,
+        exponent=exponent,
+        rooted=smooth and not analytic,
+        smooth=smooth,
+    )
+
+
+def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
+    """Whether an expression has a power series in `variable` at 0: nothing in it is singular there."""
+    for node in sympy.preorder_traversal(expression):
+        if variable not in node.free_symbols:
+            continue
+        if isinstance(node, sympy.Pow):
+            if node.exp.is_Integer and node.exp.is_nonnegative:
+                continue
+            if variable in node.exp.free_symbols:
+                base_vanishes = node.base.subs(variable, 0).is_zero is not False
+            else:
+                base_vanishes = variable in node.base.free_symbols and node.base.subs(variable, 0).is_zero is not False
+            if base_vanishes:
+                return False
+        elif isinstance(node, sympy.log) and node.args[0].subs(variable, 0).is_zero is not False:
+            return False
+        elif isinstance(node, sympy.Abs | sympy.sign | sympy.Max | sympy.Min | sympy.Piecewise):
+            return False
+    return True
+
+
+def _jumps(law: sympy.Expr) -> bool:
+    try:
+        at_touch = law.subs(DEPTH, 0)
+        if at_touch.has(sympy.nan, sympy.zoo, sympy.oo):
+            at_touch = sympy.limit(law, DEPTH, 0, "+")
+    except (NotImplementedError, ValueError):
+        return True
+    return sympy.simplify(at_touch) != 0
+
+
+def _leading_power(law: sympy.Expr) -> sympy.Expr | None:
+    terms = sympy.Add.make_args(sympy.expand(law))
+    powers = [term.as_independent(DEPTH)[1].as_base_exp() for term in terms]
+    if all(base == DEPTH or base == 1 for base, _ in powers):
+        exponents = [exponent if base == DEPTH else sympy.Integer(0) for base, exponent in powers]
+        numbers = [exponent for exponent in exponents if exponent.is_number]
+        return min(numbers) if len(numbers) == len(exponents) else None
+    return None

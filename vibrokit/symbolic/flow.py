@@ -1,0 +1,85 @@
+"""Derives the equations that a flow integrates."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import sympy
+
+from vibrokit.symbolic.contact import DEPTH, RATE
+from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.model import Model
+
+FORCING = sympy.Symbol("f", real=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class FlowEquations:
+    """Rates of a flow, with the stops as plain symbols.
+
+    Attributes
+    ----------
+    variables : tuple of Symbol
+    rates : tuple of Expr
+        In the variables, parameters, FORCING, and symbols of `contacts`.
+    contacts : dict
+        Symbol → (stop index, orders of differentiation in x and in v) of each contact term that is needed.
+    """
+
+    variables: tuple[sympy.Symbol, ...]
+    rates: tuple[sympy.Expr, ...]
+    contacts: dict[sympy.Symbol, tuple[int, int, int]]
+
+
+def derive_flow(model: Model, flow: Flow) -> FlowEquations:
+    """Derive the equations of a flow."""
+    x, v = model.state[:2]
+    opaque = tuple(sympy.Function(f"C{index}")(x, v) for index in range(len(model.scene.barriers)))
+    forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
+    drift = model.drift_with(forcing, opaque)
+    variables: tuple[sympy.Symbol, ...] = model.state
+    rates = list(drift)
+    linear: sympy.Matrix | None = None
+    if flow is Flow.STATE_VARIATIONAL:
+        linear = drift.jacobian(list(model.state))
+    elif flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
+        hamiltonian = model.hamiltonian_with(drift)
+        phase = (*model.state, *model.momenta)
+        rates = [sympy.diff(hamiltonian, p) for p in model.momenta]
+        rates += [-sympy.diff(hamiltonian, q) for q in model.state]
+        if flow is Flow.HAMILTONIAN_VARIATIONAL:
+            linear = sympy.Matrix(rates).jacobian(list(phase))
+        variables = (*phase, sympy.Symbol("S", real=True))
+        rates.append(model.action_rate)
+    if linear is not None:
+        size = linear.shape[0]
+        matrix = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"m_{i}{j}", real=True))
+        variables = (*variables, *matrix)
+        rates += list(linear * matrix)
+    return _with_plain_contacts(model, opaque, variables, rates)
+
+
+def _with_plain_contacts(
+    model: Model,
+    opaque: tuple[sympy.Expr, ...],
+    variables: tuple[sympy.Symbol, ...],
+    rates: list[sympy.Expr],
+) -> FlowEquations:
+    x, v = model.state[:2]
+    contacts: dict[sympy.Symbol, tuple[int, int, int]] = {}
+    replacements = {}
+    orders = [(a, b) for total in (2, 1, 0) for a in range(total, -1, -1) for b in (total - a,)]
+    for index, function in enumerate(opaque):
+        law = model.contacts[index].law
+        for a, b in orders:
+            term = sympy.diff(function, (x, a), (v, b))
+            if any(rate.has(term) for rate in rates):
+                if sympy.diff(law, (DEPTH, a), (RATE, b)) == 0:
+                    replacements[term] = sympy.Integer(0)
+                    continue
+                symbol = sympy.Symbol(f"C{index}" + ("_" if a + b else "") + "x" * a + "v" * b, real=True)
+                replacements[term] = symbol
+                contacts[symbol] = (index, a, b)
+    rates = [rate.doit().xreplace(replacements) for rate in rates]
+    needed = set().union(*(rate.free_symbols for rate in rates))
+    return FlowEquations(variables, tuple(rates), {s: c for s, c in contacts.items() if s in needed})

@@ -1,0 +1,177 @@
+"""Model: the equations of a scene, derived from its parts."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import sympy
+
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
+from vibrokit.symbolic.formulas import ask
+from vibrokit.symbolic.symbols import parameter_symbols
+
+
+class Model:
+    """Drift, diffusion, Hamiltonian and everything that follows from them, as SymPy expressions.
+
+    The convention is that of large deviations: ε = D, dq = b(q, t) dt + √D σ(q) dW, a = σσᵀ, and
+
+        H(q, p, t) = p·b(q, t) + ½ pᵀ a(q) p,   q′ = ∂H/∂p,   p′ = −∂H/∂q,   S′ = ½ pᵀ a p
+
+    (Freidlin & Wentzell, *Random Perturbations of Dynamical Systems*).
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.symbols = parameter_symbols(scene)
+        self.time = sympy.Symbol("t", real=True)
+        extra = scene.noise.extra_states if scene.noise else ()
+        self.state = tuple(sympy.Symbol(name, real=True) for name in ("x", "v", *extra))
+
+    def _symbols_of(self, prefix: str) -> dict[str, sympy.Symbol]:
+        start = f"{prefix}." if prefix else ""
+        return {
+            path.removeprefix(start): symbol
+            for path, symbol in self.symbols.items()
+            if path.startswith(start) and "." not in path.removeprefix(start)
+        }
+
+    @cached_property
+    def contacts(self) -> tuple[DerivedContact, ...]:
+        """What was derived from the law of each stop."""
+        return tuple(
+            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"))
+            for index, barrier in enumerate(self.scene.barriers)
+        )
+
+    def depth(self, index: int) -> sympy.Expr:
+        """Depth at stop `index`, as an expression of x; negative when apart."""
+        return self.scene.barriers[index].sign * (self.state[0] - self.symbols[f"barriers.{index}.position"])
+
+    def contact_force(self, index: int) -> sympy.Expr:
+        """Force of stop `index` on the mass where they touch and the stop pushes, as an expression of x and v."""
+        sign = self.scene.barriers[index].sign
+        return -sign * self.contacts[index].law.subs({DEPTH: self.depth(index), RATE: sign * self.state[1]})
+
+    def guarded_force(self, index: int) -> sympy.Expr:
+        """Force of stop `index` on the mass everywhere: zero when apart, and where a law would pull."""
+        sign = self.scene.barriers[index].sign
+        force = self.contact_force(index)
+        touching = self.depth(index) > 0
+        if self.contacts[index].clamped:
+            touching = sympy.And(touching, -sign * force > 0)
+        return sympy.Piecewise((force, touching), (0, True))
+
+    @cached_property
+    def smooth_force(self) -> sympy.Expr:
+        """Acceleration without stops and without what depends on time."""
+        x, v, *extra = self.state
+        omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
+        spring = omega**2 * x
+        if self.scene.spring is not None:
+            spring = ask(self.scene.spring, "force", self._symbols_of("spring"), (x, v))
+        constant = sum((f for f in self._excitations if self.time not in f.free_symbols), sympy.Integer(0))
+        push = ask(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
+        return -2 * zeta * omega * v - spring + constant + push
+
+    @cached_property
+    def _excitations(self) -> tuple[sympy.Expr, ...]:
+        return tuple(
+            ask(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,))
+            for index, part in enumerate(self.scene.excitations)
+        )
+
+    @cached_property
+    def forcing(self) -> sympy.Expr:
+        """Sum of the excitations that depend on time."""
+        return sum((f for f in self._excitations if self.time in f.free_symbols), sympy.Integer(0))
+
+    def drift_with(self, forcing: sympy.Expr, contacts: tuple[sympy.Expr, ...]) -> sympy.Matrix:
+        """Drift b in terms of a given forcing and given forces of the stops."""
+        _, v, *extra = self.state
+        acceleration = self.smooth_force + forcing + sum(contacts, sympy.Integer(0))
+        return sympy.Matrix([v, acceleration, *self._extra_drift])
+
+    @cached_property
+    def _extra_drift(self) -> tuple[sympy.Expr, ...]:
+        noise, extra = self.scene.noise, self.state[2:]
+        if noise is None or not extra:
+            return ()
+        values = {d.name: self._symbols_of("noise").get(d.name, noise.parameters[d.name]) for d in noise.declared()}
+        return tuple(sympy.sympify(rate) for rate in noise.twin(values).drift(*self.state))
+
+    @cached_property
+    def drift(self) -> sympy.Matrix:
+        """Drift b(q, t), stops as `Piecewise`, column of length n."""
+        return self.drift_with(
+            self.forcing, tuple(self.guarded_force(index) for index in range(len(self.scene.barriers)))
+        )
+
+    @cached_property
+    def amplitude(self) -> sympy.Matrix:
+        """Column σ(q): what multiplies √D dW."""
+        column = [sympy.Integer(0)] * len(self.state)
+        if self.scene.noise is not None:
+            column[-1 if len(self.state) > 2 else 1] = ask(
+                self.scene.noise, "amplitude", self._symbols_of("noise"), self.state[:2]
+            )
+        return sympy.Matrix(column)
+
+    @cached_property
+    def diffusion(self) -> sympy.Matrix:
+        """Diffusion matrix a = σσᵀ, n × n; D stands before it."""
+        return self.amplitude * self.amplitude.T
+
+    @cached_property
+    def momenta(self) -> tuple[sympy.Symbol, ...]:
+        """Momenta conjugate to the state; none in a scene without noise."""
+        if self.scene.noise is None:
+            return ()
+        return tuple(sympy.Symbol(f"p_{index + 1}", real=True) for index in range(len(self.state)))
+
+    def hamiltonian_with(self, drift: sympy.Matrix) -> sympy.Expr:
+        """H for a given drift."""
+        p = sympy.Matrix(self.momenta)
+        return (p.T * drift)[0] + (p.T * self.diffusion * p)[0] / 2 if self.momenta else sympy.Integer(0)
+
+    @cached_property
+    def hamiltonian(self) -> sympy.Expr:
+        """H(q, p, t) = p·b + ½ pᵀ a p."""
+        return self.hamiltonian_with(self.drift)
+
+    @cached_property
+    def action_rate(self) -> sympy.Expr:
+        """S′ = ½ pᵀ a p along Hamilton's equations."""
+        p = sympy.Matrix(self.momenta)
+        return (p.T * self.diffusion * p)[0] / 2 if self.momenta else sympy.Integer(0)
+
+    @cached_property
+    def equations(self) -> dict[sympy.Symbol, sympy.Expr]:
+        """Rate of every variable: Hamilton's equations with noise, the equations of motion without."""
+        if not self.momenta:
+            return dict(zip(self.state, self.drift, strict=True))
+        rates = {q: sympy.diff(self.hamiltonian, p) for q, p in zip(self.state, self.momenta, strict=True)}
+        rates |= {p: -sympy.diff(self.hamiltonian, q) for q, p in zip(self.state, self.momenta, strict=True)}
+        return {variable: sympy.expand(rate) for variable, rate in rates.items()}
+
+    @cached_property
+    def jacobian(self) -> sympy.Matrix:
+        """∂b/∂q, n × n."""
+        return self.drift.jacobian(list(self.state))
+
+    def _repr_latex_(self) -> str:
+        lines = [rf"\dot{{{sympy.latex(q)}}} &= {sympy.latex(rate)}" for q, rate in self.equations.items()]
+        if self.momenta:
+            lines.append(rf"\dot{{S}} &= {sympy.latex(self.action_rate)}")
+        return r"$\displaystyle \begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}$"
+
+    def __str__(self) -> str:
+        lines = [f"{q}' = {rate}" for q, rate in self.equations.items()]
+        if self.momenta:
+            lines += [f"S' = {self.action_rate}", f"H = {self.hamiltonian}"]
+        return "\n".join(lines)

@@ -1,0 +1,31 @@
+"""SceneText: the scene part of a kernel, as plain text. Reading it needs no SymPy."""
+
+from __future__ import annotations
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class SceneText:
+    """The scene part of a kernel, as text.
+
+    Attributes
+    ----------
+    variables : tuple of str
+        Names of the numbers that are integrated.
+    parameters : dict of str to int
+        Names of the parameters that the right-hand side takes, and their places in `theta`.
+    preamble, constants, forcing, derivative, rhs, stops, amplitude : str
+        Pieces of the module; empty where the scene has no need of them.
+    """
+
+    variables: tuple[str, ...]
+    parameters: dict[str, int]
+    forced: bool
+    preamble: str
+    constants: str
+    forcing: str
+    derivative: str
+    rhs: str
+    stops: str
+    amplitude: str

@@ -1,0 +1,48 @@
+"""A symbol for every parameter of a scene, each name used once."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import sympy
+
+from vibrokit.parts.scene import Entry, Scene
+
+_TAKEN = ("x", "v", "t", "S", "f", "h", "z")
+
+
+def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
+    """Map the path of every parameter that is a number to its symbol.
+
+    A letter that several parts share gets the part's index, or the side of its stop: k_r, k_l; f_0, f_1.
+    """
+    entries = [entry for entry in scene.entries() if not entry.declared.structural]
+    letters = Counter(entry.declared.symbol for entry in entries)
+    taken = {*_TAKEN, *(scene.noise.extra_states if scene.noise else ())}
+    symbols = {}
+    for entry in entries:
+        name = entry.declared.symbol
+        if letters[name] > 1 or name in taken:
+            name = f"{name}_{_suffix(scene, entry)}"
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        symbols[entry.path] = _symbol(name, entry)
+    return symbols
+
+
+def _suffix(scene: Scene, entry: Entry) -> str:
+    head, *rest = entry.path.split(".")
+    if head == "barriers":
+        return scene.barriers[int(rest[0])].side[0]
+    if head == "excitations":
+        return rest[0]
+    return {"spring": "s", "noise": "xi"}.get(head, "")
+
+
+def _symbol(name: str, entry: Entry) -> sympy.Symbol:
+    low = entry.declared.above if entry.declared.above is not None else entry.declared.minimum
+    if low is not None and low >= 0:
+        positive = entry.declared.above is not None
+        return sympy.Symbol(name, positive=True) if positive else sympy.Symbol(name, nonnegative=True)
+    return sympy.Symbol(name, real=True)
