@@ -117,6 +117,12 @@ def load_all(group: Group, kind: type[T]) -> dict[str, type[T]]:
     return working
 
 
+def name_of(group: Group, cls: type) -> str:
+    """Return the name that a class is registered under, or ``module:Class`` if it is not registered."""
+    place = f"{cls.__module__}:{cls.__qualname__}"
+    return next((entry.name for entry in _entry_points(group) if entry.value == place), place)
+
+
 def _entry_points(group: str) -> Iterable[EntryPoint]:
     """Read the entry points of a group; the one place that asks the installation."""
     return importlib.metadata.entry_points(group=group)

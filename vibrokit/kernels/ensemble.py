@@ -78,6 +78,7 @@ def run_ensemble(
     stop: Stop | None = None,
     start_time: float = 0.0,
     interval: float | None = None,
+    stream: tuple[int, int] | None = None,
     executor: futures.Executor | None = None,
     progress: Progress | None = None,
 ) -> Ensemble:
@@ -97,6 +98,9 @@ def run_ensemble(
         Time of the start (s).
     interval : float, optional
         Time from section to section (s); the scene's own by default.
+    stream : (int, int), optional
+        For the noisy flow: seed, and index of the first trajectory. Each trajectory has a random stream of its own
+        that depends on the seed and its index alone.
     executor : concurrent.futures.Executor, optional
         Carries the blocks; threads of this process by default. The result is the same to the last bit.
     progress : callable, optional
@@ -110,9 +114,14 @@ def run_ensemble(
     starts = np.ascontiguousarray(states, dtype=float)
     budgets = np.ascontiguousarray(np.broadcast_to(np.asarray(budget, dtype=np.int64), len(starts)))
     span = scene.section_interval if interval is None else interval
-    common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)), stop or Stop())
-    blocks = list(_blocks(len(starts)))
-    tasks = [(kernel, starts[block], budgets[block], *common) for block in blocks]
+    common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)))
+    tasks = []
+    for block in _blocks(len(starts)):
+        streams: tuple[Any, ...] = ()
+        if stream is not None:
+            seed, first = stream
+            streams = (np.int64(seed), np.arange(first + block.start, first + block.stop, dtype=np.int64))
+        tasks.append((kernel, starts[block], budgets[block], common, streams, stop or Stop()))
     return _joined(list(carry(_advance_block, tasks, executor, progress)), starts.shape[1])
 
 
@@ -125,15 +134,13 @@ def _blocks(count: int) -> Iterator[slice]:
 
 
 def _advance_block(
-    kernel: Kernel, starts: Array, budget: Array, theta: Array, start_time: float, span: float, settings: Array, stop: Stop
+    kernel: Kernel, starts: Array, budget: Array, common: tuple[Any, ...], streams: tuple[Any, ...], stop: Stop
 ) -> Ensemble:
     count = len(starts)
     ended = Ensemble(np.empty_like(starts), *(np.zeros(count, dtype=np.int64) for _ in range(3)))
-    kernel.module.advance(
-        starts, theta, start_time, span, settings, budget,
-        stop.region, stop.labels, stop.home, stop.points, stop.point_labels, stop.tolerance,
-        ended.states, ended.intervals, ended.status, ended.label,
-    )  # fmt: skip
+    tests = (stop.region, stop.labels, stop.home, stop.points, stop.point_labels, stop.tolerance)
+    outputs = (ended.states, ended.intervals, ended.status, ended.label)
+    kernel.module.advance(starts, *common, *streams, budget, *tests, *outputs)
     return ended
 
 

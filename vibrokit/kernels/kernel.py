@@ -6,6 +6,7 @@ import ast
 import dataclasses
 import functools
 import hashlib
+import re
 import types
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MARKER = "# --- scene above, stepper below ---\n"
-_FORCED, _UNFORCED = "  # forced\n", "  # unforced\n"
+_CONDITION = re.compile(r"  # (forced|unforced|noisy)\n$")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +91,8 @@ def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
     templates = [read_template(name) for name in stepper.templates]
     imports = "\n".join(dict.fromkeys(line for template in templates for line in template.imports))
     body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)
-    pieces = [text.preamble, imports, *stepper.scene_part(text), _for_forcing(body, text.forced)]
+    conditions = {"forced": text.forced, "unforced": not text.forced, "noisy": flow is Flow.NOISY}
+    pieces = [text.preamble, imports, *stepper.scene_part(text), _fitting(body, conditions)]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece)
 
 
@@ -109,10 +111,16 @@ def read_template(name: str) -> Template:
     return Template(tuple(ast.unparse(node) for node in kept), body)
 
 
-def _for_forcing(text: str, forced: bool) -> str:
-    drop, keep = (_UNFORCED, _FORCED) if forced else (_FORCED, _UNFORCED)
-    lines = [line for line in text.splitlines(keepends=True) if not line.endswith(drop)]
-    return "".join(line.replace(keep, "\n") if line.endswith(keep) else line for line in lines)
+def _fitting(text: str, conditions: dict[str, bool]) -> str:
+    """Keep the lines of a template whose condition holds, so that a scene has no trace of what it lacks."""
+    kept = []
+    for line in text.splitlines(keepends=True):
+        condition = _CONDITION.search(line)
+        if condition is None:
+            kept.append(line)
+        elif conditions[condition[1]]:
+            kept.append(line[: condition.start()] + "\n")
+    return "".join(kept)
 
 
 def theta_of(scene: Scene) -> NDArray[np.float64]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from vibrokit.symbolic.scene_text import SceneText
 
 _FEW_EQUATIONS = 8
+_ROOT_THIRD = 1 / math.sqrt(3)
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 
 
@@ -51,12 +54,27 @@ def tabulation(text: SceneText) -> str:
     )
 
 
-def scalar_step(text: SceneText) -> str:
-    """Function `slopes(t, z, theta, out)`: the same right-hand side for one trajectory at time t."""
-    arguments = [f"z[{index}]" for index in range(len(text.variables))]
-    arguments += ["forcing(t, theta)"] if text.forced else []
-    arguments += [f"theta[{place}]" for place in text.parameters.values()]
-    targets = ", ".join(f"out[{index}]" for index in range(len(text.variables)))
-    return "\n".join(
-        ["@njit(**OPTIONS)", "def slopes(t, z, theta, out):", f"    {targets} = derivative({', '.join(arguments)})", ""]
-    )
+def kicks(text: SceneText) -> str:
+    """Functions `kick_before` and `kick_after`: the noise of one step, in two parts.
+
+    With U₁, U₂ standard normal, ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
+    """
+    driven = text.states - 1
+    milstein = " + 0.5*size*slope(x, v, theta)*h*(first[lane]*first[lane] - 1.0)" if text.slope else ""
+    return f"""
+@njit(**OPTIONS)
+def kick_before(z, first, second, theta, h, later):
+    half = 0.5*sqrt(h)
+    for lane in range(LANES):
+        x = z[0, lane]
+        v = z[1, lane]
+        size = amplitude(x, v, theta)
+        z[{driven}, lane] += half*size*(first[lane] + {_ROOT_THIRD!r}*second[lane])
+        later[lane] = half*size*(first[lane] - {_ROOT_THIRD!r}*second[lane]){milstein}
+
+
+@njit(**OPTIONS)
+def kick_after(z, later):
+    for lane in range(LANES):
+        z[{driven}, lane] += later[lane]
+"""

@@ -6,7 +6,7 @@ import dataclasses
 from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import lane_step, scalar_step, tabulation
+from vibrokit.kernels.lanes import kicks, lane_step, tabulation
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.scene_text import SceneText
@@ -47,8 +47,9 @@ class RK4(Stepper):
         return float(steps), float(repeats), unit / self.steps
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The lane-packed step for ensembles, the scalar slopes for single trajectories."""
-        return [text.constants, text.forcing, tabulation(text), text.derivative, lane_step(text), scalar_step(text)]
+        """The lane-packed step, and the kicks of the noisy flow."""
+        step = [text.constants, text.forcing, tabulation(text), text.derivative, lane_step(text)]
+        return [*step, text.amplitude, text.slope, kicks(text)] if text.amplitude else step
 
     def refined(self) -> Self:
         """Twice the steps."""

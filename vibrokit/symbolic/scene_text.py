@@ -15,12 +15,17 @@ class SceneText:
         Names of the numbers that are integrated.
     parameters : dict of str to int
         Names of the parameters that the right-hand side takes, and their places in `theta`.
-    preamble, constants, forcing, derivative, rhs, stops, amplitude : str
+    states : int
+        How many of the variables are the state q.
+    forced : bool
+        Whether anything depends on time.
+    preamble, constants, forcing, derivative, rhs, stops, amplitude, slope : str
         Pieces of the module; empty where the scene has no need of them.
     """
 
     variables: tuple[str, ...]
     parameters: dict[str, int]
+    states: int
     forced: bool
     preamble: str
     constants: str
@@ -29,3 +34,4 @@ class SceneText:
     rhs: str
     stops: str
     amplitude: str
+    slope: str

@@ -36,9 +36,11 @@ _TINY = "1e-300"
 def scene_text(scene: Scene, flow: Flow) -> SceneText:
     """Derive the equations of a scene and write them down for one flow."""
     writer = _SceneWriter(Model(scene), flow)
+    amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
     return SceneText(
         variables=tuple(writer.variables),
         parameters={name: writer.place(name) for name in writer.parameter_names()},
+        states=len(writer.model.state),
         forced=writer.forced,
         preamble=writer.preamble(f"The {flow.value} flow of a scene."),
         constants=writer.constants(),
@@ -46,7 +48,8 @@ def scene_text(scene: Scene, flow: Flow) -> SceneText:
         derivative=writer.derivative(),
         rhs=writer.rhs(),
         stops=writer.stops(),
-        amplitude=writer.amplitude() if flow is Flow.NOISY else "",
+        amplitude=amplitude,
+        slope=slope,
     )
 
 
@@ -135,18 +138,18 @@ class _SceneWriter:
         nowhere = "    return np.nan"
         return "\n".join([*stop, nowhere, "", "", *law, nowhere, ""])
 
-    def amplitude(self) -> str:
-        """Functions `amplitude` = √D g and `slope` = ∂g/∂(driven state), of (x, v, theta), for the noisy flow."""
-        driven = self.model.state[-1 if len(self.model.state) > 2 else 1]
-        factor = next((value for value in self.model.amplitude if value != 0), sympy.Integer(0))
+    def noise(self) -> tuple[str, str]:
+        """Functions `amplitude` = √D g(x, v), and `slope`, its rate in the state that it drives, unless that is 0."""
+        driven = self.model.state[-1]
         intensity = self.model.symbols["noise.intensity"]
-        targets = {"amplitude": sympy.sqrt(intensity) * factor, "slope": sympy.diff(factor, driven)}
-        text = []
-        for name, target in targets.items():
-            lines, texts = assignments({name: target}, "c")
-            body = [*self._unpack(target), *lines, f"    return {texts[name]}"]
-            text += ["@njit(**OPTIONS)", f"def {name}(x, v, theta):", *body, "", ""]
-        return "\n".join(text)
+        size = sympy.sqrt(intensity) * self.model.amplitude[len(self.model.state) - 1]
+        slope = sympy.diff(size, driven)
+        return self._of_state("amplitude", size), "" if slope == 0 else self._of_state("slope", slope)
+
+    def _of_state(self, name: str, value: sympy.Expr) -> str:
+        lines, texts = assignments({name: value}, "c")
+        body = [*self._unpack(value), *lines, f"    return {texts[name]}"]
+        return "\n".join(["@njit(**OPTIONS)", f"def {name}(x, v, theta):", *body, ""])
 
     def parameter_names(self) -> list[str]:
         """Names of the parameters that the right-hand side uses, in the order of `theta`."""

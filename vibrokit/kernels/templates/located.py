@@ -7,7 +7,7 @@ At most one stop is touched at a time.
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import RAN_OUT, NOT_FINITE, STALLED
+from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
 from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, OPTIONS, ROOTED, SIDES, law, rhs, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
@@ -25,9 +25,11 @@ from vibrokit.kernels.templates.steps import (
 
 # --- scene above, stepper below ---
 
-# What is remembered between steps: lengths of the next step in free flight and in contact, which stop is touched (−1:
-# none), when (nan: unknown), whether its law would pull, whether the next step must run in time, steps tried, and the time to travel.
-FREE_STEP, CONTACT_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN, MEMORY = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# What is remembered between steps: how long the next step shall last in free flight, in contact and at the next touch,
+# which stop is touched (−1: none), since when (nan: unknown), whether its law would pull, whether the next step must
+# run in time, the steps tried, and the time to travel.
+FREE_STEP, CONTACT_STEP, FIRST_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN = 0, 1, 2, 3, 4, 5, 6, 7, 8
+MEMORY = 9
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
 
 
@@ -51,6 +53,7 @@ def settle(y, memory, pushing, theta, spare):
                 memory[SINCE] = y[CLOCK]
         if touched:
             memory[TOUCHED] = i
+            memory[CONTACT_STEP] = memory[FIRST_STEP]
             memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
             pushing[i] = memory[PULLED] == 0.0
             return
@@ -144,7 +147,7 @@ def cubic(d0, r0, d1, r1, h, s):
 
 @njit(**OPTIONS)
 def swing(d0, r0, d1, r1, h):
-    """Largest depth within a step that begins with r0 > 0 and ends with r1 < 0, and the share of the step until then."""
+    """Largest depth within a step that begins with r0 > 0 and ends with r1 < 0, estimated."""
     low, high = 0.0, 1.0
     for _ in range(24):
         s = 0.5 * (low + high)
@@ -171,8 +174,8 @@ def course_of(i, y, memory, theta, desk):
     """Choose the course of the next step in contact, and where on it y lies."""
     depth, rate = SIDES[i] * (y[0] - stop(i, theta)), SIDES[i] * y[1]
     if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
-        acceleration = desk[0, 1]
-        if rate * rate > 4.0 * abs(acceleration) * depth:
+        acceleration = SIDES[i] * desk[0, 1]
+        if rate * rate > (4.0 if acceleration > 0.0 else -1.0) * acceleration * depth:
             return ROOT_DEPTH, np.sqrt(depth)
     if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
         return ROOT_TIME, np.sqrt(y[CLOCK] - memory[SINCE])
@@ -197,7 +200,7 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
     rhs(y[CLOCK], y, pushing, theta, desk[0])
     course, sigma = course_of(i, y, memory, theta, desk)
     left = end - y[CLOCK]
-    last = memory[CONTACT_STEP] >= 0.99 * left
+    last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * left
     h = length_of(course, sigma, left if last else memory[CONTACT_STEP], i, y, theta)
     slope(course, sigma, h, y, i, pushing, theta, desk[0], desk[SPARE])
     first, error = h, 0.0
@@ -218,8 +221,72 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
             if trial[CLOCK] > end or SIDES[i] * trial[1] >= 0.0:
                 memory[TIMED] = 2.0 if trial[CLOCK] > end else 1.0
                 return RAN_OUT
-        elif leaves(i, y, h if course == TIME else lapse, memory, theta, trial) and not tiny:
+        elif memory[PULLED] == 0.0 and not tiny and leaves(i, y, lapse, theta, trial):
             h *= 0.5
             continue
         break
     return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, desk)
+
+
+@njit(**OPTIONS)
+def leaves(i, y, lapse, theta, trial):
+    """Whether a step in time ends outside the stop, or may have been outside between."""
+    wall, before, after = stop(i, theta), SIDES[i] * y[1], SIDES[i] * trial[1]
+    end = SIDES[i] * (trial[0] - wall)
+    if end < -4.0 * EPSILON * abs(wall):
+        return True
+    if before < 0.0 < after:
+        start = SIDES[i] * (y[0] - wall)
+        least = -swing(-start, -before, -end, -after, lapse)
+        return least < 0.1 * (max(start, end) - least)
+    return False
+
+
+@njit(**OPTIONS)
+def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, desk):
+    """Accept the step in TRIAL, or the part of it before the law changes its sign or the mass leaves."""
+    trial = desk[TRIAL]
+    wall, length, turned = stop(i, theta), h, False
+    if CLAMPED[i]:
+        before, after = push_at(i, y, theta), push_at(i, trial, theta)
+        pulled = memory[PULLED] != 0.0
+        turned = after > 0.0 if pulled else after < 0.0
+        if turned and (before < 0.0 if pulled else before > 0.0):
+            length = land(LAW_GOAL, course, sigma, h, y, i, pushing, theta, desk)
+        elif turned:
+            trial[:] = y
+            length = 0.0
+        if pulled and SIDES[i] * (trial[0] - wall) < 0.0:
+            turned = False
+            length = land(DEPTH_GOAL, course, sigma, length, y, i, pushing, theta, desk)
+            trial[0] = wall
+    lapse = trial[CLOCK] - y[CLOCK]
+    y[:] = trial
+    if last and length == h:
+        y[CLOCK] = end
+    plan_contact(course, sigma, length, lapse, last, error, memory)
+    if turned:
+        memory[PULLED] = 1.0 - memory[PULLED]
+        memory[SINCE] = np.nan
+        pushing[i] = not pushing[i]
+    elif (course == ROOT_DEPTH and sigma + length == 0.0) or SIDES[i] * (y[0] - wall) <= 0.0:
+        y[0] = wall
+        settle(y, memory, pushing, theta, desk[SPARE])
+    return RAN_OUT
+
+
+@njit(**OPTIONS)
+def plan_contact(course, sigma, length, lapse, last, error, memory):
+    """Choose how long the next step in contact shall last."""
+    factor = stretch(error)
+    if course == ROOT_TIME:
+        if sigma == 0.0:
+            memory[FIRST_STEP] = lapse * min(factor, 1.5) ** 2
+        longer = factor * length
+        lapse = longer * (2.0 * (sigma + length) + longer)
+    else:
+        lapse *= factor
+    if length != 0.0 and not (last and lapse < memory[CONTACT_STEP]):
+        memory[CONTACT_STEP] = lapse
+    if memory[TIMED] == 1.0:
+        memory[TIMED] = 0.0

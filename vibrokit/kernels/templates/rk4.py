@@ -2,13 +2,31 @@
 
 All lanes of a block share the phase of the forcing, so it is tabulated once. A lane whose trajectory has ended is
 given the next one at the following section.
+
+With noise, a step of length h draws ΔW and ΔZ = ∫W dt exactly and gives them as two kicks, ΔZ/h before a Runge–Kutta
+step of the drift and ΔW − ΔZ/h after it, so that the driven state and its integral both receive the right
+increments. For additive noise that is weak order 2 in the noise and order 4 in the drift (cf. small-noise methods in
+Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the amplitude depends on the state that
+it drives, Milstein's term makes it strong order 1.
+
+Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows.
 """
 
 import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
-from vibrokit.kernels.templates.scene import EQUATIONS, LANES, OPTIONS, slopes, step_lanes, tabulate
+from vibrokit.kernels.streams import normal_pairs, seed_lane
+from vibrokit.kernels.templates.scene import (
+    EQUATIONS,
+    LANES,
+    OPTIONS,
+    forcing,
+    kick_after,
+    kick_before,
+    step_lanes,
+    tabulate,
+)
 
 # --- scene above, stepper below ---
 
@@ -20,6 +38,8 @@ def advance(
     start_time,
     interval,
     settings,
+    seed,  # noisy
+    indices,  # noisy
     budget,
     region,
     labels,
@@ -39,11 +59,15 @@ def advance(
     table = np.zeros(2 * steps + 1)  # forced
     z = np.zeros((EQUATIONS, LANES))
     before = np.zeros((EQUATIONS, LANES))
+    stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
+    first = np.zeros(LANES)  # noisy
+    second = np.zeros(LANES)  # noisy
+    later = np.zeros(LANES)  # noisy
     holder = np.full(LANES, -1, dtype=np.int64)
     done = np.zeros(LANES, dtype=np.int64)
     waiting = 0
     active = 0
-    elapsed = 0
+    elapsed = 0  # forced
     tabulate(start_time, h, theta, table)  # forced
     while waiting < count or active > 0:
         # Lanes that do not share the phase of a newcomer must finish first.
@@ -54,6 +78,7 @@ def advance(
                         holder[lane] = waiting
                         done[lane] = 0
                         active += 1
+                        seed_lane(stream, lane, seed, indices[waiting])  # noisy
                         for e in range(EQUATIONS):
                             z[e, lane] = states[waiting, e]
                     else:
@@ -62,16 +87,19 @@ def advance(
                         out_status[waiting] = RAN_OUT
                         out_label[waiting] = -1
                     waiting += 1
-            elapsed = 0
             if active == 0:
                 break
+            elapsed = elapsed if repeats else 0  # forced
         if not repeats:  # forced
             tabulate(start_time + elapsed * interval, h, theta, table)  # forced
         before[:, :] = z
         for step in range(steps):
+            normal_pairs(stream, first, second)  # noisy
+            kick_before(z, first, second, theta, h, later)  # noisy
             step_lanes(z, table[2 * step], table[2 * step + 1], table[2 * step + 2], theta, h)  # forced
             step_lanes(z, theta, h)  # unforced
-        elapsed += 1
+            kick_after(z, later)  # noisy
+        elapsed += 1  # forced
         for lane in range(LANES):
             index = holder[lane]
             if index < 0:
@@ -100,33 +128,42 @@ def advance(
 
 
 @njit(**OPTIONS)
-def record(state, theta, start_time, spacing, settings, out):
+def record(
+    state,
+    theta,
+    start_time,
+    spacing,
+    settings,
+    seed,  # noisy
+    index,  # noisy
+    given,  # noisy
+    out,
+):
+    # One trajectory in lane 0, by the very code of the ensembles. `given` normals, if any, replace drawn ones.
     steps = max(1, int(np.ceil(spacing / settings[2] - 1e-9)))
     h = spacing / steps
-    z = state.copy()
-    point = np.empty(EQUATIONS)
-    k1 = np.empty(EQUATIONS)
-    k2 = np.empty(EQUATIONS)
-    k3 = np.empty(EQUATIONS)
-    k4 = np.empty(EQUATIONS)
-    out[0] = z
+    z = np.zeros((EQUATIONS, LANES))
+    stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
+    first = np.zeros(LANES)  # noisy
+    second = np.zeros(LANES)  # noisy
+    later = np.zeros(LANES)  # noisy
+    seed_lane(stream, 0, seed, index)  # noisy
+    for e in range(EQUATIONS):
+        z[e, 0] = state[e]
+    out[0] = state
     for sample in range(1, out.shape[0]):
         for step in range(steps):
-            t = start_time + (sample - 1) * spacing + step * h
-            slopes(t, z, theta, k1)
-            for e in range(EQUATIONS):
-                point[e] = z[e] + 0.5 * h * k1[e]
-            slopes(t + 0.5 * h, point, theta, k2)
-            for e in range(EQUATIONS):
-                point[e] = z[e] + 0.5 * h * k2[e]
-            slopes(t + 0.5 * h, point, theta, k3)
-            for e in range(EQUATIONS):
-                point[e] = z[e] + h * k3[e]
-            slopes(t + h, point, theta, k4)
-            for e in range(EQUATIONS):
-                z[e] += h / 6.0 * (k1[e] + 2.0 * (k2[e] + k3[e]) + k4[e])
+            t = start_time + (sample - 1) * spacing + step * h  # forced
+            normal_pairs(stream, first, second)  # noisy
+            if given.shape[0] > 0:  # noisy
+                first[0] = given[(sample - 1) * steps + step, 0]  # noisy
+                second[0] = given[(sample - 1) * steps + step, 1]  # noisy
+            kick_before(z, first, second, theta, h, later)  # noisy
+            step_lanes(z, forcing(t, theta), forcing(t + 0.5 * h, theta), forcing(t + h, theta), theta, h)  # forced
+            step_lanes(z, theta, h)  # unforced
+            kick_after(z, later)  # noisy
         for e in range(EQUATIONS):
-            if not np.isfinite(z[e]):
+            if not np.isfinite(z[e, 0]):
                 return sample
-        out[sample] = z
+            out[sample, e] = z[e, 0]
     return out.shape[0]

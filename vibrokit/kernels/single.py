@@ -1,0 +1,64 @@
+"""Runs one trajectory and keeps all of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import NoSectionError
+from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
+
+
+def record(
+    scene: Scene,
+    flow: Flow,
+    stepper: Stepper,
+    state: NDArray[np.float64],
+    start_time: float,
+    spacing: float,
+    count: int,
+    *,
+    seed: int | None = None,
+    normals: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Integrate one trajectory of any flow.
+
+    Parameters
+    ----------
+    scene, flow, stepper
+    state : array (equations,)
+        Start, in the layout of the flow.
+    start_time, spacing : float
+        Time of the start, and from sample to sample (s).
+    count : int
+        Samples after the start.
+    seed : int, optional
+        Of the noise, for the noisy flow.
+    normals : array (steps, 2), optional
+        Standard normals to use in place of drawn ones, for coupled paths.
+
+    Returns
+    -------
+    array (≤ count + 1, equations)
+        Shorter if the numbers ran out of range.
+    """
+    module = kernel_for(scene, flow, stepper).module
+    settings = np.array(stepper.settings(scene, _unit(scene)))
+    out = np.empty((count + 1, len(state)))
+    noise: tuple[Any, ...] = ()
+    if flow is Flow.NOISY:
+        noise = (np.int64(seed or 0), np.int64(0), np.empty((0, 2)) if normals is None else normals)
+    good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
+    return out[:good]
+
+
+def _unit(scene: Scene) -> float:
+    try:
+        return scene.section_interval
+    except NoSectionError:
+        return 2 * np.pi / scene.natural_frequency

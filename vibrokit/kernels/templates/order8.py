@@ -1,0 +1,112 @@
+"""Free flight by steps of order 8, each ended at the first touch of a stop."""
+
+from numba import njit
+
+from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
+from vibrokit.kernels.templates.located import (
+    COUNT,
+    DEPTH_GOAL,
+    FREE_STEP,
+    RATE_GOAL,
+    SPAN,
+    land,
+    settle,
+    swing,
+)
+from vibrokit.kernels.templates.scene import BARRIERS, OPTIONS, SIDES, stop
+from vibrokit.kernels.templates.steps import CLOCK, EPSILON, SPARE, TIME, TRIAL, attempt, misfit, slope, stretch
+
+# --- scene above, stepper below ---
+
+CLEAR, TOO_LONG = -1, -2  # what `watch` finds in a step, or the stop that it runs into
+
+
+@njit(**OPTIONS)
+def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
+    """Follow the free motion until a stop is touched or the time is up."""
+    trial = desk[TRIAL]
+    while y[CLOCK] < end:
+        left = end - y[CLOCK]
+        last = memory[FREE_STEP] >= 0.99 * left
+        h = left if last else memory[FREE_STEP]
+        first, touched, length = h, CLEAR, h
+        slope(TIME, 0.0, h, y, 0, pushing, theta, desk[0], desk[SPARE])
+        while True:
+            memory[COUNT] += 1.0
+            if memory[COUNT] > settings[1]:
+                return STALLED
+            attempt(TIME, 0.0, h, y, 0, pushing, theta, desk)
+            error = misfit(h, y, memory[SPAN], settings[0], desk)
+            tiny = h <= EPSILON * (abs(y[CLOCK]) + memory[SPAN])
+            if error > 1.0 and not tiny:
+                h *= min(0.7, stretch(error))
+                continue
+            if error == np.inf:
+                return NOT_FINITE
+            length = h
+            if BARRIERS > 0:
+                touched, length = watch(h, tiny, y, pushing, theta, desk)
+                if touched == TOO_LONG:
+                    h *= 0.5
+                    continue
+            break
+        if touched == CLEAR and not (last and h == first and h * stretch(error) < memory[FREE_STEP]):
+            memory[FREE_STEP] = h * stretch(error)
+        y[:] = trial
+        if last and length == first:
+            y[CLOCK] = end
+        if BARRIERS > 0 and touched >= 0:
+            y[0] = stop(touched, theta)
+            settle(y, memory, pushing, theta, desk[SPARE])
+            return RAN_OUT
+    return RAN_OUT
+
+
+@njit(**OPTIONS)
+def watch(h, tiny, y, pushing, theta, desk):
+    """Look for a touch within the step in TRIAL; shorten the step to end on it. Returns what was found and the length."""
+    trial = desk[TRIAL]
+    for i in range(BARRIERS):
+        wall, side = stop(i, theta), SIDES[i]
+        before, after = side * (y[0] - wall), side * (trial[0] - wall)
+        turns, up = turns_of(side, trial[1], desk)
+        if turns > 1 and not tiny:
+            return TOO_LONG, h
+        if after > 0.0:
+            if before < 0.0:
+                return i, land(DEPTH_GOAL, TIME, 0.0, h, y, i, pushing, theta, desk)
+            if not tiny:
+                return TOO_LONG, h  # it has just left and is back already
+            return i, h
+        if turns == 1 and up:
+            rise, fall = side * y[1], side * trial[1]
+            if not (rise > 0.0 > fall):
+                continue
+            top = swing(before, rise, after, fall, h)
+            if top + 0.3 * (top - min(before, after)) <= 0.0:
+                continue
+            desk[SPARE, :] = trial
+            turn = land(RATE_GOAL, TIME, 0.0, h, y, i, pushing, theta, desk)
+            if side * (trial[0] - wall) > 0.0 and before < 0.0:
+                return i, land(DEPTH_GOAL, TIME, 0.0, turn, y, i, pushing, theta, desk)
+            if side * (trial[0] - wall) > 0.0 and not tiny:
+                return TOO_LONG, h
+            return CLEAR, turn
+    return CLEAR, h
+
+
+@njit(**OPTIONS)
+def turns_of(side, final, desk):
+    """How often the velocity turns within a step, from its stages, and whether the first turn is from towards a stop to away."""
+    largest = max(abs(desk[0, 0]), abs(desk[5, 0]), abs(final))
+    turns, up, before = 0, False, 0.0
+    for s in (0, 3, 5, 9, 10, 12):
+        rate = side * (final if s == 12 else desk[s, 0])
+        if abs(rate) < 1e-3 * largest:
+            continue
+        if rate * before < 0.0:
+            if turns == 0:
+                up = before > 0.0
+            turns += 1
+        before = rate
+    return turns, up

@@ -1,0 +1,111 @@
+"""From section to section: what every stepper that locates its events offers."""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
+from vibrokit.kernels.templates.located import (
+    CONTACT_STEP,
+    COUNT,
+    FIRST_STEP,
+    FREE_STEP,
+    MEMORY,
+    SPAN,
+    TOUCHED,
+    press,
+    settle,
+)
+from vibrokit.kernels.templates.order8 import fly
+from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
+from vibrokit.kernels.templates.steps import CLOCK, ROWS, SPARE
+
+# --- scene above, stepper below ---
+
+
+@njit(**OPTIONS)
+def begin(y, interval, memory, pushing, theta, desk):
+    """Forget the past: what follows depends on y alone."""
+    memory[SPAN] = abs(interval)
+    memory[FREE_STEP] = interval / 16.0
+    memory[FIRST_STEP] = interval / 128.0
+    memory[CONTACT_STEP] = memory[FIRST_STEP]
+    if BARRIERS > 0:
+        settle(y, memory, pushing, theta, desk[SPARE])
+    else:
+        memory[TOUCHED] = -1.0
+
+
+@njit(**OPTIONS)
+def travel(y, end, memory, pushing, theta, settings, desk, coefficients):
+    """Carry y to the time `end`, from contact to contact."""
+    memory[COUNT] = 0.0
+    status = RAN_OUT
+    while y[CLOCK] < end and status == RAN_OUT:
+        if BARRIERS > 0 and memory[TOUCHED] >= 0.0:
+            status = press(y, end, memory, pushing, theta, settings, desk)
+        else:
+            status = fly(y, end, memory, pushing, theta, settings, desk, coefficients)
+    for e in range(EQUATIONS):
+        if not np.isfinite(y[e]):
+            return NOT_FINITE
+    return status
+
+
+@njit(**OPTIONS)
+def advance(
+    states,
+    theta,
+    start_time,
+    interval,
+    settings,
+    budget,
+    region,
+    labels,
+    home,
+    points,
+    point_labels,
+    tolerance,
+    out_states,
+    out_intervals,
+    out_status,
+    out_label,
+):
+    memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
+    desk, coefficients, y = desk_and_more()
+    repeats = settings[2] != 0.0
+    for index in range(states.shape[0]):
+        status, label, done = RAN_OUT, -1, 0
+        out_states[index] = states[index]
+        while status == RAN_OUT and done < budget[index]:
+            # Where the forcing repeats, each interval starts at the same time: the phase cannot drift.
+            start = start_time if repeats else start_time + done * interval
+            y[:CLOCK] = out_states[index]
+            y[CLOCK] = start
+            begin(y, interval, memory, pushing, theta, desk)
+            status = travel(y, start + interval, memory, pushing, theta, settings, desk, coefficients)
+            if status == RAN_OUT:
+                done += 1
+                out_states[index] = y[:CLOCK]
+                status, label = section_status(y[0], y[1], region, labels, home, points, point_labels, tolerance)
+        out_intervals[index], out_status[index], out_label[index] = done, status, label
+
+
+@njit(**OPTIONS)
+def desk_and_more():
+    return np.zeros((ROWS, CLOCK + 1)), np.zeros((EQUATIONS, 32)), np.zeros(CLOCK + 1)
+
+
+@njit(**OPTIONS)
+def record(state, theta, start_time, spacing, settings, out):
+    memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
+    desk, coefficients, y = desk_and_more()
+    out[0] = state
+    y[:CLOCK] = state
+    y[CLOCK] = start_time
+    begin(y, spacing, memory, pushing, theta, desk)
+    for sample in range(1, out.shape[0]):
+        status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, desk, coefficients)
+        if status != RAN_OUT:
+            return sample
+        out[sample] = y[:CLOCK]
+    return out.shape[0]

@@ -1,0 +1,227 @@
+"""Oscillator: a scene that can be looked at and integrated."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vibrokit.errors import IntegrationError, NoSectionError, ParameterError, SceneError
+from vibrokit.parts.scene import Scene
+from vibrokit.results.trajectory import Trajectory
+from vibrokit.symbolic.flow_kind import Flow
+
+if TYPE_CHECKING:
+    from vibrokit.kernels.stepper import Stepper
+    from vibrokit.symbolic.model import Model
+
+_SAMPLES = 256
+
+Array = NDArray[np.float64]
+Rng = int | np.random.Generator | None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Oscillator(Scene):
+    """A vibro-impact oscillator, x″ + 2ζω_n x′ + spring(x, x′) = stops + Σ excitations + noise, per unit mass.
+
+    Takes the parts that `Scene` describes, checks them, derives the equations when they are first looked at, and
+    compiles what is integrated when it is first integrated.
+
+    Examples
+    --------
+    >>> import vibrokit as vk
+    >>> osc = vk.Oscillator(
+    ...     natural_frequency=1.0, damping_ratio=0.01,
+    ...     barriers=(vk.Barrier(vk.Hertz(stiffness=50.0), position=0.5, side="right"),),
+    ...     excitations=(vk.Harmonic(amplitude=0.18, frequency=0.57),))
+    >>> osc.section_map([[0.0, 0.0]], periods=100)  # doctest: +SKIP
+    """
+
+    @cached_property
+    def model(self) -> Model:
+        """The derived equations; shows itself as LaTeX in a notebook."""
+        from vibrokit.symbolic.model import Model
+
+        return Model(self)
+
+    def trajectory(
+        self,
+        state: ArrayLike,
+        periods: float | None = None,
+        *,
+        duration: float | None = None,
+        samples: int = _SAMPLES,
+        start_time: float = 0.0,
+        stepper: Stepper | None = None,
+        rng: Rng = None,
+    ) -> Trajectory:
+        """Integrate one trajectory and return it at equally spaced times.
+
+        Parameters
+        ----------
+        state : array_like (n,)
+            Start (x, v), extra noise states after.
+        periods : float, optional
+            Length in forcing periods (units of 2π/ω_n without forcing). Give this or `duration`.
+        duration : float, optional
+            Length in time (s).
+        samples : int
+            Points per period; per 2π/ω_n where there is none.
+        start_time : float
+            Time of the start (s); the phase of the forcing follows from it.
+        stepper : Stepper, optional
+            By default the one that `vibrokit.kernels.choice` recommends for single trajectories.
+        rng : int or numpy.random.Generator, optional
+            Seed of the noise. Without it the trajectory is free of noise.
+
+        Returns
+        -------
+        Trajectory
+
+        Raises
+        ------
+        IntegrationError
+            The numbers ran out of range; it says when, and from which state.
+        """
+        from vibrokit.kernels.choice import single_stepper
+        from vibrokit.kernels.single import record
+
+        start = self._checked_states(state, 1)[0]
+        unit = self.section_interval if periods is not None else self._time_unit
+        length = self._length(periods, duration, unit)
+        count = max(1, math.ceil(length / unit * samples - 1e-9))
+        flow = Flow.STATE if rng is None else self._noisy()
+        chosen = stepper or single_stepper(self, flow)
+        seed = None if rng is None else seed_from(rng)
+        path = record(self, flow, chosen, start, start_time, length / count, count, seed=seed)
+        times = start_time + length / count * np.arange(count + 1)
+        if len(path) <= count:
+            last = tuple(float(value) for value in path[-1])
+            raise IntegrationError(
+                f"the trajectory ran out of range between t = {times[len(path) - 1]:g} and {times[len(path)]:g}; its "
+                f"last good state is {last}. Look at the signs of the forces, or take a finer stepper than {chosen}.",
+                float(times[len(path) - 1]),
+                last,
+            )
+        return Trajectory(times, path, tuple(barrier.position for barrier in self.barriers))
+
+    def section_map(
+        self,
+        states: ArrayLike,
+        periods: int = 1,
+        *,
+        stepper: Stepper | None = None,
+        rng: Rng = None,
+        executor: concurrent.futures.Executor | None = None,
+    ) -> Array:
+        """Map states from the section (t = 0) to the section some periods later.
+
+        Parameters
+        ----------
+        states : array_like (count, n)
+        periods : int
+            Forcing periods; units of 2π/ω_n for a scene without forcing.
+        stepper : Stepper, optional
+            By default the one that `vibrokit.kernels.choice` recommends for ensembles.
+        rng : int or numpy.random.Generator, optional
+            Seed of the noise. Without it the map is free of noise.
+        executor : concurrent.futures.Executor, optional
+            Carries blocks of work; threads by default.
+
+        Returns
+        -------
+        array (count, n)
+
+        Raises
+        ------
+        NoSectionError
+            The excitations have no common period.
+        IntegrationError
+            A trajectory ran out of range; it says which, when, and from which state.
+        """
+        from vibrokit.kernels.choice import ensemble_stepper
+        from vibrokit.kernels.ensemble import run_ensemble
+
+        starts = self._checked_states(states, 2)
+        if isinstance(periods, bool) or not isinstance(periods, int) or periods < 0:
+            raise ParameterError(f"section_map: periods is {periods!r}; give a whole number, 0 or more.")
+        flow = Flow.STATE if rng is None else self._noisy()
+        chosen = stepper or ensemble_stepper(self, flow)
+        stream = None if rng is None else (seed_from(rng), 0)
+        ended = run_ensemble(self, flow, chosen, starts, periods, stream=stream, executor=executor)
+        failed = np.flatnonzero(ended.intervals < periods)
+        if failed.size:
+            first = failed[0]
+            time = float(ended.intervals[first] * self.section_interval)
+            last = tuple(float(value) for value in ended.states[first])
+            raise IntegrationError(
+                f"{failed.size} of {len(starts)} trajectories ran out of range; the first, number {first} from "
+                f"{tuple(starts[first])}, in the period after t = {time:g}, where its state was {last}. Look at the "
+                f"signs of the forces, or take a finer stepper than {chosen}.",
+                time,
+                last,
+            )
+        return ended.states
+
+    def error_estimate(self, states: ArrayLike, periods: int = 1, *, stepper: Stepper | None = None) -> Array:
+        """Estimate the error of `section_map` for each state: the distance to the result of the next finer stepper.
+
+        Returns
+        -------
+        array (count,)
+        """
+        from vibrokit.kernels.choice import ensemble_stepper
+
+        chosen = stepper or ensemble_stepper(self, Flow.STATE)
+        coarse = self.section_map(states, periods, stepper=chosen)
+        fine = self.section_map(states, periods, stepper=chosen.refined())
+        return np.linalg.norm(coarse - fine, axis=1)
+
+    @property
+    def _time_unit(self) -> float:
+        try:
+            return self.section_interval
+        except NoSectionError:
+            return 2 * math.pi / self.natural_frequency
+
+    def _noisy(self) -> Flow:
+        if self.noise is None:
+            raise SceneError("rng was given but the scene has no noise; give the scene a noise model, or no rng.")
+        return Flow.NOISY
+
+    def _checked_states(self, states: ArrayLike, dimensions: int) -> Array:
+        size = 2 + len(self.noise.extra_states if self.noise else ())
+        try:
+            checked = np.atleast_2d(np.asarray(states, dtype=float))
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"states are not numbers ({error}); give (x, v), or an array of shape (count, {size}).") from error
+        if checked.ndim != 2 or checked.shape[1] != size or (dimensions == 1 and len(checked) != 1):
+            wanted = f"{size} numbers" if dimensions == 1 else f"an array of shape (count, {size})"
+            raise ParameterError(f"states have shape {np.shape(states)}; give {wanted}.")
+        if not np.isfinite(checked).all():
+            row = checked[~np.isfinite(checked).all(axis=1)][0]
+            raise ParameterError(f"a state is {tuple(row)}, which is not finite; give finite numbers.")
+        return checked
+
+    @staticmethod
+    def _length(periods: float | None, duration: float | None, unit: float) -> float:
+        if (periods is None) == (duration is None):
+            raise ParameterError("trajectory: give periods or duration, one of them.")
+        length = periods * unit if periods is not None else duration
+        if not (length is not None and math.isfinite(length) and length > 0):
+            raise ParameterError(f"trajectory: the length is {length!r}; give a positive, finite one.")
+        return length
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+
+def seed_from(rng: int | np.random.Generator) -> int:
+    """Return the seed of a family of random streams, one for each trajectory (SPEC 7's `rng`)."""
+    return int(np.random.default_rng(rng).integers(2**63))

@@ -1,0 +1,201 @@
+"""Scene files: TOML in, TOML out. They may come from strangers, so they are read as data and never run."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vibrokit.errors import ParameterError, SceneError, UnknownNameError, nearest
+from vibrokit.oscillator import Oscillator
+from vibrokit.parts.barrier import Barrier
+from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.excitation.excitation import Excitation
+from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.part import Part
+from vibrokit.parts.scene import Scene
+from vibrokit.parts.spring.spring import Spring
+from vibrokit.registry import Group, load, name_of
+from vibrokit.results.atomic import write_atomically
+
+_BUNDLED = Path(__file__).parent / "scenes"
+_LARGEST_FILE = 1_000_000
+_KEYS = ("natural_frequency", "damping_ratio", "spring", "barriers", "excitations", "noise")
+_BARRIER_KEYS = ("law", "position", "side", "adhesive")
+
+
+def bundled_scenes() -> tuple[str, ...]:
+    """Return the names of the scenes that come with the toolkit."""
+    return tuple(sorted(path.stem for path in _BUNDLED.glob("*.toml")))
+
+
+def load_scene(source: str | os.PathLike[str]) -> Oscillator:
+    """Read a scene from a file, or a bundled one by name.
+
+    Parameters
+    ----------
+    source : str or path
+        Path of a TOML file, or a name out of `bundled_scenes`.
+
+    Returns
+    -------
+    Oscillator
+
+    Raises
+    ------
+    SceneError, ParameterError
+        Not a scene: what is wrong with it, and what is allowed.
+    UnknownNameError
+        A part that is not registered, or a scene that is neither file nor bundled.
+    """
+    path = _find(os.fspath(source))
+    if path.stat().st_size > _LARGEST_FILE:
+        raise SceneError(f"{path} has {path.stat().st_size} bytes, too many for a scene; at most {_LARGEST_FILE}.")
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path} is no text in UTF-8 ({error}); a scene is a TOML file.") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise SceneError(f"{path} is no TOML: {error}.") from error
+    try:
+        return scene_from_data(data)
+    except (SceneError, ParameterError) as error:
+        raise type(error)(f"{path.name}: {error}") from error
+
+
+def _find(source: str) -> Path:
+    path = Path(source)
+    if path.is_file():
+        return path
+    if source in bundled_scenes():
+        return _BUNDLED / f"{source}.toml"
+    if path.is_dir():
+        raise SceneError(f"{source} is a folder; give a TOML file or one of {', '.join(bundled_scenes())}.")
+    raise UnknownNameError(f"no file and no bundled scene is called {source!r}{nearest(source, bundled_scenes())}")
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene to a TOML file, whole or not at all.
+
+    Raises
+    ------
+    SceneError
+        A part is of a class that is not registered, so that no file could name it.
+    """
+    data = scene_data(scene)
+    for kind, values in _named_parts(data):
+        if ":" in values["name"]:
+            raise SceneError(
+                f"{values['name']} is not registered, so a scene file cannot name it; register the class under the "
+                f"entry-point group {kind.value!r}."
+            )
+    write_atomically(Path(path), _toml(data).encode("utf-8"))
+
+
+def scene_data(scene: Scene) -> dict[str, Any]:
+    """Return a scene as plain data, as a scene file has it. A class that is not registered is named module:Class."""
+    data: dict[str, Any] = {"natural_frequency": scene.natural_frequency, "damping_ratio": scene.damping_ratio}
+    if scene.spring is not None:
+        data["spring"] = _part_data(Group.SPRINGS, scene.spring)
+    if scene.barriers:
+        data["barriers"] = [_barrier_data(barrier) for barrier in scene.barriers]
+    if scene.excitations:
+        data["excitations"] = [_part_data(Group.EXCITATIONS, part) for part in scene.excitations]
+    if scene.noise is not None:
+        data["noise"] = _part_data(Group.NOISE_MODELS, scene.noise)
+    return data
+
+
+def _part_data(group: Group, part: Part) -> dict[str, Any]:
+    return {"name": name_of(group, type(part)), **part.parameters}
+
+
+def _barrier_data(barrier: Barrier) -> dict[str, Any]:
+    data = {"law": _part_data(Group.CONTACT_LAWS, barrier.law), "position": barrier.position, "side": barrier.side}
+    return data | ({"adhesive": True} if barrier.adhesive else {})
+
+
+def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
+    found = [(Group.CONTACT_LAWS, barrier["law"]) for barrier in data.get("barriers", ())]
+    found += [(Group.EXCITATIONS, values) for values in data.get("excitations", ())]
+    found += [(group, data[key]) for group, key in ((Group.SPRINGS, "spring"), (Group.NOISE_MODELS, "noise")) if key in data]
+    return found
+
+
+def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
+    """Make an oscillator from plain data, checking all of it."""
+    _check_keys("scene", data, _KEYS, required=_KEYS[:2])
+    spring, noise = data.get("spring"), data.get("noise")
+    return Oscillator(
+        natural_frequency=data["natural_frequency"],
+        damping_ratio=data["damping_ratio"],
+        spring=None if spring is None else _part("spring", Group.SPRINGS, Spring, spring),
+        barriers=tuple(_barrier(f"barriers.{i}", b) for i, b in enumerate(_listed("barriers", data))),
+        excitations=tuple(
+            _part(f"excitations.{i}", Group.EXCITATIONS, Excitation, e)
+            for i, e in enumerate(_listed("excitations", data))
+        ),
+        noise=None if noise is None else _part("noise", Group.NOISE_MODELS, NoiseModel, noise),
+    )
+
+
+def _listed(key: str, data: Mapping[str, Any]) -> list[Any]:
+    values = data.get(key, [])
+    if not isinstance(values, list):
+        raise SceneError(f"scene: {key} is {values!r}, no list; write a table [[{key}]] for each.")
+    return values
+
+
+def _barrier(place: str, data: Any) -> Barrier:
+    _check_keys(place, data, _BARRIER_KEYS, required=_BARRIER_KEYS[:3])
+    law = _part(f"{place}.law", Group.CONTACT_LAWS, ContactLaw, data["law"])
+    return Barrier(law, data["position"], data["side"], data.get("adhesive", False))
+
+
+def _part(place: str, group: Group, kind: type, data: Any) -> Any:
+    if not isinstance(data, dict) or not isinstance(data.get("name"), str):
+        raise SceneError(f"{place} is {data!r}; write a table with the part's name and its parameters.")
+    part = load(group, data["name"], kind)
+    values = {key: value for key, value in data.items() if key != "name"}
+    accepted = inspect.signature(part).parameters.values()
+    open_ended = any(p.kind is p.VAR_KEYWORD for p in accepted)
+    known = [p.name for p in accepted if p.kind is not p.VAR_KEYWORD]
+    required = [p.name for p in accepted if p.default is p.empty and p.kind is not p.VAR_KEYWORD]
+    _check_keys(f"{place} ({data['name']})", values, (*known, *values) if open_ended else known, required)
+    return part(**values)
+
+
+def _check_keys(place: str, data: Any, known: Any, required: Any) -> None:
+    if not isinstance(data, Mapping):
+        raise SceneError(f"{place} is {data!r}, no table; it has {', '.join(known)}.")
+    for key in data:
+        if key not in known:
+            raise SceneError(f"{place} has an unknown entry {key!r}{nearest(key, known)}")
+    for key in required:
+        if key not in data:
+            raise SceneError(f"{place} lacks {key}; it needs {', '.join(required)}.")
+
+
+def _toml(data: Mapping[str, Any]) -> str:
+    rows = [f"{key} = {_value(value)}" for key, value in data.items() if isinstance(value, float)]
+    for key, value in data.items():
+        if isinstance(value, dict):
+            rows += ["", f"[{key}]", *(f"{k} = {_value(v)}" for k, v in value.items())]
+        elif isinstance(value, list):
+            for table in value:
+                rows += ["", f"[[{key}]]", *(f"{k} = {_value(v)}" for k, v in table.items())]
+    return "\n".join([*rows, ""])
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, str):
+        return json.dumps(value)  # a JSON string of printable text is a TOML basic string
+    return repr(value)
