@@ -16,16 +16,23 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from vibrokit.parts.formula_text import FUNCTIONS, FormulaError, check_parameter_name, check_text, refusal
+from vibrokit.parts.formula_text import (
+    FUNCTIONS,
+    FormulaError,
+    check_parameter_name,
+    check_parameter_names,
+    check_text,
+    refusal,
+)
 
 if TYPE_CHECKING:
     import sympy
 
 __all__ = ["Formula", "FormulaError", "check_parameter_name", "parse_formula"]
 
-MOST_PARAMETERS = 100
 LARGEST_EXPONENT = 64
 LARGEST_EXACT_DENOMINATOR = 64
+LONGEST_EXACT_CONSTANT = 20  # nodes of a SymPy tree
 
 _OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -54,12 +61,7 @@ class Formula:
     names: tuple[str, ...] = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
-        if len(self.parameters) > MOST_PARAMETERS:
-            raise FormulaError(
-                f"The formula has {len(self.parameters)} parameters; at most {MOST_PARAMETERS} are allowed."
-            )
-        for name in self.parameters:
-            check_parameter_name(name, self.variables)
+        check_parameter_names(self.parameters, self.variables)
         object.__setattr__(self, "names", check_text(self.text, (*self.variables, *self.parameters)))
         _check_constants(self.text, _tree(self.text))
 
@@ -81,10 +83,13 @@ class Formula:
         built: dict[ast.expr, Any] = {}
         for node in _bottom_up(_tree(self.text)):
             parts = [built[part] for part in _operands(node)]
-            built[node] = _built(self.text, node, parts, symbols)
-            if parts and built[node].is_number and not _is_finite(built[node]):
-                problem = f"a part of it comes to {_brief(built[node])}, which is no finite real number"
-                raise refusal(self.text, node.col_offset, problem)
+            try:
+                built[node] = _built(self.text, node, parts, symbols)
+            except (ArithmeticError, AttributeError, RecursionError, TypeError) as error:
+                problem = f"SymPy makes no expression of this part ({error}); write it in another way"
+                raise refusal(self.text, node.col_offset, problem) from error
+            if parts and built[node].is_number:
+                built[node] = _checked_number(self.text, node, built[node])
         _check_expression(self.text, built[node])
         return built[node]
 
@@ -263,6 +268,17 @@ def _power(text: str, node: ast.BinOp, base: Any, exponent: Any) -> Any:
     return base**exponent
 
 
+def _checked_number(text: str, node: ast.expr, number: sympy.Expr) -> sympy.Expr:
+    """Return a constant, exact if it is rational or short; SymPy takes exponential time over long nested roots."""
+    import sympy  # noqa: PLC0415
+
+    if not _is_finite(number):
+        problem = f"a part of it comes to {_brief(number)}, which is no finite real number"
+        raise refusal(text, node.col_offset, problem)
+    is_long = sum(1 for _ in sympy.preorder_traversal(number)) > LONGEST_EXACT_CONSTANT
+    return sympy.Float(number.evalf(20), 17) if is_long else number
+
+
 def _is_finite(expression: sympy.Expr) -> bool:
     try:
         return math.isfinite(float(expression))
@@ -272,10 +288,10 @@ def _is_finite(expression: sympy.Expr) -> bool:
 
 def _brief(expression: sympy.Expr) -> str:
     try:
-        text = str(expression)
+        text = str(expression).replace("zoo", "infinity")
     except ValueError:  # Python prints no integer of more than 4300 digits
         return "a number of thousands of digits"
-    return text.replace("zoo", "infinity") if len(text) <= 60 else text[:60] + "..."
+    return text if len(text) <= 60 else text[:60] + "..."
 
 
 def _check_expression(text: str, expression: sympy.Expr) -> None:

@@ -19,7 +19,9 @@ LONGEST_TEXT = 2000
 LONGEST_NAME = 60
 DEEPEST = 50
 MOST_NODES = 500
+MOST_PARAMETERS = 100
 MOST_DIGITS = 15
+MOST_COMPARED = 24  # SymPy compares all arguments of min and max in pairs
 
 # What each function does to constants; SymPy's functions of the same names make the expression.
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
@@ -77,6 +79,14 @@ def check_parameter_name(name: str, variables: Sequence[str] = ()) -> None:
     raise FormulaError(f"The parameter name {_shortened(name, 1)} {problem}.")
 
 
+def check_parameter_names(names: Sequence[str], variables: Sequence[str]) -> None:
+    """Raise FormulaError unless a formula in `variables` may have all these parameters."""
+    if len(names) > MOST_PARAMETERS:
+        raise FormulaError(f"The formula has {len(names)} parameters; at most {MOST_PARAMETERS} are allowed.")
+    for name in names:
+        check_parameter_name(name, variables)
+
+
 def refusal(text: str, column: int, problem: str) -> FormulaError:
     """Return the error that says what is wrong with `text` at `column`, counted from 1."""
     return FormulaError(f"The formula {_shortened(text, column)} is refused at column {column}: {problem}.")
@@ -130,6 +140,7 @@ class _Scan:
         self.known = known
         self.column = 1
         self.nodes = 0
+        self.compared = 0
         self.wants_operand = True
         self.open: list[list[Any]] = []  # column, function or None, and number of commas
         self.names: dict[str, None] = {}
@@ -237,6 +248,9 @@ class _Scan:
             self._refuse("')' closes a parenthesis that was never opened; remove it or add (")
         self.column, function, commas = self.open.pop()
         several = function in SEVERAL_ARGUMENTS
+        self.compared += commas + 1 if several else 0
+        if self.compared > MOST_COMPARED:
+            self._refuse(f"min and max have {self.compared} arguments in all; at most {MOST_COMPARED} are allowed")
         if function and (commas > 0) != several:
             found = f"{commas + 1} argument{'s' * (commas > 0)}"
             allowed = "2 or more" if several else "only 1"

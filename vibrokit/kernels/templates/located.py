@@ -11,13 +11,22 @@ from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
 from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, OPTIONS, ROOTED, SIDES, law, rhs, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
+    CONTACT_STEP,
+    COUNT,
     EPSILON,
+    FIRST_STEP,
+    PULLED,
     ROOT_DEPTH,
     ROOT_TIME,
+    SINCE,
+    SPAN,
     SPARE,
     TIME,
+    TIMED,
+    TOUCHED,
     TRIAL,
     attempt,
+    copy,
     misfit,
     slope,
     stretch,
@@ -25,25 +34,21 @@ from vibrokit.kernels.templates.steps import (
 
 # --- scene above, stepper below ---
 
-# What is remembered between steps: how long the next step shall last in free flight, in contact and at the next touch,
-# which stop is touched (−1: none), since when (nan: unknown), whether its law would pull, whether the next step must
-# run in time, the steps tried, and the time to travel.
-FREE_STEP, CONTACT_STEP, FIRST_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN = 0, 1, 2, 3, 4, 5, 6, 7, 8
-MEMORY = 9
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
+SOME_CLAMPED = True in CLAMPED
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def settle(y, memory, pushing, theta, spare):
     """Find out what is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
     memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
-    pushing[:] = False
+    switch_off(pushing)
     for i in range(BARRIERS):
         wall, rate = stop(i, theta), SIDES[i] * y[1]
         depth = SIDES[i] * (y[0] - wall)
         touched = depth > 0.0
         if depth == 0.0:
-            pushing[:] = False
+            switch_off(pushing)
             rhs(y[CLOCK], y, pushing, theta, spare)
             acceleration = SIDES[i] * spare[1]
             # A visit too shallow for x to represent is none.
@@ -54,17 +59,25 @@ def settle(y, memory, pushing, theta, spare):
         if touched:
             memory[TOUCHED] = i
             memory[CONTACT_STEP] = memory[FIRST_STEP]
-            memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
+            memory[PULLED] = 0.0
+            if SOME_CLAMPED:
+                memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
             pushing[i] = memory[PULLED] == 0.0
             return
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
+def switch_off(pushing):
+    for i in range(BARRIERS):
+        pushing[i] = False
+
+
+@njit(**INNER)
 def push_at(i, y, theta):
     return law(i, max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30), SIDES[i] * y[1], theta)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def goal_at(goal, i, y, theta):
     if goal == DEPTH_GOAL:
         return SIDES[i] * (y[0] - stop(i, theta))
@@ -73,7 +86,7 @@ def goal_at(goal, i, y, theta):
     return push_at(i, y, theta)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def land(goal, course, sigma, h, y, i, pushing, theta, desk):
     """Shorten a step, after which a goal has changed its sign, to end on its zero; leave that end in TRIAL.
 
@@ -117,7 +130,7 @@ def land(goal, course, sigma, h, y, i, pushing, theta, desk):
     return length
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def cubic_root(d0, r0, d1, r1, h):
     """Zero in (0, h) of the cubic with these end values and slopes, d0 and d1 of opposite sign."""
     low, high = 0.0, 1.0
@@ -138,14 +151,14 @@ def cubic_root(d0, r0, d1, r1, h):
     return s * h
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def cubic(d0, r0, d1, r1, h, s):
     """Cubic Hermite interpolant at the fraction s of a step h."""
     q = 1.0 - s
     return q * q * ((1.0 + 2.0 * s) * d0 + s * h * r0) + s * s * ((3.0 - 2.0 * s) * d1 - q * h * r1)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def swing(d0, r0, d1, r1, h):
     """Largest depth within a step that begins with r0 > 0 and ends with r1 < 0, estimated."""
     low, high = 0.0, 1.0
@@ -158,7 +171,7 @@ def swing(d0, r0, d1, r1, h):
     return cubic(d0, r0, d1, r1, h, 0.5 * (low + high))
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def press(y, end, memory, pushing, theta, settings, desk):
     """Follow the contact with the touched stop until it ends or the time is up."""
     touched = memory[TOUCHED]
@@ -169,7 +182,7 @@ def press(y, end, memory, pushing, theta, settings, desk):
     return RAN_OUT
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def course_of(i, y, memory, theta, desk):
     """Choose the course of the next step in contact, and where on it y lies."""
     depth, rate = SIDES[i] * (y[0] - stop(i, theta)), SIDES[i] * y[1]
@@ -182,7 +195,7 @@ def course_of(i, y, memory, theta, desk):
     return TIME, 0.0
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def length_of(course, sigma, lapse, i, y, theta):
     """Length along a course of a step that lasts `lapse`."""
     if course == ROOT_TIME:
@@ -193,7 +206,7 @@ def length_of(course, sigma, lapse, i, y, theta):
     return lapse
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def press_step(i, y, end, memory, pushing, theta, settings, desk):
     """One step in contact, on the course that suits it."""
     trial = desk[TRIAL]
@@ -228,7 +241,7 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
     return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, desk)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def leaves(i, y, lapse, theta, trial):
     """Whether a step in time ends outside the stop, or may have been outside between."""
     wall, before, after = stop(i, theta), SIDES[i] * y[1], SIDES[i] * trial[1]
@@ -242,26 +255,16 @@ def leaves(i, y, lapse, theta, trial):
     return False
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, desk):
     """Accept the step in TRIAL, or the part of it before the law changes its sign or the mass leaves."""
     trial = desk[TRIAL]
     wall, length, turned = stop(i, theta), h, False
-    if CLAMPED[i]:
-        before, after = push_at(i, y, theta), push_at(i, trial, theta)
-        pulled = memory[PULLED] != 0.0
-        turned = after > 0.0 if pulled else after < 0.0
-        if turned and (before < 0.0 if pulled else before > 0.0):
-            length = land(LAW_GOAL, course, sigma, h, y, i, pushing, theta, desk)
-        elif turned:
-            trial[:] = y
-            length = 0.0
-        if pulled and SIDES[i] * (trial[0] - wall) < 0.0:
-            turned = False
-            length = land(DEPTH_GOAL, course, sigma, length, y, i, pushing, theta, desk)
-            trial[0] = wall
+    if SOME_CLAMPED:
+        if CLAMPED[i]:
+            length, turned = turn(i, course, sigma, h, y, memory, pushing, theta, desk)
     lapse = trial[CLOCK] - y[CLOCK]
-    y[:] = trial
+    copy(trial, y)
     if last and length == h:
         y[CLOCK] = end
     plan_contact(course, sigma, length, lapse, last, error, memory)
@@ -275,7 +278,26 @@ def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, d
     return RAN_OUT
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
+def turn(i, course, sigma, h, y, memory, pushing, theta, desk):
+    """End the step in TRIAL where the law changes its sign, or where a mass that is not pushed leaves the stop."""
+    trial, wall = desk[TRIAL], stop(i, theta)
+    before, after = push_at(i, y, theta), push_at(i, trial, theta)
+    pulled, length = memory[PULLED] != 0.0, h
+    turned = after > 0.0 if pulled else after < 0.0
+    if turned and (before < 0.0 if pulled else before > 0.0):
+        length = land(LAW_GOAL, course, sigma, h, y, i, pushing, theta, desk)
+    elif turned:
+        copy(y, trial)
+        length = 0.0
+    if pulled and SIDES[i] * (trial[0] - wall) < 0.0:
+        turned = False
+        length = land(DEPTH_GOAL, course, sigma, length, y, i, pushing, theta, desk)
+        trial[0] = wall
+    return length, turned
+
+
+@njit(**INNER)
 def plan_contact(course, sigma, length, lapse, last, error, memory):
     """Choose how long the next step in contact shall last."""
     factor = stretch(error)

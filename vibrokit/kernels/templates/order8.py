@@ -3,25 +3,30 @@
 from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import (
-    COUNT,
-    DEPTH_GOAL,
-    FREE_STEP,
-    RATE_GOAL,
-    SPAN,
-    land,
-    settle,
-    swing,
-)
+from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land, settle, swing
 from vibrokit.kernels.templates.scene import BARRIERS, OPTIONS, SIDES, stop
-from vibrokit.kernels.templates.steps import CLOCK, EPSILON, SPARE, TIME, TRIAL, attempt, misfit, slope, stretch
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
+    COUNT,
+    EPSILON,
+    FREE_STEP,
+    SPAN,
+    SPARE,
+    TIME,
+    TRIAL,
+    attempt,
+    copy,
+    misfit,
+    slope,
+    stretch,
+)
 
 # --- scene above, stepper below ---
 
 CLEAR, TOO_LONG = -1, -2  # what `watch` finds in a step, or the stop that it runs into
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
     """Follow the free motion until a stop is touched or the time is up."""
     trial = desk[TRIAL]
@@ -52,7 +57,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
             break
         if touched == CLEAR and not (last and h == first and h * stretch(error) < memory[FREE_STEP]):
             memory[FREE_STEP] = h * stretch(error)
-        y[:] = trial
+        copy(trial, y)
         if last and length == first:
             y[CLOCK] = end
         if BARRIERS > 0 and touched >= 0:
@@ -62,7 +67,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
     return RAN_OUT
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def watch(h, tiny, y, pushing, theta, desk):
     """Look for a touch within the step in TRIAL; shorten the step to end on it. Returns what was found and the length."""
     trial = desk[TRIAL]
@@ -85,7 +90,6 @@ def watch(h, tiny, y, pushing, theta, desk):
             top = swing(before, rise, after, fall, h)
             if top + 0.3 * (top - min(before, after)) <= 0.0:
                 continue
-            desk[SPARE, :] = trial
             turn = land(RATE_GOAL, TIME, 0.0, h, y, i, pushing, theta, desk)
             if side * (trial[0] - wall) > 0.0 and before < 0.0:
                 return i, land(DEPTH_GOAL, TIME, 0.0, turn, y, i, pushing, theta, desk)
@@ -95,7 +99,7 @@ def watch(h, tiny, y, pushing, theta, desk):
     return CLEAR, h
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def turns_of(side, final, desk):
     """How often the velocity turns within a step, from its stages, and whether the first turn is from towards a stop to away."""
     largest = max(abs(desk[0, 0]), abs(desk[5, 0]), abs(final))

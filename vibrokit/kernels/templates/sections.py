@@ -4,25 +4,32 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
-from vibrokit.kernels.templates.located import (
+from vibrokit.kernels.templates.located import press, settle
+from vibrokit.kernels.templates.order8 import fly
+from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
     CONTACT_STEP,
     COUNT,
     FIRST_STEP,
     FREE_STEP,
     MEMORY,
+    ROWS,
     SPAN,
+    SPARE,
     TOUCHED,
-    press,
-    settle,
 )
-from vibrokit.kernels.templates.order8 import fly
-from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
-from vibrokit.kernels.templates.steps import CLOCK, ROWS, SPARE
 
 # --- scene above, stepper below ---
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
+def copy_state(source, target):
+    for e in range(EQUATIONS):
+        target[e] = source[e]
+
+
+@njit(**INNER)
 def begin(y, interval, memory, pushing, theta, desk):
     """Forget the past: what follows depends on y alone."""
     memory[SPAN] = abs(interval)
@@ -35,7 +42,7 @@ def begin(y, interval, memory, pushing, theta, desk):
         memory[TOUCHED] = -1.0
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def travel(y, end, memory, pushing, theta, settings, desk, coefficients):
     """Carry y to the time `end`, from contact to contact."""
     memory[COUNT] = 0.0
@@ -75,22 +82,22 @@ def advance(
     repeats = settings[2] != 0.0
     for index in range(states.shape[0]):
         status, label, done = RAN_OUT, -1, 0
-        out_states[index] = states[index]
+        copy_state(states[index], out_states[index])
         while status == RAN_OUT and done < budget[index]:
             # Where the forcing repeats, each interval starts at the same time: the phase cannot drift.
             start = start_time if repeats else start_time + done * interval
-            y[:CLOCK] = out_states[index]
+            copy_state(out_states[index], y)
             y[CLOCK] = start
             begin(y, interval, memory, pushing, theta, desk)
             status = travel(y, start + interval, memory, pushing, theta, settings, desk, coefficients)
             if status == RAN_OUT:
                 done += 1
-                out_states[index] = y[:CLOCK]
+                copy_state(y, out_states[index])
                 status, label = section_status(y[0], y[1], region, labels, home, points, point_labels, tolerance)
         out_intervals[index], out_status[index], out_label[index] = done, status, label
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def desk_and_more():
     return np.zeros((ROWS, CLOCK + 1)), np.zeros((EQUATIONS, 32)), np.zeros(CLOCK + 1)
 
@@ -99,13 +106,13 @@ def desk_and_more():
 def record(state, theta, start_time, spacing, settings, out):
     memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
     desk, coefficients, y = desk_and_more()
-    out[0] = state
-    y[:CLOCK] = state
+    copy_state(state, out[0])
+    copy_state(state, y)
     y[CLOCK] = start_time
     begin(y, spacing, memory, pushing, theta, desk)
     for sample in range(1, out.shape[0]):
         status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, desk, coefficients)
         if status != RAN_OUT:
             return sample
-        out[sample] = y[:CLOCK]
+        copy_state(y, out[sample])
     return out.shape[0]

@@ -18,11 +18,25 @@ from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS, SIDES
 TIME, ROOT_TIME, ROOT_DEPTH = 0, 1, 2
 CLOCK = EQUATIONS  # where the time stands in y
 TRIAL, STAGE, SPARE, SIZE, ROWS = STAGES, STAGES + 1, STAGES + 2, STAGES + 3, STAGES + 4  # rows of the desk
+# What is remembered between steps: how long the next step shall last in free flight, in contact and at the next touch,
+# which stop is touched (−1: none), since when (nan: unknown), whether its law would pull, whether the next step must
+# run in time, the steps tried, and the time to travel.
+FREE_STEP, CONTACT_STEP, FIRST_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN = 0, 1, 2, 3, 4, 5, 6, 7, 8
+MEMORY = 9
 EPSILON = 2.220446049250313e-16
+# Functions that only kernels call: Numba need not wrap them for Python.
+INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 BLOCKS = error_blocks(STATES, EQUATIONS)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
+def copy(source, target):
+    # Assigning slices would compile Numba's shape messages, for seconds.
+    for e in range(CLOCK + 1):
+        target[e] = source[e]
+
+
+@njit(**INNER)
 def slope(course, sigma, reach, y, i, pushing, theta, out, spare):
     """Rate of y along a course, at sigma; `reach` is the length of the step that asks."""
     if BARRIERS == 0 or course == TIME:
@@ -32,7 +46,7 @@ def slope(course, sigma, reach, y, i, pushing, theta, out, spare):
         root_slope(course, sigma, reach, y, i, pushing, theta, out, spare)
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def root_slope(course, sigma, reach, y, i, pushing, theta, out, spare):
     wall, side = stop(i, theta), SIDES[i]
     if course == ROOT_DEPTH:
@@ -62,7 +76,7 @@ def root_slope(course, sigma, reach, y, i, pushing, theta, out, spare):
     y[0] = x
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def weighted_slope(weight, y, pushing, theta, out):
     rhs(y[CLOCK], y, pushing, theta, out)
     for e in range(EQUATIONS):
@@ -70,45 +84,42 @@ def weighted_slope(weight, y, pushing, theta, out):
     out[CLOCK] = weight
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def attempt(course, sigma, h, y, i, pushing, theta, desk):
     """Take a step from y, whose slope is in row 0 of the desk, and leave its end in row TRIAL."""
-    stage = desk[STAGE]
+    stage, trial = desk[STAGE], desk[TRIAL]
     for s in range(1, STAGES):
-        stage[:] = 0.0
-        for j in range(s):
-            weight = WEIGHTS[s, j]
-            for e in range(CLOCK + 1):
-                stage[e] += weight * desk[j, e]
         for e in range(CLOCK + 1):
-            stage[e] = y[e] + h * stage[e]
+            total = WEIGHTS[s, 0] * desk[0, e]
+            for j in range(1 if s < 5 else 3, s):  # the later stages do not use slopes 1 and 2
+                total += WEIGHTS[s, j] * desk[j, e]
+            stage[e] = y[e] + h * total
         slope(course, sigma + NODES[s] * h, h, stage, i, pushing, theta, desk[s], desk[SPARE])
-    trial = desk[TRIAL]
-    trial[:] = 0.0
-    for s in range(STAGES):
-        for e in range(CLOCK + 1):
-            trial[e] += RESULT[s] * desk[s, e]
     for e in range(CLOCK + 1):
-        trial[e] = y[e] + h * trial[e]
+        total = RESULT[0] * desk[0, e]
+        for s in range(5, STAGES):
+            total += RESULT[s] * desk[s, e]
+        trial[e] = y[e] + h * total
     if BARRIERS > 0 and course == ROOT_DEPTH:
         trial[0] = stop(i, theta) + SIDES[i] * (sigma + h) ** 2
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def misfit(h, y, span, tolerance, desk):
     """Estimated error of the step in TRIAL, in units of the tolerance: the largest over the components.
 
     Each block is judged by its own size. A velocity that vanishes is judged by x over `span`, the time to travel.
     """
     size, trial = desk[SIZE], desk[TRIAL]
-    size[:] = 0.0
+    for e in range(EQUATIONS):
+        size[e] = 0.0
     for e in range(EQUATIONS):
         size[BLOCKS[e]] = max(size[BLOCKS[e]], abs(y[e]), abs(trial[e]), abs(h * desk[0, e]))
     size[BLOCKS[1]] = max(size[BLOCKS[1]], size[BLOCKS[0]] / span)
     fifth, third = 0.0, 0.0
     for e in range(CLOCK + 1):
-        a, b = 0.0, 0.0
-        for s in range(STAGES):
+        a, b = FIFTH[0] * desk[0, e], THIRD[0] * desk[0, e]
+        for s in range(5, STAGES):
             a += FIFTH[s] * desk[s, e]
             b += THIRD[s] * desk[s, e]
         unit = size[BLOCKS[e]] if e < EQUATIONS else min(span, size[0] / (abs(trial[1]) + size[0] / span))
@@ -122,7 +133,7 @@ def misfit(h, y, span, tolerance, desk):
     return abs(h) * fifth * fifth / np.sqrt(fifth * fifth + 0.01 * third * third) / tolerance
 
 
-@njit(**OPTIONS)
+@njit(**INNER)
 def stretch(error):
     """By how much to lengthen the next step."""
     if not np.isfinite(error):

@@ -1,0 +1,77 @@
+"""Periodic orbits: refined by Newton on the variational equations."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import StructureError
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.symbolic.flow_kind import Flow
+
+_ITERATIONS = 30
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Orbit:
+    """A fixed point of the section map's power, with its linearisation.
+
+    Attributes
+    ----------
+    point : array (n,)
+    period : int
+    monodromy : array (n, n)
+        Derivative of the map over `period` periods.
+    residual : float
+        Distance between the point and its image.
+    """
+
+    point: Array
+    period: int
+    monodromy: Array
+    residual: float
+
+
+def section_derivative(osc: Oscillator, point: Array, periods: int, stepper: Stepper) -> tuple[Array, Array]:
+    """Return the image of a point of the section after some periods, and the derivative of that map."""
+    size = len(point)
+    start = np.concatenate([point, np.eye(size).ravel()])
+    ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], periods)
+    image = ended.states[0]
+    return image[:size], image[size:].reshape(size, size)
+
+
+def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
+    """Refine a periodic point by Newton's method until the residual no longer falls.
+
+    Raises
+    ------
+    StructureError
+        The iteration did not come near any periodic point.
+    """
+    best: Orbit | None = None
+    point = np.array(guess, dtype=float)
+    for _ in range(_ITERATIONS):
+        image, monodromy = section_derivative(osc, point, period, stepper)
+        residual = float(np.linalg.norm(image - point))
+        if not np.isfinite(residual) or (best is not None and residual >= best.residual):
+            break
+        best = Orbit(point, period, monodromy, residual)
+        try:
+            point = point - np.linalg.solve(monodromy - np.eye(len(point)), image - point)
+        except np.linalg.LinAlgError:
+            break
+    scale = 1.0 + float(np.linalg.norm(guess))
+    if best is None or best.residual > 1e-6 * scale:
+        found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
+        raise StructureError(
+            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6))}: {found}. The start "
+            "is too far off, or the orbit is not hyperbolic; wait longer or take a finer stepper."
+        )
+    return best

@@ -1,0 +1,67 @@
+"""Region: the rectangle of the section that is looked at."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import StructureError
+
+
+@dataclasses.dataclass(frozen=True)
+class Region:
+    """Bounds of displacement and velocity on the section.
+
+    Parameters
+    ----------
+    x : (float, float)
+        Least and largest displacement (m).
+    v : (float, float)
+        Least and largest velocity (m s⁻¹).
+    """
+
+    x: tuple[float, float]
+    v: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for name, bounds in (("x", self.x), ("v", self.v)):
+            low, high = bounds
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                raise StructureError(f"region: {name} goes from {low:g} to {high:g}; give finite bounds, the lower first.")
+
+    @classmethod
+    def of(cls, bounds: Any) -> Region:
+        """Make a region of ((x_min, x_max), (v_min, v_max)), or return it if it is one."""
+        if isinstance(bounds, cls):
+            return bounds
+        try:
+            (x_low, x_high), (v_low, v_high) = bounds
+            return cls((float(x_low), float(x_high)), (float(v_low), float(v_high)))
+        except (TypeError, ValueError) as error:
+            raise StructureError(f"region is {bounds!r}; give ((x_min, x_max), (v_min, v_max)).") from error
+
+    @classmethod
+    def around(cls, points: NDArray[np.float64], margin: float) -> Region:
+        """Return the region round some points, widened on each side by `margin` times its width."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        width = np.maximum(high - low, 1e-3 * np.maximum(1.0, np.abs(high)))
+        low, high = low - margin * width, high + margin * width
+        return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Array (2, 2): bounds of x, bounds of v."""
+        return np.array([self.x, self.v])
+
+    def cell_centres(self, cells: Sequence[int]) -> NDArray[np.float64]:
+        """Return the centres of a grid of cells, shape (nx · nv, 2), v running fastest."""
+        axes = [
+            low + (high - low) * (np.arange(count) + 0.5) / count
+            for (low, high), count in zip((self.x, self.v), cells, strict=True)
+        ]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
