@@ -1,0 +1,64 @@
+"""Result: what an analyzer returns, and what is saved of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from vibrokit.results.energy import ActivationEnergy
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Result(ABC):
+    """A record of one analysis. Abstract; each analyzer has its own, which knows how to draw itself.
+
+    Attributes
+    ----------
+    energies : tuple of ActivationEnergy
+    data : xarray.Dataset
+        Labelled arrays behind the numbers.
+    scene : dict
+        The scene as plain data, with every parameter.
+    settings : dict
+        Configuration of the analyzer.
+    status : str
+        What was found and what was not, as sentences.
+    seconds : float
+        Time that it took.
+    versions : dict
+        Versions of the toolkit and of what it stands on.
+    seed : int or None
+        Seed of what was random.
+
+    For developers
+    --------------
+    A subclass names its `kind`, which files carry, and writes `plot`. From these everything else just works: saving,
+    opening, and drawing without what made it.
+    """
+
+    kind: ClassVar[str]
+
+    energies: tuple[ActivationEnergy, ...]
+    data: xarray.Dataset
+    scene: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    status: str
+    seconds: float
+    versions: Mapping[str, str]
+    seed: int | None = None
+
+    @abstractmethod
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the picture of this result into `ax`, or into a new figure; return the artists."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
+        from vibrokit.results.files import save_result
+
+        save_result(self, path)
