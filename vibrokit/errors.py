@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
 
 
@@ -55,10 +56,24 @@ class IntegrationError(VibrokitError, ArithmeticError):
         self.state = state
 
 
+def shown(value: object) -> str:
+    """Return a value as one short line, whatever it is: the part of a sentence that says what was given."""
+    try:
+        text = " ".join(_SHORT.repr(value).split())
+    except Exception:  # a repr that fails, or an integer too long to be printed
+        return f"an object of type {type(value).__name__}"
+    return text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
+
+
+_LONGEST_SHOWN = 120
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _LONGEST_SHOWN
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return the end of a sentence that names the closest of the known names, or all of them."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(str(name)[:60], names, n=1)
     if close:
         return f"; the nearest is {close[0]!r}."
     return f"; there {'is' if len(names) == 1 else 'are'} {', '.join(names) or 'none'}."

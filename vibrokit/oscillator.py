@@ -6,12 +6,14 @@ import concurrent.futures
 import dataclasses
 import math
 from functools import cached_property
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibrokit.errors import IntegrationError, NoSectionError, ParameterError, SceneError
+from vibrokit.errors import IntegrationError, ParameterError, SceneError, shown
+from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.scene import Scene
 from vibrokit.results.trajectory import Trajectory
 from vibrokit.symbolic.flow_kind import Flow
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.model import Model
 
 _SAMPLES = 256
+_MOST_SAMPLES = 10**8
+_PERIODS = Parameter("periods", "", "", "", above=0)
+_DURATION = Parameter("duration", "", "", "s", above=0)
+_START_TIME = Parameter("start_time", "", "", "s")
 
 Array = NDArray[np.float64]
 Rng = int | np.random.Generator | None
@@ -93,9 +99,8 @@ class Oscillator(Scene):
         from vibrokit.kernels.single import record
 
         start = self._checked_states(state, 1)[0]
-        unit = self.section_interval if periods is not None else self._time_unit
-        length = self._length(periods, duration, unit)
-        count = max(1, math.ceil(length / unit * samples - 1e-9))
+        start_time = _START_TIME.checked("trajectory", start_time)
+        length, count = self._sampling(periods, duration, samples)
         flow = Flow.STATE if rng is None else self._noisy()
         chosen = stepper or single_stepper(self, flow)
         seed = None if rng is None else seed_from(rng)
@@ -149,12 +154,12 @@ class Oscillator(Scene):
         from vibrokit.kernels.ensemble import run_ensemble
 
         starts = self._checked_states(states, 2)
-        if isinstance(periods, bool) or not isinstance(periods, int) or periods < 0:
-            raise ParameterError(f"section_map: periods is {periods!r}; give a whole number, 0 or more.")
+        if isinstance(periods, bool) or not isinstance(periods, Integral) or periods < 0:
+            raise ParameterError(f"section_map: periods is {shown(periods)}; give a whole number, 0 or more.")
         flow = Flow.STATE if rng is None else self._noisy()
         chosen = stepper or ensemble_stepper(self, flow)
         stream = None if rng is None else (seed_from(rng), 0)
-        ended = run_ensemble(self, flow, chosen, starts, periods, stream=stream, executor=executor)
+        ended = run_ensemble(self, flow, chosen, starts, int(periods), stream=stream, executor=executor)
         failed = np.flatnonzero(ended.intervals < periods)
         if failed.size:
             first = failed[0]
@@ -162,7 +167,7 @@ class Oscillator(Scene):
             last = tuple(float(value) for value in ended.states[first])
             raise IntegrationError(
                 f"{failed.size} of {len(starts)} trajectories ran out of range; the first, number {first} from "
-                f"{tuple(starts[first])}, in the period after t = {time:g}, where its state was {last}. Look at the "
+                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, where its state was {last}. Look at the "
                 f"signs of the forces, or take a finer stepper than {chosen}.",
                 time,
                 last,
@@ -183,13 +188,6 @@ class Oscillator(Scene):
         fine = self.section_map(states, periods, stepper=chosen.refined())
         return np.linalg.norm(coarse - fine, axis=1)
 
-    @property
-    def _time_unit(self) -> float:
-        try:
-            return self.section_interval
-        except NoSectionError:
-            return 2 * math.pi / self.natural_frequency
-
     def _noisy(self) -> Flow:
         if self.noise is None:
             raise SceneError("rng was given but the scene has no noise; give the scene a noise model, or no rng.")
@@ -206,17 +204,26 @@ class Oscillator(Scene):
             raise ParameterError(f"states have shape {np.shape(states)}; give {wanted}.")
         if not np.isfinite(checked).all():
             row = checked[~np.isfinite(checked).all(axis=1)][0]
-            raise ParameterError(f"a state is {tuple(row)}, which is not finite; give finite numbers.")
+            raise ParameterError(f"a state is {tuple(row.tolist())}, which is not finite; give finite numbers.")
         return checked
 
-    @staticmethod
-    def _length(periods: float | None, duration: float | None, unit: float) -> float:
+    def _sampling(self, periods: float | None, duration: float | None, samples: int) -> tuple[float, int]:
+        """Length of a trajectory (s) and number of samples after its start."""
         if (periods is None) == (duration is None):
             raise ParameterError("trajectory: give periods or duration, one of them.")
-        length = periods * unit if periods is not None else duration
-        if not (length is not None and math.isfinite(length) and length > 0):
-            raise ParameterError(f"trajectory: the length is {length!r}; give a positive, finite one.")
-        return length
+        if isinstance(samples, bool) or not isinstance(samples, Integral) or samples < 1:
+            raise ParameterError(f"trajectory: samples is {shown(samples)}; give a whole number, 1 or more.")
+        if duration is not None:
+            length = _DURATION.checked("trajectory", duration)
+        else:
+            length = _PERIODS.checked("trajectory", periods) * self.section_interval
+        count = length / self.time_unit * int(samples)
+        if count > _MOST_SAMPLES:
+            raise ParameterError(
+                f"trajectory: it would have {count:.0f} samples, at most {_MOST_SAMPLES} are kept; make it shorter or "
+                f"take fewer samples per period than {samples}."
+            )
+        return length, max(1, math.ceil(count - 1e-9))
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

@@ -30,6 +30,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128
 _NEIGHBOURS = 64
+_SHARES = 4
 
 Array = NDArray[np.float64]
 
@@ -136,16 +137,17 @@ class ActionPlot(Analyzer):
     def _energy(
         self, osc: Oscillator, structure: Structure, attractor: Attractor, ring: _Ring, best: int, stepper: Stepper
     ) -> ActivationEnergy:
-        """Energy of the cheapest exit, its error from half the points, finer steps, and one section less."""
+        """Energy of the cheapest exit, its error from a quarter of the points, finer steps, and one section less."""
         exits = ring.exits
         value = float(exits.actions[best])
         path = _path(osc, ring.starts[best], int(exits.intervals[best]), exits.interval, stepper)
         before = float(path.action[path.section[-2]])
-        fewer = float(np.nanmin(exits.actions[::2])) if np.isfinite(exits.actions[::2]).any() else value
+        quarters = [exits.actions[k::_SHARES] for k in range(_SHARES)]
+        by_points = max(float(np.nanmin(some)) - value if np.isfinite(some).any() else value for some in quarters)
         window = ring.angles[best] + (np.arange(2 * _NEIGHBOURS + 1) - _NEIGHBOURS) * (ring.angles[1] - ring.angles[0])
         finer = self._ring(osc, structure, attractor, window, stepper.refined()).exits
         by_steps = abs(value - float(finer.actions[finer.best])) if finer.best is not None else value
-        error = abs(fewer - value) + by_steps
+        error = by_points + by_steps
         return ActivationEnergy(
             source=attractor.label,
             target=int(exits.targets[best]),

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.errors import SceneError, StepperError, shown
 from vibrokit.kernels import store
 from vibrokit.kernels.fingerprint import scene_fingerprint
 from vibrokit.kernels.stepper import Stepper
@@ -22,6 +23,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MARKER = "# --- scene above, stepper below ---\n"
+_NEED_NOISE = {Flow.NOISY: "random forces", Flow.HAMILTONIAN: "momenta", Flow.HAMILTONIAN_VARIATIONAL: "momenta"}
 _CONDITION = re.compile(r"  # (forced|unforced|noisy)\n$")
 
 
@@ -51,9 +53,19 @@ def kernel_for(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
 
     Raises
     ------
+    SceneError
+        The scene has no noise, and the flow is one of noise or of momenta.
     StepperError
         The stepper cannot integrate this flow of this scene.
     """
+    if scene.noise is None and flow in _NEED_NOISE:
+        raise SceneError(
+            f"scene: it has no noise, so there are no {_NEED_NOISE[flow]} and no {flow.value} flow; give the scene a "
+            "noise model, such as WhiteNoise(intensity=2e-5)."
+        )
+    if not isinstance(stepper, Stepper):
+        raise StepperError(f"the stepper is {shown(stepper)}, which is none; give one, such as RK4(steps=256).")
+    stepper.check(scene, flow)
     return _kernel(scene_fingerprint(scene), flow, stepper.name, _Sources(scene, flow, stepper))
 
 
@@ -93,7 +105,22 @@ def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
     body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)
     conditions = {"forced": text.forced, "unforced": not text.forced, "noisy": flow is Flow.NOISY}
     pieces = [text.preamble, imports, *stepper.scene_part(text), _fitting(body, conditions)]
-    return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece)
+    return _with_needed_imports("\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece))
+
+
+def _with_needed_imports(text: str) -> str:
+    """Gather the imports of all pieces where the first stands; names that nothing uses are left out."""
+    tree = ast.parse(text)
+    nodes = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    lines: list[str | None] = list(text.split("\n"))
+    for node in nodes:
+        lines[node.lineno - 1 : node.end_lineno] = [None] * ((node.end_lineno or node.lineno) - node.lineno + 1)
+        node.names = [alias for alias in node.names if (alias.asname or alias.name) in used]
+    kept = dict.fromkeys(ast.unparse(node) for node in nodes if node.names)
+    first = nodes[0].lineno - 1
+    body = [*lines[:first], *kept, *lines[first:]]
+    return re.sub(r"\n{4,}", "\n\n\n", "\n".join(line for line in body if line is not None))
 
 
 class Template(NamedTuple):

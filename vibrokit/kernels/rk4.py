@@ -40,11 +40,9 @@ class RK4(Stepper):
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
         """Steps in this interval, whether the forcing repeats with it, and the step length."""
-        unit = scene.section_interval
+        unit = scene.time_unit
         steps = max(1, round(self.steps * interval / unit))
-        multiple = interval / unit
-        repeats = scene.autonomous or abs(multiple - round(multiple)) < 1e-12 * multiple
-        return float(steps), float(repeats), unit / self.steps
+        return float(steps), float(scene.repeats_after(interval)), unit / self.steps
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The lane-packed step, and the kicks of the noisy flow."""

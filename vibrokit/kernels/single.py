@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import NoSectionError
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
@@ -48,17 +47,10 @@ def record(
         Shorter if the numbers ran out of range.
     """
     module = kernel_for(scene, flow, stepper).module
-    settings = np.array(stepper.settings(scene, _unit(scene)))
+    settings = np.array(stepper.settings(scene, scene.time_unit))
     out = np.empty((count + 1, len(state)))
     noise: tuple[Any, ...] = ()
     if flow is Flow.NOISY:
         noise = (np.int64(seed or 0), np.int64(0), np.empty((0, 2)) if normals is None else normals)
     good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
     return out[:good]
-
-
-def _unit(scene: Scene) -> float:
-    try:
-        return scene.section_interval
-    except NoSectionError:
-        return 2 * np.pi / scene.natural_frequency

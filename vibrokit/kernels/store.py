@@ -7,6 +7,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+import threading
 import types
 import warnings
 from pathlib import Path
@@ -46,17 +47,26 @@ def store(name: str, text: str) -> None:
     """Write a generated module so that another process sees all of it or nothing."""
     folder = cache_directory()
     with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8") as file:
-        file.write(text)
-    try:
-        os.replace(file.name, folder / f"{name}.py")
-    except OSError:
-        os.unlink(file.name)
-        raise
+        try:
+            file.write(text)
+            file.close()
+            os.replace(file.name, folder / f"{name}.py")
+        except BaseException:
+            os.unlink(file.name)
+            raise
+
+
+def load(name: str, text: str) -> types.ModuleType:
+    """Import a generated module, writing it first if this machine does not have it."""
+    with _LOADING:  # else threads that start together import it twice, and compile it twice
+        return _load(name, text)
+
+
+_LOADING = threading.Lock()
 
 
 @functools.cache
-def load(name: str, text: str) -> types.ModuleType:
-    """Import a generated module, writing it first if this machine does not have it."""
+def _load(name: str, text: str) -> types.ModuleType:
     if stored(name) != text:
         store(name, text)
     specification = importlib.util.spec_from_file_location(name, cache_directory() / f"{name}.py")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Literal, Self
 
-from vibrokit.errors import ParameterError, SceneError
+from vibrokit.errors import ParameterError, SceneError, shown
 from vibrokit.parts.contact.contact_law import ContactLaw
 from vibrokit.parts.parameter import Parameter
 
@@ -36,12 +36,12 @@ class Barrier:
     def __post_init__(self) -> None:
         if not isinstance(self.law, ContactLaw):
             raise SceneError(
-                f"Barrier: law is {self.law!r}, which is no contact law; give one, such as Hertz(stiffness=50.0)."
+                f"Barrier: law is {shown(self.law)}, which is no contact law; give one, such as Hertz(stiffness=50.0)."
             )
         if self.side not in ("right", "left"):
-            raise ParameterError(f"Barrier: side is {self.side!r}; give 'right' or 'left'.")
+            raise ParameterError(f"Barrier: side is {shown(self.side)}; give 'right' or 'left'.")
         if not isinstance(self.adhesive, bool):
-            raise ParameterError(f"Barrier: adhesive is {self.adhesive!r}; give True or False.")
+            raise ParameterError(f"Barrier: adhesive is {shown(self.adhesive)}; give True or False.")
         object.__setattr__(self, "position", _POSITION.checked("Barrier", self.position))
 
     @property

@@ -85,7 +85,9 @@ class Formula:
             parts = [built[part] for part in _operands(node)]
             try:
                 built[node] = _built(self.text, node, parts, symbols)
-            except (ArithmeticError, AttributeError, RecursionError, TypeError) as error:
+            except FormulaError:
+                raise
+            except (ArithmeticError, AttributeError, RecursionError, TypeError, ValueError) as error:
                 problem = f"SymPy makes no expression of this part ({error}); write it in another way"
                 raise refusal(self.text, node.col_offset, problem) from error
             if parts and built[node].is_number:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+from vibrokit.errors import ParameterError
 from vibrokit.parts.formula import check_parameter_name, parse_formula
 from vibrokit.parts.parameter import Parameter
 
@@ -26,6 +27,8 @@ class FormulaPart:
         """Check formula and constants and store them."""
         for name in constants:
             check_parameter_name(name, self.variables)
+            if name in ("name", "formula", "constants"):
+                raise ParameterError(f"{type(self).__name__}: a constant is called {name}; choose another name for it.")
         parse_formula(formula, self.variables, tuple(constants))
         checked = tuple(
             (name, Parameter(name, name, name, "").checked(type(self).__name__, value))

@@ -7,7 +7,7 @@ import math
 from numbers import Real
 from typing import Any
 
-from vibrokit.errors import ParameterError
+from vibrokit.errors import ParameterError, shown
 
 _KEY = "vibrokit.parameter"
 
@@ -57,8 +57,11 @@ class Parameter:
     def checked(self, owner: str, value: Any) -> float:
         """Return `value` as a float, or raise ParameterError naming owner, parameter, value and range."""
         if isinstance(value, bool) or not isinstance(value, Real):
-            raise ParameterError(f"{owner}: {self.name} is {value!r}, which is no number; give {self.allowed}.")
-        number = float(value)
+            raise ParameterError(f"{owner}: {self.name} is {shown(value)}, which is no number; give {self.allowed}.")
+        try:
+            number = float(value)
+        except OverflowError:
+            raise ParameterError(f"{owner}: {self.name} is beyond 1.8e308; give {self.allowed}.") from None
         outside = (
             not math.isfinite(number)
             or (self.minimum is not None and number < self.minimum)
@@ -94,8 +97,11 @@ def parameter(
 
 def declared_parameters(cls: type) -> tuple[Parameter, ...]:
     """Parameters of a dataclass, in field order; a field declared without `parameter` may have any finite value."""
+    # A base class that was decorated a second time has lost the metadata of its fields, but not its declarations.
+    inherited = {d.attribute: d for base in reversed(cls.__mro__[1:]) for d in vars(base).get("_declared", ())}
     found = []
     for field in dataclasses.fields(cls):
-        declared = field.metadata.get(_KEY, Parameter("", "", field.name, None))
+        bare = inherited.get(field.name, Parameter("", "", field.name, None))
+        declared = field.metadata.get(_KEY, bare)
         found.append(dataclasses.replace(declared, name=declared.name or field.name, attribute=field.name))
     return tuple(found)

@@ -34,7 +34,7 @@ class Part(ABC):
                 kind = next(b.__name__ for b in base.__mro__[1:] if issubclass(b, Part))
                 raise TypeError(
                     f"{cls.__name__} inherits from {base.__name__}, a finished part, and finished parts are final; "
-                    f"inherit from {kind} and hold a {base.__name__} in a field, or write the formula anew."
+                    f"inherit from {kind} instead and write the whole formula."
                 )
         dataclasses.dataclass(frozen=True, repr=False)(cls)
         cls._declared = declared_parameters(cls)

@@ -6,9 +6,10 @@ import dataclasses
 import math
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from numbers import Real
 from typing import Any, NamedTuple, Self
 
-from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest
+from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.excitation.excitation import Excitation
 from vibrokit.parts.noise.noise_model import NoiseModel
@@ -70,6 +71,7 @@ class Scene:
         if self.spring is not None:
             _checked_parts("spring", (self.spring,), Spring)
         self._check_stops()
+        self._check_periods()
 
     def _check_stops(self) -> None:
         for side in ("left", "right"):
@@ -85,6 +87,15 @@ class Scene:
                 f"scene: the left stop, at {stops['left']:g}, is to the right of the right stop, at "
                 f"{stops['right']:g}; the left one must not be beyond the right one (equal places are allowed)."
             )
+
+    def _check_periods(self) -> None:
+        for index, part in enumerate(self.excitations):
+            period = part.period
+            if period is not None and (isinstance(period, bool) or not isinstance(period, Real) or not period > 0):
+                raise SceneError(
+                    f"scene: excitations.{index}, a {type(part).__name__}, has the period {shown(period)}; give a positive "
+                    "number, None for a constant force, or math.inf for one that never repeats."
+                )
 
     def entries(self) -> tuple[Entry, ...]:
         """Every parameter with its path, in the order in which they travel to compiled code."""
@@ -118,7 +129,7 @@ class Scene:
         fields: dict[str, Any] = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         for path, value in changes.items():
             if path not in known:
-                raise ParameterError(f"scene has no parameter {path!r}{nearest(path, known)}")
+                raise ParameterError(f"scene has no parameter {shown(path)}{nearest(path, known)}")
             head, *rest = path.split(".")
             fields[head] = _replaced(fields[head], rest, value)
         return type(self)(**fields)
@@ -136,6 +147,10 @@ class Scene:
         if not periods:
             return None
         longest = max(periods)
+        if math.isinf(longest):
+            raise NoSectionError(
+                "scene: an excitation never repeats, so there is no section; give every excitation a finite period."
+            )
         multiple = 1
         for period in periods:
             ratio = Fraction(longest / period).limit_denominator(_LONGEST_RATIO)
@@ -157,16 +172,34 @@ class Scene:
         """Time from section to section (s): the common period, or 2π/ω_n for an autonomous scene."""
         return self.period or 2 * math.pi / self.natural_frequency
 
+    @property
+    def time_unit(self) -> float:
+        """Time that steps and samples are counted in (s): the section interval, or 2π/ω_n without a section."""
+        try:
+            return self.section_interval
+        except NoSectionError:
+            return 2 * math.pi / self.natural_frequency
+
+    def repeats_after(self, interval: float) -> bool:
+        """Whether the excitations are the same again after `interval` (s), so that trajectories share the phase."""
+        if self.autonomous:
+            return True
+        try:
+            multiple = interval / self.section_interval
+        except NoSectionError:
+            return False
+        return round(multiple) >= 1 and abs(multiple - round(multiple)) < 1e-12 * multiple
+
 
 def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:
     if isinstance(parts, kind):
         raise SceneError(f"scene: {name} is a single {type(parts).__name__}; give a sequence of them, even of one.")
     if not isinstance(parts, Iterable):
-        raise SceneError(f"scene: {name} is {parts!r}; give a sequence of {kind.__name__}s, empty for none.")
+        raise SceneError(f"scene: {name} is {shown(parts)}; give a sequence of {kind.__name__}s, empty for none.")
     found = tuple(parts)
     for part in found:
         if not isinstance(part, kind):
-            raise SceneError(f"scene: {name} has {part!r}, which is no {kind.__name__}; give a {kind.__name__}.")
+            raise SceneError(f"scene: {name} has {shown(part)}, which is no {kind.__name__}; give one.")
     return found
 
 

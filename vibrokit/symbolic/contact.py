@@ -12,6 +12,8 @@ from vibrokit.symbolic.formulas import ask
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
 
+_ANALYTIC = (sympy.exp, sympy.sin, sympy.cos, sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan)  # on the real axis
+
 
 @dataclasses.dataclass(frozen=True)
 class DerivedContact:
@@ -77,9 +79,14 @@ def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
                 base_vanishes = variable in node.base.free_symbols and node.base.subs(variable, 0).is_zero is not False
             if base_vanishes:
                 return False
-        elif isinstance(node, sympy.log) and node.args[0].subs(variable, 0).is_zero is not False:
-            return False
-        elif isinstance(node, sympy.Abs | sympy.sign | sympy.Max | sympy.Min | sympy.Piecewise):
+        elif isinstance(node, (sympy.Add, sympy.Mul, sympy.Symbol, *_ANALYTIC)):
+            continue
+        elif isinstance(node, sympy.log | sympy.tan | sympy.asin | sympy.acos):
+            at_touch = node.args[0].subs(variable, 0)
+            singular = {sympy.log: at_touch, sympy.tan: sympy.cos(at_touch)}.get(node.func, 1 - at_touch**2)
+            if singular.is_zero is not False:
+                return False
+        else:  # kinks, jumps, and functions of which nothing is known
             return False
     return True
 

@@ -33,8 +33,7 @@ class FlowEquations:
 
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
     """Derive the equations of a flow."""
-    x, v = model.state[:2]
-    opaque = tuple(sympy.Function(f"C{index}")(x, v) for index in range(len(model.scene.barriers)))
+    opaque = model.opaque_forces
     forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
     drift = model.drift_with(forcing, opaque)
     variables: tuple[sympy.Symbol, ...] = model.state

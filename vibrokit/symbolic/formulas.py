@@ -33,7 +33,7 @@ def ask(part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tup
     named = {d.name: values.get(d.name, exact(part.parameters[d.name])) for d in part.declared()}
     title = f"{type(part).__name__}.{method}"
     try:
-        answer = sympy.sympify(getattr(part.twin(named), method)(*arguments))
+        answer = sympy.sympify(getattr(part.twin(named), method)(*arguments), strict=True)
     except Exception as error:
         raise DerivationError(
             f"{title} failed when it was called with symbols ({type(error).__name__}: {error}); write it with "

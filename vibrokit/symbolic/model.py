@@ -6,9 +6,11 @@ from functools import cached_property
 
 import sympy
 
+from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
 from vibrokit.symbolic.formulas import ask
+from vibrokit.symbolic.reading import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
 
 
@@ -58,14 +60,18 @@ class Model:
         sign = self.scene.barriers[index].sign
         return -sign * self.contacts[index].law.subs({DEPTH: self.depth(index), RATE: sign * self.state[1]})
 
-    def guarded_force(self, index: int) -> sympy.Expr:
-        """Force of stop `index` on the mass everywhere: zero when apart, and where a law would pull."""
-        sign = self.scene.barriers[index].sign
-        force = self.contact_force(index)
-        touching = self.depth(index) > 0
+    def guarded_force(self, index: int, in_x: int = 0, in_v: int = 0) -> sympy.Expr:
+        """Force of stop `index` on the mass everywhere: zero when apart, and where a law would pull.
+
+        With `in_x` and `in_v`, its derivative of these orders in x and in v.
+        """
+        x, v = self.state[:2]
+        barrier, force = self.scene.barriers[index], self.contact_force(index)
+        position = self.symbols[f"barriers.{index}.position"]
+        touching = x > position if barrier.sign > 0 else x < position
         if self.contacts[index].clamped:
-            touching = sympy.And(touching, -sign * force > 0)
-        return sympy.Piecewise((force, touching), (0, True))
+            touching = sympy.And(touching, -barrier.sign * force > 0)
+        return sympy.Piecewise((sympy.diff(force, (x, in_x), (v, in_v)), touching), (0, True))
 
     @cached_property
     def smooth_force(self) -> sympy.Expr:
@@ -81,10 +87,15 @@ class Model:
 
     @cached_property
     def _excitations(self) -> tuple[sympy.Expr, ...]:
-        return tuple(
-            ask(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,))
-            for index, part in enumerate(self.scene.excitations)
-        )
+        forces = []
+        for index, part in enumerate(self.scene.excitations):
+            forces.append(ask(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,)))
+            if part.period is None and self.time in forces[-1].free_symbols:
+                raise DerivationError(
+                    f"{type(part).__name__}.period is None, as of a constant, but its force depends on time; give the "
+                    "period, or math.inf if it never repeats."
+                )
+        return tuple(forces)
 
     @cached_property
     def forcing(self) -> sympy.Expr:
@@ -155,9 +166,26 @@ class Model:
         """Rate of every variable: Hamilton's equations with noise, the equations of motion without."""
         if not self.momenta:
             return dict(zip(self.state, self.drift, strict=True))
-        rates = {q: sympy.diff(self.hamiltonian, p) for q, p in zip(self.state, self.momenta, strict=True)}
-        rates |= {p: -sympy.diff(self.hamiltonian, q) for q, p in zip(self.state, self.momenta, strict=True)}
-        return {variable: sympy.expand(rate) for variable, rate in rates.items()}
+        # The stops stay closed while H is differentiated: their formulas come out as their authors wrote them.
+        x, v = self.state[:2]
+        forces = self.opaque_forces
+        hamiltonian = self.hamiltonian_with(self.drift_with(self.forcing, forces))
+        rates = {q: sympy.diff(hamiltonian, p) for q, p in zip(self.state, self.momenta, strict=True)}
+        rates |= {
+            p: sum(sympy.expand_mul(term, deep=False) for term in sympy.Add.make_args(-sympy.diff(hamiltonian, q)))
+            for q, p in zip(self.state, self.momenta, strict=True)
+        }
+        opened = {
+            sympy.diff(force, (x, a), (v, b)): self.guarded_force(index, a, b)
+            for index, force in enumerate(forces)
+            for a, b in ((1, 0), (0, 1), (0, 0))
+        }
+        return {variable: rate.xreplace(opened) for variable, rate in rates.items()}
+
+    @property
+    def opaque_forces(self) -> tuple[sympy.Expr, ...]:
+        """The force of each stop as a function of x and v that is not looked into."""
+        return tuple(sympy.Function(f"C{index}")(*self.state[:2]) for index in range(len(self.scene.barriers)))
 
     @cached_property
     def jacobian(self) -> sympy.Matrix:
@@ -165,13 +193,13 @@ class Model:
         return self.drift.jacobian(list(self.state))
 
     def _repr_latex_(self) -> str:
-        lines = [rf"\dot{{{sympy.latex(q)}}} &= {sympy.latex(rate)}" for q, rate in self.equations.items()]
+        lines = [rf"\dot{{{as_latex(q)}}} &= {as_latex(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
-            lines.append(rf"\dot{{S}} &= {sympy.latex(self.action_rate)}")
+            lines.append(rf"\dot{{S}} &= {as_latex(self.action_rate)}")
         return r"$\displaystyle \begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}$"
 
     def __str__(self) -> str:
-        lines = [f"{q}' = {rate}" for q, rate in self.equations.items()]
+        lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
-            lines += [f"S' = {self.action_rate}", f"H = {self.hamiltonian}"]
+            lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
         return "\n".join(lines)

@@ -57,6 +57,10 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
                 text = f"({self._print(value)} if {self._print(condition)} else {text})"
         return text
 
+    def _print_sign(self, expression: sympy.sign) -> str:
+        text = self._print(expression.args[0])
+        return f"(1.0 if {text} > 0.0 else (-1.0 if {text} < 0.0 else 0.0))"
+
     def _print_Max(self, expression: sympy.Max) -> str:
         return self._fold("max", expression)
 
@@ -86,12 +90,12 @@ def assignments(
     Returns
     -------
     lines : list of str
-        Assignments of the common parts, to names that begin with `temporary`.
+        Assignments of the common parts, to names made of an underscore, `temporary` and a number.
     texts : dict of str
         Text of each target in terms of these.
     """
     printer = SourcePrinter()
-    names = (sympy.Symbol(f"{temporary}{index}") for index in range(10**6))
+    names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))  # no parameter begins with "_"
     shared, reduced = sympy.cse([printable(e) for e in targets.values()], symbols=names, optimizations=None)
     lines = [f"{indent}{name} = {printer.doprint(value)}" for name, value in shared]
     texts = {name: printer.doprint(value) for name, value in zip(targets, reduced, strict=True)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import keyword
+import re
 from collections import Counter
 
 import sympy
@@ -9,6 +11,14 @@ import sympy
 from vibrokit.parts.scene import Entry, Scene
 
 _TAKEN = ("x", "v", "t", "S", "f", "h", "z")
+_SPELLED = {"lambda": "lamda"}  # SymPy's own spelling; the other is a word of Python
+# What generated code calls its own: momenta, matrix entries, stops, tabulated forcing, arrays, functions. None of
+# it ends in an underscore.
+_IN_CODE = re.compile(
+    r"(?!.*_$)([pm]_\d+|C\d+(_\w+)?|k\d+_\w+|f[012]|touching\d+|[A-Z]{3,}|depth|rate|lane|theta|out|pushing|_.*|"
+    r"forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|record|advance|njit|np|min|max|"
+    r"a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
+)
 
 
 def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
@@ -24,8 +34,8 @@ def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
         name = entry.declared.symbol
         if letters[name] > 1 or name in taken:
             name = f"{name}_{_suffix(scene, entry)}"
-        while name in taken:
-            name += "_"
+        while name in taken or keyword.iskeyword(name) or _IN_CODE.fullmatch(name):
+            name = _SPELLED.get(name, f"{name}_")
         taken.add(name)
         symbols[entry.path] = _symbol(name, entry)
     return symbols

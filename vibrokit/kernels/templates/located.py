@@ -21,6 +21,7 @@ from vibrokit.kernels.templates.steps import (
     SINCE,
     SPAN,
     SPARE,
+    STAGE,
     TIME,
     TIMED,
     TOUCHED,
@@ -215,7 +216,8 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
     left = end - y[CLOCK]
     last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * left
     h = length_of(course, sigma, left if last else memory[CONTACT_STEP], i, y, theta)
-    slope(course, sigma, h, y, i, pushing, theta, desk[0], desk[SPARE])
+    copy(y, desk[STAGE])
+    slope(course, sigma, h, i, pushing, theta, desk, 0)
     first, error = h, 0.0
     while True:
         memory[COUNT] += 1.0

@@ -12,6 +12,7 @@ from vibrokit.kernels.templates.steps import (
     FREE_STEP,
     SPAN,
     SPARE,
+    STAGE,
     TIME,
     TRIAL,
     attempt,
@@ -35,7 +36,8 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
         last = memory[FREE_STEP] >= 0.99 * left
         h = left if last else memory[FREE_STEP]
         first, touched, length = h, CLEAR, h
-        slope(TIME, 0.0, h, y, 0, pushing, theta, desk[0], desk[SPARE])
+        copy(y, desk[STAGE])
+        slope(TIME, 0.0, h, 0, pushing, theta, desk, 0)
         while True:
             memory[COUNT] += 1.0
             if memory[COUNT] > settings[1]:

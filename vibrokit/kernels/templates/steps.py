@@ -37,33 +37,39 @@ def copy(source, target):
 
 
 @njit(**INNER)
-def slope(course, sigma, reach, y, i, pushing, theta, out, spare):
-    """Rate of y along a course, at sigma; `reach` is the length of the step that asks."""
-    if BARRIERS == 0 or course == TIME:
-        rhs(y[CLOCK], y, pushing, theta, out)
-        out[CLOCK] = 1.0
-    else:
-        root_slope(course, sigma, reach, y, i, pushing, theta, out, spare)
+def slope(course, sigma, reach, i, pushing, theta, desk, row):
+    """Put the slope at the point in STAGE, at sigma on a course, in a row; `reach` is the length of the step."""
+    y, weight = desk[STAGE], 1.0
+    if BARRIERS > 0:
+        if course != TIME:
+            wall, side = stop(i, theta), SIDES[i]
+            if course == ROOT_DEPTH:
+                y[0] = wall + side * sigma * sigma
+            depth, rate = side * (y[0] - wall), side * y[1]
+            if depth < 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(rate if course == ROOT_TIME else 1.0):
+                first_slope(course, sigma, reach, i, pushing, theta, desk, row)
+                return
+            weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * np.sqrt(depth) / rate
+    weighted_slope(weight, y, pushing, theta, desk[row])
 
 
 @njit(**INNER)
-def root_slope(course, sigma, reach, y, i, pushing, theta, out, spare):
-    wall, side = stop(i, theta), SIDES[i]
-    if course == ROOT_DEPTH:
-        y[0] = wall + side * sigma * sigma
-    x, rate = y[0], side * y[1]
-    depth = side * (x - wall)
-    along = rate if course == ROOT_TIME and rate > 0.0 else 1.0  # depth = along sigma² near the stop
-    least = 64.0 * EPSILON * abs(wall) + (1e-8 * reach) ** 2 * along
-    if depth >= least:
-        weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * np.sqrt(depth) / rate
-        weighted_slope(weight, y, pushing, theta, out)
-    elif course == ROOT_TIME and (rate <= 0.0 or sigma * sigma * rate > 4.0 * least):
+def first_slope(course, sigma, reach, i, pushing, theta, desk, row):
+    """The slope so near to the stop that x cannot tell how near.
+
+    The second derivative of a law is infinite at depth 0 while its product with sigma is not: there, continue the
+    slope from two depths that x does represent.
+    """
+    # Rows are made into arrays only here: arrays handed on cost more than a slope.
+    y, out, spare = desk[STAGE], desk[row], desk[SPARE]
+    x, wall, side = y[0], stop(i, theta), SIDES[i]
+    rate = side * y[1]
+    along = rate if course == ROOT_TIME else 1.0  # depth = along sigma² near the stop
+    least = 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(along)
+    if course == ROOT_TIME and (rate <= 0.0 or sigma * sigma * rate > 4.0 * least):
         y[0] = wall + side * least
         weighted_slope(2.0 * sigma, y, pushing, theta, out)
     else:
-        # A law's second derivative is infinite at depth 0 while its product with sigma is not: continue the slope
-        # from two depths that x can still represent.
         y[0] = wall + side * least
         first = np.sqrt(side * (y[0] - wall) / along)
         weighted_slope(2.0 * first if course == ROOT_TIME else 2.0 * first / rate, y, pushing, theta, spare)
@@ -94,7 +100,7 @@ def attempt(course, sigma, h, y, i, pushing, theta, desk):
             for j in range(1 if s < 5 else 3, s):  # the later stages do not use slopes 1 and 2
                 total += WEIGHTS[s, j] * desk[j, e]
             stage[e] = y[e] + h * total
-        slope(course, sigma + NODES[s] * h, h, stage, i, pushing, theta, desk[s], desk[SPARE])
+        slope(course, sigma + NODES[s] * h, h, i, pushing, theta, desk, s)
     for e in range(CLOCK + 1):
         total = RESULT[0] * desk[0, e]
         for s in range(5, STAGES):

@@ -18,4 +18,4 @@ class Excitation(Part):
     @property
     @abstractmethod
     def period(self) -> float | None:
-        """Period (s); None if the force is constant."""
+        """Period (s); None if the force is constant, `math.inf` if it varies and never repeats."""

@@ -33,10 +33,10 @@ class StateDependentNoise(FormulaPart, NoiseModel):
     formula: str
     constants: tuple[tuple[str, Any], ...]
 
-    def __init__(self, intensity: float, amplitude: str, **constants: float) -> None:
-        object.__setattr__(self, "intensity", intensity)
+    def __init__(self, /, intensity: float, amplitude: str, **constants: float) -> None:
+        (declared,) = self._own()
+        object.__setattr__(self, "intensity", declared.checked(type(self).__name__, intensity))
         self._read(amplitude, constants)
-        self.__post_init__()
 
     def _own(self) -> tuple[Parameter, ...]:
         return self._declared[:1]

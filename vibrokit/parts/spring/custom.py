@@ -29,7 +29,7 @@ class CustomSpring(FormulaPart, Spring):
     formula: str
     constants: tuple[tuple[str, Any], ...]
 
-    def __init__(self, formula: str, **constants: float) -> None:
+    def __init__(self, /, formula: str, **constants: float) -> None:
         self._read(formula, constants)
 
     def force(self, x: Any, v: Any) -> Any:

@@ -1,0 +1,272 @@
+"""The command line: vibrokit run, equations, list, check, plot, trade."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vibrokit import __version__
+from vibrokit.errors import VibrokitError
+
+if TYPE_CHECKING:
+    from vibrokit.kernels.ensemble import Progress
+    from vibrokit.results.result import Result
+    from vibrokit.structure.structure import Structure
+
+_PATIENCE = 2.0  # seconds after which progress is shown
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status: 0, 1 where a check failed, 2 where the input is wrong."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options) or 0)
+    except (VibrokitError, OSError) as error:
+        print(f"vibrokit: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("vibrokit: stopped; nothing was written.", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="vibrokit", description="Stochastic stability of vibro-impact oscillators: how hard each state is to leave."
+    )
+    parser.add_argument("--version", action="version", version=f"vibrokit {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    scene = argparse.ArgumentParser(add_help=False)
+    scene.add_argument("scene", help="a bundled scene, such as hertz-0.570, or a TOML file")
+
+    run = commands.add_parser("run", parents=[scene], help="find steady states and their activation energies")
+    run.add_argument("--analyzer", nargs="+", default=["action-plot"], metavar="NAME", help="default: action-plot")
+    run.add_argument("--set", action="append", default=[], metavar="FIELD=NUMBER", help="a setting of the analyzer")
+    run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
+    run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
+    run.add_argument("--json", action="store_true", help="print one JSON object and draw nothing")
+    run.add_argument("-o", "--output", type=Path, metavar="FILE", help="save the result (netCDF)")
+    run.add_argument("--figure", type=Path, metavar="FILE", help="where to save the figure")
+    run.set_defaults(command=_run)
+
+    equations = commands.add_parser("equations", parents=[scene], help="print the derived equations")
+    equations.add_argument("--latex", action="store_true", help="as LaTeX")
+    equations.set_defaults(command=_equations)
+
+    commands.add_parser("list", help="list scenes, parts and analyzers").set_defaults(command=_list)
+
+    check = commands.add_parser("check", help="check a registered part against the conformance kit")
+    check.add_argument("name")
+    check.set_defaults(command=_check)
+
+    plot = commands.add_parser("plot", help="draw a saved result")
+    plot.add_argument("file", type=Path)
+    plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture to write (default: FILE.png)")
+    plot.set_defaults(command=_plot)
+
+    trade = commands.add_parser("trade", parents=[scene], help="error against time of each stepper on this machine")
+    trade.add_argument("-o", "--output", type=Path, metavar="FILE", help="where to save the figure")
+    trade.set_defaults(command=_trade)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> None:
+    from vibrokit.analyzers.analyzer import Analyzer
+    from vibrokit.registry import Group, load
+    from vibrokit.scene_file import load_scene
+    from vibrokit.structure.find import find_structure
+
+    began = time.perf_counter()
+    osc = load_scene(options.scene)
+    kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
+    settings = _settings(options.set)
+    analyzers = [kind(**_known(kind, settings)) for kind in kinds]
+    cells = (_cells(options.cells),) * 2
+    with _Bar("basins") as bar:
+        structure = find_structure(osc, cells=cells, rng=options.seed, progress=bar)
+    if not options.json:
+        print(_attractor_table(options.scene, structure))
+    results = {}
+    for name, analyzer in zip(options.analyzer, analyzers, strict=True):
+        with _Bar(name) as bar:
+            results[name] = analyzer.run(osc, structure, progress=bar)
+    seconds = time.perf_counter() - began
+    if options.output is not None:
+        for name, result in results.items():
+            result.save(_numbered(options.output, name, len(results)))
+    if options.json:
+        print(json.dumps(_record(options, structure, results, seconds), allow_nan=False))
+        return
+    for name, result in results.items():
+        print(_energy_table(name, result))
+        figure = options.figure or Path(f"{_stem(options.scene)}.png")
+        figure = _numbered(figure, name, len(results) if options.figure else 2)
+        _save_figure(result, figure)
+        print(f"figure: {figure}")
+    print(f"{seconds:.1f} s")
+
+
+def _settings(words: list[str]) -> dict[str, Any]:
+    settings: dict[str, Any] = {}
+    for word in words:
+        field, equals, text = word.partition("=")
+        try:
+            number = float(text)
+            settings[field] = int(text) if text.lstrip("+-").isdigit() else number
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise VibrokitError(f"--set {word}: write FIELD=NUMBER, such as points=40000.")
+    return settings
+
+
+def _known(kind: type, settings: dict[str, Any]) -> dict[str, Any]:
+    import dataclasses
+
+    from vibrokit.errors import UnknownNameError, nearest
+
+    fields = [field.name for field in dataclasses.fields(kind)]
+    for name in settings:
+        if name not in fields:
+            raise UnknownNameError(f"{kind.__name__} has no setting {name!r}{nearest(name, fields)}")
+    return settings
+
+
+def _cells(count: int) -> int:
+    if not 2 <= count <= 20_000:
+        raise VibrokitError(f"--cells is {count}; give a whole number from 2 to 20000.")
+    return count
+
+
+def _stem(scene: str) -> str:
+    return Path(scene).name.removesuffix(".toml")
+
+
+def _numbered(path: Path, name: str, count: int) -> Path:
+    ending = path.suffix if path.suffix in (".png", ".pdf", ".svg", ".nc") else ""
+    return path if count == 1 else path.with_name(f"{path.name.removesuffix(ending)}-{name}{ending}")
+
+
+class _Bar:
+    """Progress on standard error, shown once work has taken a while."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+
+    def __enter__(self) -> Progress:
+        from tqdm import tqdm
+
+        self.bar: Any = tqdm(desc=self.title, delay=_PATIENCE, leave=False, unit="block", file=sys.stderr)
+
+        def show(done: int, total: int) -> None:
+            self.bar.total = total
+            self.bar.update(done - self.bar.n)
+
+        return show
+
+    def __exit__(self, *error: object) -> None:
+        self.bar.close()
+
+
+def _attractor_table(scene: str, structure: Structure) -> str:
+    rows = [f"{scene}: {structure.status}", "", "state  kind         period  stop hits  basin            at (x, v)"]
+    for a in structure.attractors:
+        basin = f"{100 * a.basin_fraction:.2f} ± {100 * a.basin_fraction_error:.2f} %"
+        place = f"({a.points[0, 0]:+.6f}, {a.points[0, 1]:+.6f})"
+        rows.append(f"{a.label:<5}  {a.kind:<11}  {a.period:<6}  {a.impacts:<9}  {basin:<15}  {place}")
+    return "\n".join([*rows, ""])
+
+
+def _energy_table(name: str, result: Result) -> str:
+    rows = [f"{name}: {result.status}", "", "from → to   ΔU            lower         upper         momentum at exit"]
+    for e in result.energies:
+        rows.append(f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}")
+    return "\n".join([*rows, ""])
+
+
+def _save_figure(result: Result, path: Path) -> None:
+    from vibrokit.results.pictures import save_figure
+
+    save_figure(result.plot(), path)
+
+
+def _record(options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float) -> dict[str, Any]:
+    energies = ("source", "target", "method", "value", "lower", "upper", "residual")
+    return {
+        "scene": options.scene,
+        "attractors": [
+            {
+                "label": a.label,
+                "kind": a.kind,
+                "period": a.period,
+                "impacts": a.impacts,
+                "points": a.points.tolist(),
+                "basin_fraction": a.basin_fraction,
+            }
+            for a in structure.attractors
+        ],
+        "saddles": [
+            {"period": s.period, "points": s.points.tolist(), "multipliers": [[m.real, m.imag] for m in s.multipliers]}
+            for s in structure.saddles
+        ],
+        "energies": [{key: getattr(e, key) for key in energies} for r in results.values() for e in r.energies],
+        "versions": next(iter(results.values())).versions if results else {},
+        "seed": options.seed,
+        "seconds": seconds,
+    }
+
+
+def _equations(options: argparse.Namespace) -> None:
+    from vibrokit.scene_file import load_scene
+
+    model = load_scene(options.scene).model
+    print(model.latex if options.latex else model)
+
+
+def _list(options: argparse.Namespace) -> None:
+    from vibrokit.registry import Group, names
+    from vibrokit.scene_file import bundled_scenes
+
+    print("scenes:", ", ".join(bundled_scenes()))
+    for group in Group:
+        print(f"{group.noun}s:")
+        for registered in names(group):
+            print(f"    {registered.name:<20} {registered.distribution}")
+
+
+def _check(options: argparse.Namespace) -> int:
+    from vibrokit.testing import check
+
+    report = check(options.name)
+    print("\n".join(report.lines))
+    return 0 if report.passed else 1
+
+
+def _plot(options: argparse.Namespace) -> None:
+    from vibrokit.results.files import load_result
+
+    picture = options.output or options.file.with_suffix(".png")
+    _save_figure(load_result(options.file), picture)
+    print(picture)
+
+
+def _trade(options: argparse.Namespace) -> None:
+    from vibrokit.plots.trade import work_precision
+    from vibrokit.results.pictures import save_figure
+    from vibrokit.scene_file import load_scene
+    from vibrokit.trade.steppers import measure_steppers
+
+    with _Bar("trade") as bar:
+        table = measure_steppers(load_scene(options.scene), progress=bar)
+    print(table)
+    picture = options.output or Path(f"{_stem(options.scene)}-trade.png")
+    save_figure(work_precision(table.rows), picture)
+    print(f"figure: {picture}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,31 @@
+"""Saves pictures, whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vibrokit.errors import VibrokitError
+from vibrokit.results.atomic import write_atomically
+
+_DPI = 150
+_FORMATS = (".png", ".pdf", ".svg")
+
+
+def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
+    """Save the figure that some artists are in; the file's ending chooses the format.
+
+    Raises
+    ------
+    VibrokitError
+        An ending other than .png, .pdf or .svg.
+    """
+    target = Path(path)
+    if target.suffix not in _FORMATS:
+        raise VibrokitError(f"{target} ends in {target.suffix!r}; a picture ends in {', '.join(_FORMATS)}.")
+    content = io.BytesIO()
+    artists[0].get_figure().savefig(content, format=target.suffix[1:], dpi=_DPI)
+    write_atomically(target, content.getvalue())
