@@ -36,7 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="vibrokit", description="Stochastic stability of vibro-impact oscillators: how hard each state is to leave."
+        prog="vibrokit",
+        description="Stochastic stability of vibro-impact oscillators: how hard each state is to leave.",
     )
     parser.add_argument("--version", action="version", version=f"vibrokit {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -184,7 +185,9 @@ def _attractor_table(scene: str, structure: Structure) -> str:
 def _energy_table(name: str, result: Result) -> str:
     rows = [f"{name}: {result.status}", "", "from → to   ΔU            lower         upper         momentum at exit"]
     for e in result.energies:
-        rows.append(f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}")
+        rows.append(
+            f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}"
+        )
     return "\n".join([*rows, ""])
 
 
@@ -194,7 +197,9 @@ def _save_figure(result: Result, path: Path) -> None:
     save_figure(result.plot(), path)
 
 
-def _record(options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float) -> dict[str, Any]:
+def _record(
+    options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float
+) -> dict[str, Any]:
     energies = ("source", "target", "method", "value", "lower", "upper", "residual")
     return {
         "scene": options.scene,

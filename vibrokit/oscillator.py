@@ -167,8 +167,8 @@ class Oscillator(Scene):
             last = tuple(float(value) for value in ended.states[first])
             raise IntegrationError(
                 f"{failed.size} of {len(starts)} trajectories ran out of range; the first, number {first} from "
-                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, where its state was {last}. Look at the "
-                f"signs of the forces, or take a finer stepper than {chosen}.",
+                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, where its state was {last}. Look "
+                f"at the signs of the forces, or take a finer stepper than {chosen}.",
                 time,
                 last,
             )
@@ -198,7 +198,9 @@ class Oscillator(Scene):
         try:
             checked = np.atleast_2d(np.asarray(states, dtype=float))
         except (TypeError, ValueError) as error:
-            raise ParameterError(f"states are not numbers ({error}); give (x, v), or an array of shape (count, {size}).") from error
+            raise ParameterError(
+                f"states are not numbers ({error}); give (x, v), or an array of shape (count, {size})."
+            ) from error
         if checked.ndim != 2 or checked.shape[1] != size or (dimensions == 1 and len(checked) != 1):
             wanted = f"{size} numbers" if dimensions == 1 else f"an array of shape (count, {size})"
             raise ParameterError(f"states have shape {np.shape(states)}; give {wanted}.")

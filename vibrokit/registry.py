@@ -90,8 +90,7 @@ def load(group: Group, name: str, kind: type = object) -> type:
         return loaded
     origins = " and ".join(_origin(entry) for entry in candidates[name])
     raise UnknownNameError(
-        f"The {group.noun} {name!r} is registered by {origins} but does not load; the warning before this "
-        "says why."
+        f"The {group.noun} {name!r} is registered by {origins} but does not load; the warning before this says why."
     )
 
 

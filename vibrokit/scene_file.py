@@ -6,11 +6,12 @@ import inspect
 import json
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from vibrokit.errors import ParameterError, SceneError, UnknownNameError, nearest
+from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.contact.contact_law import ContactLaw
@@ -24,6 +25,7 @@ from vibrokit.results.atomic import write_atomically
 
 _BUNDLED = Path(__file__).parent / "scenes"
 _LARGEST_FILE = 1_000_000
+_LONGEST_NAME = 100
 _KEYS = ("natural_frequency", "damping_ratio", "spring", "barriers", "excitations", "noise")
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
@@ -52,30 +54,56 @@ def load_scene(source: str | os.PathLike[str]) -> Oscillator:
     UnknownNameError
         A part that is not registered, or a scene that is neither file nor bundled.
     """
-    path = _find(os.fspath(source))
-    if path.stat().st_size > _LARGEST_FILE:
-        raise SceneError(f"{path} has {path.stat().st_size} bytes, too many for a scene; at most {_LARGEST_FILE}.")
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{path} is no text in UTF-8 ({error}); a scene is a TOML file.") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SceneError(f"{path} is no TOML: {error}.") from error
+    path = _find(source)
+    data = _read(path)
     try:
         return scene_from_data(data)
-    except (SceneError, ParameterError) as error:
+    except VibrokitError as error:
         raise type(error)(f"{path.name}: {error}") from error
 
 
-def _find(source: str) -> Path:
+def _find(source: str | os.PathLike[str]) -> Path:
+    if not isinstance(source, str | os.PathLike):
+        raise SceneError(f"the scene is {shown(source)}; give the path of a TOML file or one of {_bundled_names()}.")
     path = Path(source)
-    if path.is_file():
-        return path
-    if source in bundled_scenes():
+    if str(source) in bundled_scenes() and not _is(path.is_file):
         return _BUNDLED / f"{source}.toml"
-    if path.is_dir():
-        raise SceneError(f"{source} is a folder; give a TOML file or one of {', '.join(bundled_scenes())}.")
-    raise UnknownNameError(f"no file and no bundled scene is called {source!r}{nearest(source, bundled_scenes())}")
+    if _is(path.is_dir):
+        raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled_names()}.")
+    if not _is(path.exists):
+        raise UnknownNameError(
+            f"no file and no bundled scene is called {shown(str(source))}{nearest(str(source), bundled_scenes())}"
+        )
+    return path
+
+
+def _is(question: Callable[[], bool]) -> bool:
+    try:
+        return question()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
+
+
+def _bundled_names() -> str:
+    return ", ".join(bundled_scenes())
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read ({error.strerror}); give a TOML file that can.") from error
+    if len(content) > _LARGEST_FILE:
+        raise SceneError(f"{path} is too large for a scene; at most {_LARGEST_FILE} bytes are read.")
+    try:
+        return tomllib.loads(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path} is no text in UTF-8 (at byte {error.start}); a scene is a TOML file.") from error
+    except RecursionError as error:
+        raise SceneError(f"{path} is nested too deeply; a scene has tables of numbers and text.") from error
+    except ValueError as error:  # TOMLDecodeError, or an integer too long for Python
+        raise SceneError(f"{path} is no TOML: {' '.join(str(error).split())}.") from error
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -84,7 +112,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        A part is of a class that is not registered, so that no file could name it.
+        A part is of a class that is not registered, so that no file could name it; or the file cannot be written.
     """
     data = scene_data(scene)
     for kind, values in _named_parts(data):
@@ -93,7 +121,12 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
                 f"{values['name']} is not registered, so a scene file cannot name it; register the class under the "
                 f"entry-point group {kind.value!r}."
             )
-    write_atomically(Path(path), _toml(data).encode("utf-8"))
+    try:
+        write_atomically(Path(path), _toml(data).encode("utf-8"))
+    except OSError as error:
+        raise SceneError(
+            f"{path} cannot be written ({error.strerror}); give a path in a folder that can be."
+        ) from error
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:
@@ -122,8 +155,8 @@ def _barrier_data(barrier: Barrier) -> dict[str, Any]:
 def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
     found = [(Group.CONTACT_LAWS, barrier["law"]) for barrier in data.get("barriers", ())]
     found += [(Group.EXCITATIONS, values) for values in data.get("excitations", ())]
-    found += [(group, data[key]) for group, key in ((Group.SPRINGS, "spring"), (Group.NOISE_MODELS, "noise")) if key in data]
-    return found
+    single = ((Group.SPRINGS, "spring"), (Group.NOISE_MODELS, "noise"))
+    return found + [(group, data[key]) for group, key in single if key in data]
 
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
@@ -146,19 +179,21 @@ def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
 def _listed(key: str, data: Mapping[str, Any]) -> list[Any]:
     values = data.get(key, [])
     if not isinstance(values, list):
-        raise SceneError(f"scene: {key} is {values!r}, no list; write a table [[{key}]] for each.")
+        raise SceneError(f"scene: {key} is {shown(values)}, no list; write a table [[{key}]] for each.")
     return values
 
 
 def _barrier(place: str, data: Any) -> Barrier:
     _check_keys(place, data, _BARRIER_KEYS, required=_BARRIER_KEYS[:3])
     law = _part(f"{place}.law", Group.CONTACT_LAWS, ContactLaw, data["law"])
-    return Barrier(law, data["position"], data["side"], data.get("adhesive", False))
+    return _made(place, Barrier, law, data["position"], data["side"], data.get("adhesive", False))
 
 
 def _part(place: str, group: Group, kind: type, data: Any) -> Any:
     if not isinstance(data, dict) or not isinstance(data.get("name"), str):
-        raise SceneError(f"{place} is {data!r}; write a table with the part's name and its parameters.")
+        raise SceneError(f"{place} is {shown(data)}; write a table with the part's name and its parameters.")
+    if len(data["name"]) > _LONGEST_NAME:
+        raise SceneError(f"{place} has the name {shown(data['name'])}; a name has at most {_LONGEST_NAME} characters.")
     part = load(group, data["name"], kind)
     values = {key: value for key, value in data.items() if key != "name"}
     accepted = inspect.signature(part).parameters.values()
@@ -166,15 +201,23 @@ def _part(place: str, group: Group, kind: type, data: Any) -> Any:
     known = [p.name for p in accepted if p.kind is not p.VAR_KEYWORD]
     required = [p.name for p in accepted if p.default is p.empty and p.kind is not p.VAR_KEYWORD]
     _check_keys(f"{place} ({data['name']})", values, (*known, *values) if open_ended else known, required)
-    return part(**values)
+    return _made(place, part, **values)
+
+
+def _made(place: str, make: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
+    """Make a part; what is wrong with it is said with its place in the file."""
+    try:
+        return make(*arguments, **values)
+    except VibrokitError as error:
+        raise type(error)(f"{place}: {error}") from error
 
 
 def _check_keys(place: str, data: Any, known: Any, required: Any) -> None:
     if not isinstance(data, Mapping):
-        raise SceneError(f"{place} is {data!r}, no table; it has {', '.join(known)}.")
+        raise SceneError(f"{place} is {shown(data)}, no table; it has {', '.join(known)}.")
     for key in data:
         if key not in known:
-            raise SceneError(f"{place} has an unknown entry {key!r}{nearest(key, known)}")
+            raise SceneError(f"{place} has an unknown entry {shown(key)}{nearest(key, known)}")
     for key in required:
         if key not in data:
             raise SceneError(f"{place} lacks {key}; it needs {', '.join(required)}.")
@@ -198,4 +241,4 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_value(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, str):
         return json.dumps(value)  # a JSON string of printable text is a TOML basic string
-    return repr(value)
+    return repr(int(value)) if isinstance(value, Integral) else repr(float(value))

@@ -47,6 +47,8 @@ def versions() -> dict[str, str]:
 def plain_settings(analyzer: Any) -> dict[str, Any]:
     """Return the configuration of an analyzer as plain data."""
     return {
-        field.name: value if isinstance(value := getattr(analyzer, field.name), int | float | str | None) else repr(value)
+        field.name: value
+        if isinstance(value := getattr(analyzer, field.name), int | float | str | None)
+        else repr(value)
         for field in dataclasses.fields(analyzer)
     }

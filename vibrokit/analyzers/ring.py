@@ -128,9 +128,7 @@ def confirmed_exits(
 def _settled(osc: Oscillator, structure: Structure, states: Array, stepper: Stepper) -> NDArray[np.int64]:
     points = [attractor.points for attractor in structure.attractors]
     size = structure.attractors[0].points.shape[1]
-    return settle(
-        osc, states[:, :size], points, tolerance=structure.settling, budget=structure.budget, stepper=stepper
-    )
+    return settle(osc, states[:, :size], points, tolerance=structure.settling, budget=structure.budget, stepper=stepper)
 
 
 def _carried_on(

@@ -22,5 +22,9 @@ def error_blocks(states: int, equations: int) -> NDArray[np.int64]:
     if equations in (states, states + states**2):
         return np.array(state + [states] * (equations - states))
     phase = [*state, *[states] * states]
-    matrix = [states + 2 + 2 * (row >= states) + (column >= states) for row in range(2 * states) for column in range(2 * states)]
+    matrix = [
+        states + 2 + 2 * (row >= states) + (column >= states)
+        for row in range(2 * states)
+        for column in range(2 * states)
+    ]
     return np.array([*phase, states + 1, *matrix][:equations])

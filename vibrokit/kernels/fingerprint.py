@@ -9,6 +9,8 @@ import functools
 import hashlib
 import importlib.metadata
 import inspect
+import os
+import pickle
 import sys
 import types
 from pathlib import Path
@@ -46,49 +48,87 @@ def _environment() -> str:
 def _part(part: Any) -> str:
     structural = [(d.name, part.parameters[d.name]) for d in part.declared() if d.structural]
     declared = [(d.name, d.symbol, d.minimum, d.above, d.structural) for d in part.declared()]
-    return f"{structural} {declared} {_class(type(part), frozenset())}"
+    return f"{structural} {declared} {_Walk().describe(type(part))}"
 
 
-def _class(cls: type, seen: frozenset[int]) -> str:
-    rows = []
-    for owner in cls.__mro__:
-        if owner is object or owner.__module__.startswith("abc"):
-            continue
-        rows.append(f"{owner.__module__}.{owner.__qualname__}")
-        for name, value in sorted(vars(owner).items()):
-            if not (name.startswith("__") and name.endswith("__")):
-                rows.append(f"{name}={_value(value, seen)}")
-    return hashlib.sha256("\n".join(rows).encode()).hexdigest()
+class _Walk:
+    """One walk over all that a formula may depend on: followed into code, by value for data, each thing once.
+
+    What it cannot describe gets a description that no other process makes, so that no stale kernel is ever taken.
+    """
+
+    def __init__(self) -> None:
+        self._met: dict[int, tuple[int, Any]] = {}  # holds what was met, so that no id is given again
+
+    def describe(self, value: Any, names: tuple[str, ...] = ()) -> str:
+        """Describe a value; of a module, only those members whose names are used."""
+        if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+            return repr(value)
+        if id(value) in self._met:
+            return f"met {self._met[id(value)][0]}"
+        self._met[id(value)] = len(self._met), value
+        text = self._described(value, names)
+        return text if len(text) < 100 else hashlib.sha256(text.encode()).hexdigest()
+
+    def _described(self, value: Any, names: tuple[str, ...]) -> str:
+        if isinstance(value, types.ModuleType | type | types.FunctionType | types.BuiltinFunctionType):
+            return self._code_of(value, names)
+        if isinstance(value, tuple | list):
+            return f"({', '.join(self.describe(entry, names) for entry in value)})"
+        if isinstance(value, set | frozenset):
+            return f"{{{', '.join(sorted(self.describe(entry, names) for entry in value))}}}"
+        if isinstance(value, dict):
+            rows = (f"{self.describe(key, names)}: {self.describe(entry, names)}" for key, entry in value.items())
+            return f"{{{', '.join(rows)}}}"
+        for holder in ("fget", "__func__", "__wrapped__", "func"):  # property, static or bound, cached, partial
+            if isinstance(inner := getattr(value, holder, None), types.FunctionType):
+                rest = (getattr(value, "args", ()), getattr(value, "keywords", {}))
+                return f"{type(value).__name__} {self.describe(inner)} {self.describe(rest)}"
+        try:
+            return f"{self.describe(type(value))} {hashlib.sha256(pickle.dumps(value, protocol=5)).hexdigest()}"
+        except Exception:
+            return f"{type(value)} {os.getpid()} {id(value)}"
+
+    def _code_of(self, value: Any, names: tuple[str, ...]) -> str:
+        module = value.__name__ if isinstance(value, types.ModuleType) else str(value.__module__)
+        name = getattr(value, "__qualname__", "")
+        if _is_versioned(module):
+            return f"{module} {name}"
+        if isinstance(value, types.ModuleType):
+            used = sorted(set(names) & set(vars(value)))
+            return f"{module} {[(name, self.describe(vars(value)[name], names)) for name in used]}"
+        if isinstance(value, type):
+            return f"{module} {name} {self._members(value)}"
+        return self._function(value) if isinstance(value, types.FunctionType) else f"{module} {name}"
+
+    def _members(self, cls: type) -> list[str]:
+        rows = [self.describe(base) for base in cls.__bases__]
+        for name, value in sorted(vars(cls).items()):
+            if name != "_abc_impl" and not (name.startswith("__") and name.endswith("__")):
+                rows.append(f"{name}={self.describe(value)}")
+        return rows
+
+    def _function(self, function: types.FunctionType) -> str:
+        names = _names(function.__code__)
+        rows = [self._code(function.__code__)]
+        known = function.__globals__
+        rows += [f"{name}={self.describe(known[name], names)}" for name in sorted(set(names) & set(known))]
+        rows += [self.describe(cell.cell_contents, names) for cell in function.__closure__ or () if _filled(cell)]
+        rows += [self.describe((function.__defaults__, function.__kwdefaults__))]
+        return "\n".join(rows)
+
+    def _code(self, code: types.CodeType) -> str:
+        constants = [self._code(c) if inspect.iscode(c) else self.describe(c) for c in code.co_consts]
+        return f"{code.co_code.hex()} {constants} {code.co_names} {code.co_varnames} {code.co_freevars}"
 
 
-def _value(value: Any, seen: frozenset[int]) -> str:
-    """Describe something that a formula may depend on: followed into functions, by value for plain data."""
-    if id(value) in seen:
-        return "…"
-    seen = seen | {id(value)}
-    if isinstance(value, property):
-        return _value(value.fget, seen)
-    if isinstance(value, staticmethod | classmethod):
-        return _value(value.__func__, seen)
-    if isinstance(value, types.FunctionType):
-        return _function(value, seen)
-    if isinstance(value, types.ModuleType):
-        return f"module {value.__name__} {getattr(value, '__version__', '')}"
-    if inspect.isclass(value):
-        return f"{value.__module__}.{value.__qualname__}"
-    if isinstance(value, bool | int | float | complex | str | bytes | tuple | list | dict | type(None)):
-        return repr(value)
-    return f"{type(value).__module__}.{type(value).__qualname__}"
-
-
-def _function(function: types.FunctionType, seen: frozenset[int]) -> str:
-    rows = [_code(function.__code__)]
-    names = sorted(set(_names(function.__code__)) & set(function.__globals__))
-    if not function.__module__.startswith("vibrokit."):
-        rows += [f"{name}={_value(function.__globals__[name], seen)}" for name in names]
-    rows += [_value(cell.cell_contents, seen) for cell in function.__closure__ or () if _filled(cell)]
-    rows += [_value(value, seen) for value in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values())]
-    return hashlib.sha256("\n".join(rows).encode()).hexdigest()
+def _is_versioned(module: str) -> bool:
+    """Whether a module's code is told by the versions in `_environment`."""
+    root = module.partition(".")[0]
+    if root in sys.stdlib_module_names:  # a user's file may have such a name too
+        place = getattr(sys.modules.get(root), "__file__", None)
+        return place is None or Path(place).is_relative_to(Path(os.__file__).parent)
+    return root in ("vibrokit", "mpmath", *_PACKAGES)
 
 
 def _filled(cell: Any) -> bool:
@@ -102,8 +142,3 @@ def _filled(cell: Any) -> bool:
 def _names(code: types.CodeType) -> tuple[str, ...]:
     inner = [name for constant in code.co_consts if inspect.iscode(constant) for name in _names(constant)]
     return (*code.co_names, *inner)
-
-
-def _code(code: types.CodeType) -> str:
-    constants = [_code(c) if inspect.iscode(c) else repr(c) for c in code.co_consts]
-    return f"{code.co_code.hex()} {constants} {code.co_names} {code.co_varnames} {code.co_freevars}"

@@ -99,7 +99,7 @@ def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
     """Derive the equations and write the module, scene above and stepper below."""
     from vibrokit.symbolic.source import scene_text  # only here is SymPy needed
 
-    text = scene_text(scene, flow)
+    text = scene_text(scene, flow, flight=stepper.flight)
     templates = [read_template(name) for name in stepper.templates]
     imports = "\n".join(dict.fromkeys(line for template in templates for line in template.imports))
     body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)

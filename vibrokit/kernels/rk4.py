@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.lanes import kicks, lane_step, tabulation
-from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stepper import Stepper, repeats
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.scene_text import SceneText
 

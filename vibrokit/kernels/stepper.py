@@ -23,6 +23,7 @@ class Stepper(ABC):
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]]
+    flight: ClassVar[bool] = False
 
     @abstractmethod
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
@@ -42,3 +43,11 @@ class Stepper(ABC):
 
     def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most steppers take every scene
         """Raise StepperError if this stepper cannot integrate this flow of this scene."""
+
+
+def repeats(scene: Scene, interval: float) -> bool:
+    """Whether the forcing is the same in each interval of this length."""
+    if scene.autonomous:
+        return True
+    multiple = interval / scene.section_interval
+    return abs(multiple - round(multiple)) < 1e-12 * multiple

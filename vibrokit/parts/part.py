@@ -46,10 +46,8 @@ class Part(ABC):
     def __post_init__(self) -> None:
         for declared in self.declared():
             value = getattr(self, declared.attribute)
-            if declared.structural and isinstance(value, str):
-                continue
             number = declared.checked(type(self).__name__, value)
-            if not declared.structural:
+            if isinstance(value, float) or not declared.structural:  # a structural fraction stays exact
                 object.__setattr__(self, declared.attribute, number)
 
     def declared(self) -> tuple[Parameter, ...]:

@@ -93,8 +93,8 @@ class Scene:
             period = part.period
             if period is not None and (isinstance(period, bool) or not isinstance(period, Real) or not period > 0):
                 raise SceneError(
-                    f"scene: excitations.{index}, a {type(part).__name__}, has the period {shown(period)}; give a positive "
-                    "number, None for a constant force, or math.inf for one that never repeats."
+                    f"scene: excitations.{index}, a {type(part).__name__}, has the period {shown(period)}; give a "
+                    "positive number, None for a constant force, or math.inf for one that never repeats."
                 )
 
     def entries(self) -> tuple[Entry, ...]:

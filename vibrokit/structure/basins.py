@@ -72,7 +72,5 @@ def settle(
         point_labels=np.repeat(np.arange(len(points)), [len(orbit) for orbit in points]),
         tolerance=tolerance,
     )
-    ended = run_ensemble(
-        osc, Flow.STATE, stepper, states, budget, stop=stop, executor=executor, progress=progress
-    )
+    ended = run_ensemble(osc, Flow.STATE, stepper, states, budget, stop=stop, executor=executor, progress=progress)
     return np.where(ended.status == REACHED, ended.label, UNSETTLED)

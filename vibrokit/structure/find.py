@@ -236,7 +236,9 @@ def _frame(osc: Oscillator, attractors: list[Attractor]) -> Region:
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     reach = np.abs(points - points.mean(axis=0)).max()
     places = [[barrier.position, 0.0] for barrier in osc.barriers]
-    speed = max(reach * osc.natural_frequency, np.abs(points[:, 1]).max(), 0.5 * np.ptp([p[0] for p in places] or [0.0]))
+    speed = max(
+        reach * osc.natural_frequency, np.abs(points[:, 1]).max(), 0.5 * np.ptp([p[0] for p in places] or [0.0])
+    )
     corners = np.array([*points, *places, [points[0, 0], speed], [points[0, 0], -speed]])
     return Region.around(corners, margin=0.25)
 

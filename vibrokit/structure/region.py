@@ -32,7 +32,9 @@ class Region:
         for name, bounds in (("x", self.x), ("v", self.v)):
             low, high = bounds
             if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                raise StructureError(f"region: {name} goes from {low:g} to {high:g}; give finite bounds, the lower first.")
+                raise StructureError(
+                    f"region: {name} goes from {low:g} to {high:g}; give finite bounds, the lower first."
+                )
 
     @classmethod
     def of(cls, bounds: Any) -> Region:

@@ -104,7 +104,7 @@ class Model:
 
     def drift_with(self, forcing: sympy.Expr, contacts: tuple[sympy.Expr, ...]) -> sympy.Matrix:
         """Drift b in terms of a given forcing and given forces of the stops."""
-        _, v, *extra = self.state
+        v = self.state[1]
         acceleration = self.smooth_force + forcing + sum(contacts, sympy.Integer(0))
         return sympy.Matrix([v, acceleration, *self._extra_drift])
 

@@ -77,9 +77,7 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
 def printable(expression: sympy.Expr) -> sympy.Expr:
     """Rewrite what differentiation leaves behind and no compiler knows: steps and spikes at kinks."""
     expression = expression.replace(sympy.DiracDelta, lambda *arguments: sympy.Integer(0))
-    return expression.replace(
-        sympy.Heaviside, lambda argument, *rest: sympy.Piecewise((1, argument > 0), (0, True))
-    )
+    return expression.replace(sympy.Heaviside, lambda argument, *rest: sympy.Piecewise((1, argument > 0), (0, True)))
 
 
 def assignments(

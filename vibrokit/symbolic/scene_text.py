@@ -19,7 +19,7 @@ class SceneText:
         How many of the variables are the state q.
     forced : bool
         Whether anything depends on time.
-    preamble, constants, forcing, derivative, rhs, stops, amplitude, slope : str
+    preamble, constants, forcing, derivative, rhs, stops, flight, amplitude, slope : str
         Pieces of the module; empty where the scene has no need of them.
     """
 
@@ -33,5 +33,6 @@ class SceneText:
     derivative: str
     rhs: str
     stops: str
+    flight: str
     amplitude: str
     slope: str

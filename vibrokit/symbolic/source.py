@@ -7,14 +7,17 @@ contact (`rhs`: arrays, each stop switched on or off by the caller).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import sympy
 
 from vibrokit.parts.scene import Scene
-from vibrokit.symbolic.contact import DEPTH, RATE
-from vibrokit.symbolic.flow import FORCING, FlowEquations, derive_flow
+from vibrokit.symbolic.contact_source import ContactWriter
+from vibrokit.symbolic.flight import FlightWriter
+from vibrokit.symbolic.flow import FlowEquations, derive_flow
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
-from vibrokit.symbolic.printer import SourcePrinter, assignments, printable
+from vibrokit.symbolic.printer import assignments
 from vibrokit.symbolic.scene_text import SceneText
 
 _PREAMBLE = '''"""{title}
@@ -30,11 +33,16 @@ from numba import njit
 
 OPTIONS = {{"nogil": True, "cache": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 '''
-_TINY = "1e-300"
 
 
-def scene_text(scene: Scene, flow: Flow) -> SceneText:
-    """Derive the equations of a scene and write them down for one flow."""
+def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
+    """Derive the equations of a scene and write them down for one flow; with the series of its free flight, if asked.
+
+    Raises
+    ------
+    StepperError
+        The free flight was asked for and is not linear.
+    """
     writer = _SceneWriter(Model(scene), flow)
     amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
     return SceneText(
@@ -48,6 +56,7 @@ def scene_text(scene: Scene, flow: Flow) -> SceneText:
         derivative=writer.derivative(),
         rhs=writer.rhs(),
         stops=writer.stops(),
+        flight=writer.flight() if flight else "",
         amplitude=amplitude,
         slope=slope,
     )
@@ -66,6 +75,7 @@ class _SceneWriter:
         self.model = model
         self.flow = flow
         self.equations: FlowEquations = derive_flow(model, Flow.STATE if flow is Flow.NOISY else flow)
+        self.contacts = ContactWriter(model, self.equations)
         self.index = {symbol: index for index, symbol in enumerate(model.symbols.values())}
         self.variables = [str(variable) for variable in self.equations.variables]
 
@@ -107,8 +117,8 @@ class _SceneWriter:
 
     def derivative(self) -> str:
         """Function `derivative(x, v, …, f, parameters…)`, and the names of the parameters it takes."""
-        lines, texts = self._rates()
-        contact_lines = [line for index in self._touched() for line in self._guarded_contact(index)]
+        contact_lines, zero = self.contacts.guarded()
+        lines, texts = self._rates(zero)
         arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameter_names()]
         head = f"def derivative({', '.join(arguments)}):"
         values = ", ".join(texts[name] for name in self.variables)
@@ -119,7 +129,7 @@ class _SceneWriter:
         lines, texts = self._rates()
         body = [f"    {name} = z[{index}]" for index, name in enumerate(self.variables) if self._uses(name)]
         body += ["    f = forcing(t, theta)"] if self.forced else []
-        body += [line for index in self._touched() for line in self._switched_contact(index)]
+        body += self.contacts.switched()
         body += [*lines, *(f"    out[{index}] = {texts[name]}" for index, name in enumerate(self.variables))]
         unpack = [f"    {name} = theta[{self.place(name)}]" for name in self.parameter_names()]
         return "\n".join(["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", *unpack, *body, ""])
@@ -138,6 +148,10 @@ class _SceneWriter:
         nowhere = "    return np.nan"
         return "\n".join([*stop, nowhere, "", "", *law, nowhere, ""])
 
+    def flight(self) -> str:
+        """Functions `flight_rate(theta)` and `taylor(t, z, theta, c)`."""
+        return FlightWriter(self.model, self.equations).text(self.index)
+
     def noise(self) -> tuple[str, str]:
         """Functions `amplitude` = √D g(x, v), and `slope`, its rate in the state that it drives, unless that is 0."""
         driven = self.model.state[-1]
@@ -154,9 +168,7 @@ class _SceneWriter:
     def parameter_names(self) -> list[str]:
         """Names of the parameters that the right-hand side uses, in the order of `theta`."""
         used = set().union(*(rate.free_symbols for rate in self.equations.rates))
-        for index in self._touched():
-            used |= self.model.contacts[index].law.free_symbols
-            used.add(self.model.symbols[f"barriers.{index}.position"])
+        used |= self.contacts.used()
         return [str(symbol) for symbol in self.index if symbol in used]
 
     def place(self, name: str) -> int:
@@ -167,52 +179,12 @@ class _SceneWriter:
         used = [symbol for symbol in self.index if symbol in expression.free_symbols]
         return [f"    {symbol} = theta[{self.index[symbol]}]" for symbol in used]
 
-    def _rates(self) -> tuple[list[str], dict[str, str]]:
-        return assignments(dict(zip(self.variables, self.equations.rates, strict=True)), "c")
+    def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:
+        nothing = dict.fromkeys(zero, sympy.Integer(0))
+        rates = [rate.xreplace(nothing) for rate in self.equations.rates]
+        return assignments(dict(zip(self.variables, rates, strict=True)), "c")
 
     def _uses(self, name: str) -> bool:
         symbol = next(variable for variable in self.equations.variables if str(variable) == name)
-        in_contact = bool(self._touched()) and name in ("x", "v")
+        in_contact = bool(self.contacts.stops) and name in ("x", "v")
         return in_contact or any(symbol in rate.free_symbols for rate in self.equations.rates)
-
-    def _touched(self) -> list[int]:
-        return sorted({index for index, _, _ in self.equations.contacts.values()})
-
-    def _contact_terms(self, stop: int) -> dict[str, sympy.Expr]:
-        """Each needed derivative of the force of a stop, in DEPTH and RATE."""
-        sign = self.model.scene.barriers[stop].sign
-        law = self.model.contacts[stop].law
-        terms = {}
-        for symbol, (index, in_x, in_v) in self.equations.contacts.items():
-            if index == stop:
-                derivative = sympy.diff(law, (DEPTH, in_x), (RATE, in_v))
-                terms[str(symbol)] = -(sign ** (1 + in_x + in_v)) * derivative
-        return terms
-
-    def _depth_and_rate(self, stop: int) -> tuple[str, str]:
-        position = self.model.symbols[f"barriers.{stop}.position"]
-        if self.model.scene.barriers[stop].sign > 0:
-            return f"x - {position}", "v"
-        return f"{position} - x", "-v"
-
-    def _guarded_contact(self, stop: int) -> list[str]:
-        depth, rate = self._depth_and_rate(stop)
-        clamped, terms = self.model.contacts[stop].clamped, self._contact_terms(stop)
-        lines, texts = assignments(terms, f"d{stop}_")
-        free_of_rate = all(RATE not in printable(term).free_symbols for term in terms.values())
-        head = [f"    depth = {depth}", f"    touching{stop} = depth > 0.0"]
-        head += [f"    depth = depth if touching{stop} else 1.0"]
-        head += [] if free_of_rate and not clamped else [f"    rate = {rate}"]
-        if clamped:
-            push = SourcePrinter().doprint(self.model.contacts[stop].law)
-            head.append(f"    touching{stop} = touching{stop} and {push} > 0.0")
-        return [*head, *lines, *(f"    {name} = {text} if touching{stop} else 0.0" for name, text in texts.items())]
-
-    def _switched_contact(self, stop: int) -> list[str]:
-        depth, rate = self._depth_and_rate(stop)
-        terms = self._contact_terms(stop)
-        lines, texts = assignments(terms, f"d{stop}_", indent="        ")
-        off = [f"    {name} = 0.0" for name in texts]
-        on = [f"    if pushing[{stop}]:", f"        depth = max({depth}, {_TINY})"]
-        on += [f"        rate = {rate}"] if any(RATE in term.free_symbols for term in terms.values()) else []
-        return [*off, *on, *lines, *(f"        {name} = {text}" for name, text in texts.items())]

@@ -10,14 +10,14 @@ import sympy
 
 from vibrokit.parts.scene import Entry, Scene
 
-_TAKEN = ("x", "v", "t", "S", "f", "h", "z")
 _SPELLED = {"lambda": "lamda"}  # SymPy's own spelling; the other is a word of Python
-# What generated code calls its own: momenta, matrix entries, stops, tabulated forcing, arrays, functions. None of
-# it ends in an underscore.
+# What generated code calls its own: variables, momenta, matrix entries, stops, arrays, functions. None of it ends in
+# an underscore, so that one can be added to tell a parameter from it.
 _IN_CODE = re.compile(
-    r"(?!.*_$)([pm]_\d+|C\d+(_\w+)?|k\d+_\w+|f[012]|touching\d+|[A-Z]{3,}|depth|rate|lane|theta|out|pushing|_.*|"
-    r"forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|record|advance|njit|np|min|max|"
-    r"a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
+    r"(?!.*_$)(_.*|[xvtzfhS]|[A-Z]{3,}|[pm]_\d+|[CUW]\d+(_\w+)?|k\d_\w+|f\d|(even|odd|rate)\d*|depth|other|nearer|side"
+    r"|touching|pushing|lane|theta|out|series|once|share|product|first|second|later|half|size|start|table"
+    r"|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
+    r"|njit|np|min|max|abs|range|sign|a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
 )
 
 
@@ -28,11 +28,11 @@ def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
     """
     entries = [entry for entry in scene.entries() if not entry.declared.structural]
     letters = Counter(entry.declared.symbol for entry in entries)
-    taken = {*_TAKEN, *(scene.noise.extra_states if scene.noise else ())}
+    taken = set(scene.noise.extra_states if scene.noise else ())
     symbols = {}
     for entry in entries:
         name = entry.declared.symbol
-        if letters[name] > 1 or name in taken:
+        if letters[name] > 1 or name in taken or _IN_CODE.fullmatch(name):
             name = f"{name}_{_suffix(scene, entry)}"
         while name in taken or keyword.iskeyword(name) or _IN_CODE.fullmatch(name):
             name = _SPELLED.get(name, f"{name}_")

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, OPTIONS, ROOTED, SIDES, law, rhs, stop
+from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES, law, rhs, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,

@@ -4,7 +4,7 @@ from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
 from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land, settle, swing
-from vibrokit.kernels.templates.scene import BARRIERS, OPTIONS, SIDES, stop
+from vibrokit.kernels.templates.scene import BARRIERS, SIDES, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     COUNT,

@@ -38,56 +38,45 @@ def copy(source, target):
 
 @njit(**INNER)
 def slope(course, sigma, reach, i, pushing, theta, desk, row):
-    """Put the slope at the point in STAGE, at sigma on a course, in a row; `reach` is the length of the step."""
-    y, weight = desk[STAGE], 1.0
+    """Put the slope at the point in STAGE, at sigma on a course, in a row; `reach` is the length of the step.
+
+    The second derivative of a law is infinite at depth 0 while its product with sigma is not. So near to the stop
+    that x cannot tell how near, the slope is continued from two depths that x does represent.
+    """
+    x, weight, points = desk[STAGE, 0], 1.0, 1
+    scale, first, second, farther = 1.0, 0.0, 1.0, 0.0
     if BARRIERS > 0:
         if course != TIME:
             wall, side = stop(i, theta), SIDES[i]
             if course == ROOT_DEPTH:
-                y[0] = wall + side * sigma * sigma
-            depth, rate = side * (y[0] - wall), side * y[1]
-            if depth < 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(rate if course == ROOT_TIME else 1.0):
-                first_slope(course, sigma, reach, i, pushing, theta, desk, row)
-                return
+                x = wall + side * sigma * sigma
+                desk[STAGE, 0] = x
+            depth, rate = side * (x - wall), side * desk[STAGE, 1]
             weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * np.sqrt(depth) / rate
-    weighted_slope(weight, y, pushing, theta, desk[row])
-
-
-@njit(**INNER)
-def first_slope(course, sigma, reach, i, pushing, theta, desk, row):
-    """The slope so near to the stop that x cannot tell how near.
-
-    The second derivative of a law is infinite at depth 0 while its product with sigma is not: there, continue the
-    slope from two depths that x does represent.
-    """
-    # Rows are made into arrays only here: arrays handed on cost more than a slope.
-    y, out, spare = desk[STAGE], desk[row], desk[SPARE]
-    x, wall, side = y[0], stop(i, theta), SIDES[i]
-    rate = side * y[1]
-    along = rate if course == ROOT_TIME else 1.0  # depth = along sigma² near the stop
-    least = 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(along)
-    if course == ROOT_TIME and (rate <= 0.0 or sigma * sigma * rate > 4.0 * least):
-        y[0] = wall + side * least
-        weighted_slope(2.0 * sigma, y, pushing, theta, out)
-    else:
-        y[0] = wall + side * least
-        first = np.sqrt(side * (y[0] - wall) / along)
-        weighted_slope(2.0 * first if course == ROOT_TIME else 2.0 * first / rate, y, pushing, theta, spare)
-        y[0] = wall + side * 4.0 * least
-        second = np.sqrt(side * (y[0] - wall) / along)
-        weighted_slope(2.0 * second if course == ROOT_TIME else 2.0 * second / rate, y, pushing, theta, out)
-        share = (sigma - first) / (second - first)
+            along = rate if course == ROOT_TIME else 1.0  # depth = along sigma² near the stop
+            least = 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(along)
+            if depth < least:
+                desk[STAGE, 0] = wall + side * least
+                if course == ROOT_DEPTH or (rate > 0.0 and sigma * sigma * rate <= 4.0 * least):
+                    points = 2
+                    scale = 2.0 if course == ROOT_TIME else 2.0 / rate
+                    first = np.sqrt(side * (desk[STAGE, 0] - wall) / along)
+                    farther = wall + 4.0 * (desk[STAGE, 0] - wall)
+                    second = np.sqrt(side * (farther - wall) / along)
+                    weight = scale * first
+    # One call in a loop: handing these arrays to a function that is not inlined would cost more than the slope.
+    for point in range(points):
+        rhs(desk[STAGE, CLOCK], desk[STAGE], pushing, theta, desk[row])
+        if point > 0:
+            weight = scale * second
         for e in range(CLOCK + 1):
-            out[e] = spare[e] + share * (out[e] - spare[e])
-    y[0] = x
-
-
-@njit(**INNER)
-def weighted_slope(weight, y, pushing, theta, out):
-    rhs(y[CLOCK], y, pushing, theta, out)
-    for e in range(EQUATIONS):
-        out[e] *= weight
-    out[CLOCK] = weight
+            rate = weight * (desk[row, e] if e < CLOCK else 1.0)
+            if point > 0:
+                rate = desk[SPARE, e] + (sigma - first) / (second - first) * (rate - desk[SPARE, e])
+            desk[row, e] = rate
+            desk[SPARE, e] = rate
+        desk[STAGE, 0] = farther
+    desk[STAGE, 0] = x
 
 
 @njit(**INNER)
@@ -96,16 +85,20 @@ def attempt(course, sigma, h, y, i, pushing, theta, desk):
     stage, trial = desk[STAGE], desk[TRIAL]
     for s in range(1, STAGES):
         for e in range(CLOCK + 1):
-            total = WEIGHTS[s, 0] * desk[0, e]
-            for j in range(1 if s < 5 else 3, s):  # the later stages do not use slopes 1 and 2
-                total += WEIGHTS[s, j] * desk[j, e]
-            stage[e] = y[e] + h * total
+            stage[e] = 0.0
+        for j in range(s):
+            for e in range(CLOCK + 1):
+                stage[e] += WEIGHTS[s, j] * desk[j, e]
+        for e in range(CLOCK + 1):
+            stage[e] = y[e] + h * stage[e]
         slope(course, sigma + NODES[s] * h, h, i, pushing, theta, desk, s)
     for e in range(CLOCK + 1):
-        total = RESULT[0] * desk[0, e]
-        for s in range(5, STAGES):
-            total += RESULT[s] * desk[s, e]
-        trial[e] = y[e] + h * total
+        trial[e] = 0.0
+    for s in range(STAGES):
+        for e in range(CLOCK + 1):
+            trial[e] += RESULT[s] * desk[s, e]
+    for e in range(CLOCK + 1):
+        trial[e] = y[e] + h * trial[e]
     if BARRIERS > 0 and course == ROOT_DEPTH:
         trial[0] = stop(i, theta) + SIDES[i] * (sigma + h) ** 2
 

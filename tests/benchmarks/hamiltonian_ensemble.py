@@ -1,0 +1,273 @@
+"""Microseconds per trajectory-period of the paper scene's Hamiltonian flow, contestants side by side.
+
+    python tests/benchmarks/hamiltonian_ensemble.py [--rounds 12] [--trajectories 8192] [--periods 20] [--threads 2]
+
+The scene is omega = 0.570 with two Hertz stops; five equations (x, v, two momenta, action), classical Runge-Kutta
+with 256 steps a period. Every round runs all contestants one after another, so that ratios compare neighbours in
+time. All must agree before they race: after one period to rounding, after the whole run as far as rounding grows.
+To enter another contestant, add it to CONTESTANTS.
+"""
+
+import argparse
+import concurrent.futures as futures
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+import vibrokit
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.rk4 import RK4
+from vibrokit.symbolic.flow_kind import Flow
+
+STEPS = 256
+LANES = 32
+SCENE = vibrokit.load_scene("hertz-0.570")
+NUMBERS = SCENE.parameters
+NATURAL = NUMBERS["natural_frequency"]
+DAMPING = 2 * NUMBERS["damping_ratio"] * NATURAL
+SQUARE = NATURAL**2
+GAP, STIFFNESS = NUMBERS["barriers.0.position"], NUMBERS["barriers.0.law.stiffness"]
+AMPLITUDE, FREQUENCY = NUMBERS["excitations.0.amplitude"], NUMBERS["excitations.0.frequency"]
+CONSTANT = NUMBERS["excitations.1.force"]
+H = 2 * math.pi / FREQUENCY / STEPS
+HALF, SIXTH = 0.5 * H, H / 6
+FORCING = AMPLITUDE * np.cos(FREQUENCY * HALF * np.arange(2 * STEPS + 1)) + CONSTANT
+FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+
+Array = NDArray[np.float64]
+Contestant = Callable[[Array, int], Array]
+
+
+# --- the right-hand side, by hand, with the contact in three forms
+
+
+@njit(**FLAGS)
+def folded(x, v, p, q, f):
+    """By symmetry: one depth, one root, no choice."""
+    depth = max(abs(x) - GAP, 0.0)
+    root = STIFFNESS * math.sqrt(depth)
+    return v, f - DAMPING * v - SQUARE * x - math.copysign(root * depth, x) + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+
+
+@njit(**FLAGS)
+def both_stops(x, v, p, q, f):
+    """Each stop by itself, without a branch."""
+    right, left = max(x - GAP, 0.0), max(-GAP - x, 0.0)
+    pull, push = STIFFNESS * math.sqrt(right), STIFFNESS * math.sqrt(left)
+    force = push * left - pull * right
+    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * (pull + push)), DAMPING * q - p, 0.5 * q * q
+
+
+@njit(**FLAGS)
+def branching(x, v, p, q, f):
+    """A predicted branch costs less than waiting for a square root."""
+    depth = abs(x) - GAP
+    if depth <= 0.0:
+        return v, f - DAMPING * v - SQUARE * x + q, q * SQUARE, DAMPING * q - p, 0.5 * q * q
+    root = STIFFNESS * math.sqrt(depth)
+    return v, f - DAMPING * v - SQUARE * x - math.copysign(root * depth, x) + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+
+
+def runge_kutta(slopes):
+    """One classical step with the given right-hand side, compiled."""
+
+    @njit(**FLAGS)
+    def step(x, v, p, q, s, f0, f1, f2):
+        x1, v1, p1, q1, s1 = slopes(x, v, p, q, f0)
+        x2, v2, p2, q2, s2 = slopes(x + HALF * x1, v + HALF * v1, p + HALF * p1, q + HALF * q1, f1)
+        x3, v3, p3, q3, s3 = slopes(x + HALF * x2, v + HALF * v2, p + HALF * p2, q + HALF * q2, f1)
+        x4, v4, p4, q4, s4 = slopes(x + H * x3, v + H * v3, p + H * p3, q + H * q3, f2)
+        return (
+            x + SIXTH * (x1 + 2 * (x2 + x3) + x4),
+            v + SIXTH * (v1 + 2 * (v2 + v3) + v4),
+            p + SIXTH * (p1 + 2 * (p2 + p3) + p4),
+            q + SIXTH * (q1 + 2 * (q2 + q3) + q4),
+            s + SIXTH * (s1 + 2 * (s2 + s3) + s4),
+        )
+
+    return step
+
+
+# --- lane-packed
+
+
+def lane_packed(slopes) -> Contestant:
+    step = runge_kutta(slopes)
+
+    @njit(**FLAGS)
+    def packed_step(x, v, p, q, s, f0, f1, f2):
+        for i in range(LANES):
+            x[i], v[i], p[i], q[i], s[i] = step(x[i], v[i], p[i], q[i], s[i], f0, f1, f2)
+
+    @njit(**FLAGS, parallel=True)
+    def run(starts, periods, forcing):
+        final = np.empty_like(starts)
+        for block in prange(starts.shape[0] // LANES):
+            here = slice(block * LANES, (block + 1) * LANES)
+            z = starts[here].T.copy()
+            for _ in range(periods):
+                for k in range(STEPS):
+                    f0, f1, f2 = forcing[2 * k], forcing[2 * k + 1], forcing[2 * k + 2]
+                    packed_step(z[0], z[1], z[2], z[3], z[4], f0, f1, f2)
+            final[here] = z.T
+        return final
+
+    return lambda starts, periods: run(starts, periods, FORCING)
+
+
+# --- one trajectory at a time
+
+
+def scalar(slopes) -> Contestant:
+    step = runge_kutta(slopes)
+
+    @njit(**FLAGS, parallel=True)
+    def run(starts, periods, forcing):
+        final = np.empty_like(starts)
+        for n in prange(starts.shape[0]):
+            x, v, p, q, s = starts[n, 0], starts[n, 1], starts[n, 2], starts[n, 3], starts[n, 4]
+            for _ in range(periods):
+                for k in range(STEPS):
+                    x, v, p, q, s = step(x, v, p, q, s, forcing[2 * k], forcing[2 * k + 1], forcing[2 * k + 2])
+            final[n, 0], final[n, 1], final[n, 2], final[n, 3], final[n, 4] = x, v, p, q, s
+        return final
+
+    return lambda starts, periods: run(starts, periods, FORCING)
+
+
+# --- the formula as one writes it down
+
+
+@njit
+def naive_slopes(t, z):
+    x, v, p, q, _ = z
+    force, stiffness = 0.0, 0.0
+    if x > GAP:
+        force = -STIFFNESS * (x - GAP) ** 1.5
+        stiffness = 1.5 * STIFFNESS * (x - GAP) ** 0.5
+    if x < -GAP:
+        force = STIFFNESS * (-GAP - x) ** 1.5
+        stiffness = 1.5 * STIFFNESS * (-GAP - x) ** 0.5
+    drift = AMPLITUDE * math.cos(FREQUENCY * t) + CONSTANT - DAMPING * v - NATURAL**2 * x + force
+    return v, drift + q, q * (NATURAL**2 + stiffness), DAMPING * q - p, q**2 / 2
+
+
+@njit
+def moved(z, length, k):
+    return (
+        z[0] + length * k[0],
+        z[1] + length * k[1],
+        z[2] + length * k[2],
+        z[3] + length * k[3],
+        z[4] + length * k[4],
+    )
+
+
+@njit(parallel=True)
+def naive_run(starts, periods):
+    final = np.empty_like(starts)
+    for n in prange(starts.shape[0]):
+        z = (starts[n, 0], starts[n, 1], starts[n, 2], starts[n, 3], starts[n, 4])
+        for _ in range(periods):
+            for step in range(STEPS):
+                t = step * H
+                k1 = naive_slopes(t, z)
+                k2 = naive_slopes(t + H / 2, moved(z, H / 2, k1))
+                k3 = naive_slopes(t + H / 2, moved(z, H / 2, k2))
+                k4 = naive_slopes(t + H, moved(z, H, k3))
+                z = moved(moved(moved(moved(z, H / 6, k1), H / 3, k2), H / 3, k3), H / 6, k4)
+        final[n, 0], final[n, 1], final[n, 2], final[n, 3], final[n, 4] = z
+    return final
+
+
+# --- vibrokit's
+
+
+def generated(pool: futures.Executor) -> Contestant:
+    def run(starts: Array, periods: int) -> Array:
+        return run_ensemble(SCENE, Flow.HAMILTONIAN, RK4(STEPS), starts, periods, executor=pool).states
+
+    return run
+
+
+REFERENCE = "vibrokit, generated"
+SCALAR = "scalar"
+CONTESTANTS: dict[str, Contestant] = {
+    "lane-packed by hand, folded": lane_packed(folded),
+    "lane-packed by hand, both stops": lane_packed(both_stops),
+    f"{SCALAR}, branching": scalar(branching),
+    f"{SCALAR}, folded": scalar(folded),
+    f"{SCALAR}, both stops": scalar(both_stops),
+    "naive scalar": naive_run,
+}
+
+
+def start_states(trajectories: int) -> Array:
+    rng = np.random.default_rng(0)
+    starts = np.zeros((trajectories, 5))
+    starts[:, :2] = rng.uniform(-0.6, 0.6, (trajectories, 2))
+    starts[:, 2:4] = 1e-4 * rng.standard_normal((trajectories, 2))
+    return starts
+
+
+def check(contestants: dict[str, Contestant], starts: Array, periods: int) -> None:
+    """All give the same trajectories; this also compiles them."""
+    print(f"median relative difference from {REFERENCE}")
+    for count, allowed in ((1, 1e-12), (periods, 1e-8)):
+        expected = contestants[REFERENCE](starts, count)
+        for name, contestant in contestants.items():
+            difference = np.median(np.abs(contestant(starts, count) / expected - 1))
+            print(f"  {name:32}{count:3} periods{difference:9.1e}")
+            assert difference <= allowed, f"{name} differs by {difference:.1e} after {count} periods."
+
+
+def race(contestants: dict[str, Contestant], rounds: int, starts: Array, periods: int) -> dict[str, Array]:
+    """Microseconds per trajectory-period, round by round."""
+    cost: dict[str, list[float]] = {name: [] for name in contestants}
+    for number in range(rounds):
+        names = list(contestants)
+        for name in names if number % 2 else reversed(names):
+            start = time.perf_counter_ns()
+            contestants[name](starts, periods)
+            cost[name].append((time.perf_counter_ns() - start) / 1e3 / (len(starts) * periods))
+    return {name: np.array(times) for name, times in cost.items()}
+
+
+def report(cost: dict[str, Array]) -> None:
+    print(f"{'':32}{'µs per trajectory-period':>27}{'over ' + REFERENCE:>29}")
+    print(f"{'':32}{'median':>11}{'quartiles':>16}{'median':>13}{'quartiles':>16}")
+    for name, times in cost.items():
+        row = f"{name:32}"
+        for values, width in ((times, 11), (times / cost[REFERENCE], 13)):
+            low, middle, high = np.percentile(values, [25, 50, 75])
+            row += f"{middle:{width}.2f}{f'{low:.2f}-{high:.2f}':>16}"
+        print(row)
+    best = min((name for name in cost if name.startswith(SCALAR)), key=lambda name: np.median(cost[name]))
+    print(f"best scalar: {best}, {np.median(cost[best] / cost[REFERENCE]):.2f} times {REFERENCE}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Cost of the lane-packed Hamiltonian ensemble.")
+    parser.add_argument("--rounds", type=int, default=12)
+    parser.add_argument("--trajectories", type=int, default=8192, help=f"rounded up to a multiple of {LANES}")
+    parser.add_argument("--periods", type=int, default=20)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    numba.set_num_threads(options.threads)
+    starts = start_states(-(-options.trajectories // LANES) * LANES)
+    with futures.ThreadPoolExecutor(options.threads) as pool:
+        contestants = {REFERENCE: generated(pool)} | CONTESTANTS
+        check(contestants, starts, options.periods)
+        report(race(contestants, options.rounds, starts, options.periods))
+
+
+if __name__ == "__main__":
+    main()

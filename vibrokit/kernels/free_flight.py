@@ -1,0 +1,32 @@
+"""FreeFlight: exact between stops, for linear springs."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+from vibrokit.kernels.order8 import LocatedStepper
+from vibrokit.symbolic.scene_text import SceneText
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeFlight(LocatedStepper):
+    """Exact flight between the stops, for linear springs and sinusoidal forces, one trajectory at a time.
+
+    The flight is its Taylor series to rounding error, at any damping and at resonance; the first touch is found by a
+    bound that can miss none. Contacts are stepped as `Order8` does, to the same order. Choose it for orbits,
+    certificates, grazing, stiff stops and long flights; a scene with a nonlinear spring is refused.
+
+    Parameters
+    ----------
+    tolerance : float
+        Error that one step in contact may make, relative to the size of what is integrated.
+    """
+
+    name: ClassVar[str] = "free_flight"
+    templates: ClassVar[tuple[str, ...]] = ("steps", "located", "free_flight", "sections")
+    flight: ClassVar[bool] = True
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """The right-hand side with switched stops, and the series of the flight."""
+        return [text.constants, text.forcing, text.rhs, text.stops, text.flight]

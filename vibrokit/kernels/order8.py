@@ -1,0 +1,75 @@
+"""Order8: adaptive steps of order 8 that find every contact."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar, Self
+
+from vibrokit.errors import StepperError
+from vibrokit.kernels.stepper import Stepper, repeats
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.scene_text import SceneText
+
+FINEST, COARSEST = 1e-15, 1e-2
+_MOST_STEPS = 200_000.0
+
+
+@dataclasses.dataclass(frozen=True)
+class LocatedStepper(Stepper):
+    """What the steppers that locate every contact have in common. Abstract.
+
+    Parameters
+    ----------
+    tolerance : float
+        Error that one step may make, relative to the size of what is integrated.
+    """
+
+    tolerance: float = 1e-10
+
+    def __post_init__(self) -> None:
+        number = self.tolerance
+        if isinstance(number, bool) or not isinstance(number, int | float) or not FINEST <= number <= COARSEST:
+            raise StepperError(
+                f"{type(self).__name__}: tolerance is {number!r}; give a number from {FINEST:g} to {COARSEST:g}."
+            )
+
+    def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
+        """Tolerance, most steps in an interval, and whether the forcing repeats with it."""
+        return float(self.tolerance), _MOST_STEPS, float(repeats(scene, interval))
+
+    def refined(self) -> Self:
+        """A hundredth of the tolerance."""
+        return dataclasses.replace(self, tolerance=max(FINEST, self.tolerance / 100))
+
+    def coarsened(self) -> Self:
+        """A hundred times the tolerance."""
+        return dataclasses.replace(self, tolerance=min(COARSEST, self.tolerance * 100))
+
+    def check(self, scene: Scene, flow: Flow) -> None:
+        """Refuse noise: a random force has no order 8."""
+        if flow is Flow.NOISY:
+            raise StepperError(f"{type(self).__name__} integrates smooth motion only; for noisy trajectories take RK4.")
+
+
+@dataclasses.dataclass(frozen=True)
+class Order8(LocatedStepper):
+    """Dormand–Prince 8(5,3) with adaptive steps, one trajectory at a time; contacts are located and stepped through.
+
+    Order 8 for linear and Hertz stops and every law that is smooth in the depth or in its square root, whose contact
+    is stepped in √time and √depth; other laws lose order at first touch, and the error control answers with shorter
+    steps. Choose it for orbits and certificates of any scene, and for stiff stops; choose `FreeFlight` where the spring
+    is linear, `RK4` for large ensembles.
+
+    Parameters
+    ----------
+    tolerance : float
+        Error that one step may make, relative to the size of what is integrated.
+    """
+
+    name: ClassVar[str] = "order8"
+    templates: ClassVar[tuple[str, ...]] = ("steps", "located", "order8", "sections")
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """The right-hand side with switched stops."""
+        return [text.constants, text.forcing, text.rhs, text.stops]

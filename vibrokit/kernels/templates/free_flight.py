@@ -1,0 +1,116 @@
+"""Free flight in closed form: between the stops of a linear scene the Taylor series of the motion is exact.
+
+A touch is the first zero of a polynomial. The search for it never passes one: from each point it goes only as far as the
+bounds on the second and third derivative prove free.
+"""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.stopping import RAN_OUT, STALLED
+from vibrokit.kernels.templates.located import settle
+from vibrokit.kernels.templates.scene import (
+    BARRIERS,
+    EQUATIONS,
+    OPTIONS,
+    ORDER,
+    SIDES,
+    flight_rate,
+    stop,
+    taylor,
+)
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER, SPARE
+
+# --- scene above, stepper below ---
+
+
+@njit(**INNER)
+def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
+    """Follow the free motion until a stop is touched or the time is up."""
+    reach = 1.5 / flight_rate(theta)
+    while y[CLOCK] < end:
+        memory[COUNT] += 1.0
+        if memory[COUNT] > settings[1]:
+            return STALLED
+        left = end - y[CLOCK]
+        last = left <= 1.01 * reach
+        length, touched = left if last else reach, -1
+        taylor(y[CLOCK], y, theta, coefficients)
+        if BARRIERS > 0:
+            touched, length = first_touch(length, theta, coefficients)
+        for e in range(EQUATIONS):
+            value = coefficients[e, ORDER]
+            for k in range(ORDER - 1, -1, -1):
+                value = value * length + coefficients[e, k]
+            y[e] = value
+        y[CLOCK] = end if last and touched < 0 else y[CLOCK] + length
+        if BARRIERS > 0:
+            if touched >= 0:
+                y[0] = stop(touched, theta)
+                settle(y, memory, pushing, theta, desk[SPARE])
+                return RAN_OUT
+    return RAN_OUT
+
+
+@njit(**INNER)
+def first_touch(length, theta, c):
+    """Which stop is touched first within `length` (−1: none), and when."""
+    size, second, third = abs(c[0, 0]) + abs(c[0, 1]) * length, 0.0, 0.0
+    power = 1.0  # length^(k − 2)
+    for k in range(2, ORDER + 1):
+        term = abs(c[0, k]) * power
+        size += term * length * length
+        second += k * (k - 1) * term
+        third += k * (k - 1) * (k - 2) * term / length
+        power *= length
+    touched, moment = -1, length
+    for i in range(BARRIERS):
+        s = touch_of(i, moment, size, second, third, theta, c)
+        if s < moment:
+            touched, moment = i, s
+    return touched, moment
+
+
+@njit(**INNER)
+def touch_of(i, length, size, second, third, theta, c):
+    """First moment before `length` at which a stop is touched, or `length`.
+
+    `size`, `second` and `third` bound x and its derivatives. A visit too shallow for x to represent is none.
+    """
+    wall, side, s = stop(i, theta), SIDES[i], 0.0
+    rounding = EPSILON * (4.0 * abs(wall) + 2.0 * size)
+    for _ in range(300):
+        x, v, a = c[0, ORDER], 0.0, 0.0
+        for k in range(ORDER - 1, -1, -1):
+            a = a * s + v
+            v = v * s + x
+            x = x * s + c[0, k]
+        gap, closing, pull = side * (wall - x), side * v, 2.0 * side * a
+        if s == 0.0 and gap == 0.0:
+            closing = min(closing, 0.0)  # it starts here, and is free: it leaves
+        elif closing > 0.0 and gap <= max(rounding, 4.0 * EPSILON * closing * length):
+            if pull >= 0.0 or closing * closing > -2.0 * pull * rounding:
+                return min(max(s + gap / closing, 0.0), length)
+            closing = 0.0
+        ahead = max(clear_ahead(max(gap, 0.0), closing, pull, second, third), 4.0 * EPSILON * length)
+        if ahead == 4.0 * EPSILON * length and closing <= 0.0:
+            ahead = 6e-6 * length  # at rest at the stop without acceleration: x does not change in this time
+        s += ahead
+        if s >= length:
+            return length
+    return s
+
+
+@njit(**INNER)
+def clear_ahead(gap, closing, pull, second, third):
+    """For how long the gap surely stays open."""
+    root = np.sqrt(closing * closing + 2.0 * second * gap)
+    if closing > 0.0:
+        ahead = 2.0 * gap / (closing + root)
+        if pull < 0.0:
+            ahead = max(ahead, min(gap / closing, -pull / third))
+        return ahead
+    ahead = (root - closing) / second if second > 0.0 else np.inf
+    if pull < 0.0:
+        ahead = max(ahead, -3.0 * pull / third)
+    return ahead

@@ -1,0 +1,125 @@
+"""Writes contact forces and their derivatives as text, in the two forms that steppers need."""
+
+from __future__ import annotations
+
+import sympy
+
+from vibrokit.symbolic.contact import DEPTH, RATE
+from vibrokit.symbolic.flow import FlowEquations
+from vibrokit.symbolic.model import Model
+from vibrokit.symbolic.printer import SourcePrinter, assignments, printable
+
+_TINY = "1e-300"
+_SIDE = sympy.Symbol("side")
+
+
+class ContactWriter:
+    """Writes the contact terms that a flow needs.
+
+    Parameters
+    ----------
+    model : Model
+    equations : FlowEquations
+    """
+
+    def __init__(self, model: Model, equations: FlowEquations) -> None:
+        self.model = model
+        self.needed = equations.contacts
+        self.stops = sorted({stop for stop, _, _ in equations.contacts.values()})
+
+    @property
+    def merged(self) -> bool:
+        """Whether two stops share one law, so that lanes need to evaluate it once only.
+
+        A mass is never in both stops at once, for they are not crossed: the nearer one is chosen first.
+        """
+        if len(self.stops) != 2:
+            return False
+        first, second = (self.model.contacts[stop] for stop in self.stops)
+        swapped = first.law.subs(dict(self._partners()), simultaneous=True)
+        return first.clamped == second.clamped and swapped == second.law
+
+    def used(self) -> set[sympy.Symbol]:
+        """Parameters of the contact terms."""
+        symbols: set[sympy.Symbol] = set()
+        for stop in self.stops:
+            symbols |= self.model.contacts[stop].law.free_symbols - {DEPTH, RATE}
+            symbols.add(self.model.symbols[f"barriers.{stop}.position"])
+        return symbols
+
+    def guarded(self) -> tuple[list[str], set[sympy.Symbol]]:
+        """Lines without a branch, for lanes; and the contact terms that are zero because another holds their sum."""
+        if self.merged:
+            second = {symbol for symbol, (stop, _, _) in self.needed.items() if stop == self.stops[1]}
+            return self._merged_lines(), second
+        return [line for stop in self.stops for line in self._guarded_lines(stop)], set()
+
+    def switched(self) -> list[str]:
+        """Lines in which the caller switches each stop on or off by ``pushing``."""
+        return [line for stop in self.stops for line in self._switched_lines(stop)]
+
+    def _partners(self) -> list[tuple[sympy.Symbol, sympy.Symbol]]:
+        """Parameters of the first law with those of the second that stand in the same place."""
+        first, second = (f"barriers.{stop}.law." for stop in self.stops)
+        symbols = self.model.symbols
+        pairs = [(symbols[p], symbols.get(second + p.removeprefix(first))) for p in symbols if p.startswith(first)]
+        return [(one, other) for one, other in pairs if other is not None]
+
+    def _terms(self, stop: int, side: sympy.Expr) -> dict[str, sympy.Expr]:
+        """Each needed derivative of a stop's force: −side^(1 + orders) times that of the law."""
+        law = self.model.contacts[stop].law
+        terms = {}
+        for symbol, (index, in_x, in_v) in self.needed.items():
+            if index == stop:
+                sign = side if (1 + in_x + in_v) % 2 else sympy.Integer(1)
+                terms[str(symbol)] = -sign * sympy.diff(law, (DEPTH, in_x), (RATE, in_v))
+        return terms
+
+    def _depth_and_rate(self, stop: int) -> tuple[str, str]:
+        position = self.model.symbols[f"barriers.{stop}.position"]
+        if self.model.scene.barriers[stop].sign > 0:
+            return f"x - {position}", "v"
+        return f"{position} - x", "-v"
+
+    def _guard(self, stop: int, terms: dict[str, sympy.Expr], rate: str) -> list[str]:
+        """Lines that make ``touching`` true where the stop pushes, and depth positive everywhere."""
+        clamped = self.model.contacts[stop].clamped
+        lines = ["    touching = depth > 0.0", "    depth = depth if touching else 1.0"]
+        if clamped or _uses_rate(terms):
+            lines.append(f"    rate = {rate}")
+        if clamped:
+            push = SourcePrinter().doprint(printable(self.model.contacts[stop].law))
+            lines.append(f"    touching = touching and {push} > 0.0")
+        return lines
+
+    def _guarded_lines(self, stop: int) -> list[str]:
+        depth, rate = self._depth_and_rate(stop)
+        terms = self._terms(stop, sympy.Integer(self.model.scene.barriers[stop].sign))
+        lines, texts = assignments(terms, f"d{stop}_")
+        guard = [f"    depth = {depth}", *self._guard(stop, terms, rate)]
+        return [*guard, *lines, *(f"    {name} = {text} if touching else 0.0" for name, text in texts.items())]
+
+    def _merged_lines(self) -> list[str]:
+        first, second = self.stops
+        terms = self._terms(first, _SIDE)
+        lines, texts = assignments(terms, "d")
+        (near, _), (far, _) = self._depth_and_rate(first), self._depth_and_rate(second)
+        sign = float(self.model.scene.barriers[first].sign)
+        head = [f"    depth = {near}", f"    other = {far}", "    nearer = depth > other"]
+        head += ["    depth = depth if nearer else other", f"    side = {sign} if nearer else {-sign}"]
+        head += [f"    {one} = {one} if nearer else {other}" for one, other in self._partners()]
+        head += self._guard(first, terms, "side*v")
+        return [*head, *lines, *(f"    {name} = {text} if touching else 0.0" for name, text in texts.items())]
+
+    def _switched_lines(self, stop: int) -> list[str]:
+        depth, rate = self._depth_and_rate(stop)
+        terms = self._terms(stop, sympy.Integer(self.model.scene.barriers[stop].sign))
+        lines, texts = assignments(terms, f"d{stop}_", indent="        ")
+        off = [f"    {name} = 0.0" for name in texts]
+        on = [f"    if pushing[{stop}]:", f"        depth = max({depth}, {_TINY})"]
+        on += [f"        rate = {rate}"] if _uses_rate(terms) else []
+        return [*off, *on, *lines, *(f"        {name} = {text}" for name, text in texts.items())]
+
+
+def _uses_rate(terms: dict[str, sympy.Expr]) -> bool:
+    return any(RATE in printable(term).free_symbols for term in terms.values())

@@ -1,0 +1,142 @@
+"""Free flight: where the motion between stops is linear, its Taylor series to rounding error."""
+
+from __future__ import annotations
+
+import sympy
+
+from vibrokit.errors import StepperError
+from vibrokit.symbolic.flow import FORCING, FlowEquations
+from vibrokit.symbolic.model import Model
+from vibrokit.symbolic.printer import SourcePrinter
+
+ORDER = 22
+
+
+class FlightWriter:
+    """Writes `flight_rate` and `taylor` for a flow without contact.
+
+    A linear system under sinusoidal forces is solved by its Taylor series: at order 22 a step of 1.5 over the largest
+    rate is exact to rounding, whatever the damping, at resonance too.
+
+    Parameters
+    ----------
+    model : Model
+    equations : FlowEquations
+
+    Raises
+    ------
+    StepperError
+        The motion between stops is not linear, or a force is no sum of sinusoids.
+    """
+
+    def __init__(self, model: Model, equations: FlowEquations) -> None:
+        self.model = model
+        self.variables = equations.variables
+        nothing = dict.fromkeys(equations.contacts, sympy.Integer(0))
+        self.rates = [sympy.expand(rate.xreplace(nothing)) for rate in equations.rates]
+        self.waves = sinusoids(model)
+        self.polynomials = [
+            self._polynomial(variable, rate) for variable, rate in zip(self.variables, self.rates, strict=True)
+        ]
+
+    def _polynomial(self, variable: sympy.Symbol, rate: sympy.Expr) -> sympy.Poly:
+        allowed = 2 if str(variable) == "S" else 1
+        try:
+            polynomial = sympy.Poly(rate, *self.variables, FORCING)
+        except sympy.PolynomialError:
+            polynomial = None
+        if polynomial is None or polynomial.total_degree() > allowed or self._inexact(polynomial):
+            raise StepperError(
+                f"FreeFlight needs linear motion between the stops, and here {variable}' = {rate}; take Order8 or RK4."
+            )
+        return polynomial
+
+    def _inexact(self, polynomial: sympy.Poly) -> bool:
+        return any(coefficient.free_symbols & {*self.variables, FORCING} for coefficient in polynomial.coeffs())
+
+    def text(self, places: dict[sympy.Symbol, int]) -> str:
+        """Both functions; `places` says where each parameter is in ``theta``."""
+        return f"ORDER = {ORDER}\n\n\n{self._rate(places)}\n\n{self._taylor(places)}"
+
+    def _unpack(self, expressions: list[sympy.Expr], places: dict[sympy.Symbol, int]) -> list[str]:
+        used = set().union(*(expression.free_symbols for expression in expressions))
+        return [f"    {symbol} = theta[{place}]" for symbol, place in places.items() if symbol in used]
+
+    def _rate(self, places: dict[sympy.Symbol, int]) -> str:
+        x, v, *extra = self.model.state
+        stiffness, damping = (sympy.diff(self.rates[1], variable) for variable in (x, v))
+        bounds = [2 * sympy.sqrt(sympy.Abs(stiffness)) + sympy.Abs(damping)]
+        bounds += [sympy.Abs(frequency) for frequency, _, _ in self.waves]
+        for row in range(2, 2 + len(extra)):
+            bounds.append(sum(sympy.Abs(sympy.diff(self.rates[row], variable)) for variable in self.model.state))
+        printer = SourcePrinter()
+        text = printer.doprint(bounds[0])
+        for bound in bounds[1:]:
+            text = f"max({text}, {printer.doprint(bound)})"
+        unpack = self._unpack(bounds, places)
+        return "\n".join(["@njit(**OPTIONS)", "def flight_rate(theta):", *unpack, f"    return {text}", ""])
+
+    def _taylor(self, places: dict[sympy.Symbol, int]) -> str:
+        printer = SourcePrinter()
+        coefficients = [c for polynomial in self.polynomials for c in polynomial.coeffs()]
+        waves = [part for wave in self.waves for part in wave]
+        lines = self._unpack([*coefficients, *waves], places)
+        for index, (frequency, even, odd) in enumerate(self.waves):
+            lines += [f"    rate{index} = {printer.doprint(frequency)}", f"    even{index} = {printer.doprint(even)}"]
+            lines += [f"    odd{index} = {printer.doprint(odd)}"]
+        lines += ["    for _e in range(EQUATIONS):", "        series[_e, 0] = z[_e]", "    for _k in range(ORDER):"]
+        lines += ["        once = 1.0 if _k == 0 else 0.0", "        share = 1.0/(_k + 1.0)"]
+        if self.waves:
+            lines.append("        f = " + " + ".join(f"even{index}" for index in range(len(self.waves))))
+        for index in range(len(self.waves)):
+            step = f"odd{index}*rate{index}*share, -even{index}*rate{index}*share"
+            lines.append(f"        even{index}, odd{index} = {step}")
+        for row, polynomial in enumerate(self.polynomials):
+            lines += self._row(row, polynomial, printer)
+        return "\n".join(["@njit(**OPTIONS)", "def taylor(t, z, theta, series):", *lines, ""])
+
+    def _row(self, row: int, polynomial: sympy.Poly, printer: SourcePrinter) -> list[str]:
+        lines, terms = [], []
+        for powers, coefficient in polynomial.terms():
+            factors = [index for index, power in enumerate(powers) for _ in range(power)]
+            text = printer.doprint(coefficient)
+            if not factors:
+                terms.append(f"({text})*once")
+            elif len(factors) == 1:
+                series = "f" if factors[0] == len(self.variables) else f"series[{factors[0]}, _k]"
+                terms.append(f"({text})*{series}")
+            else:
+                first, second = factors
+                lines += ["        product = 0.0", "        for _j in range(_k + 1):"]
+                lines += [f"            product += series[{first}, _j]*series[{second}, _k - _j]"]
+                terms.append(f"({text})*product")
+        return [*lines, f"        series[{row}, _k + 1] = share*({' + '.join(terms) or '0.0'})"]
+
+
+def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
+    """Split the forcing into sinusoids: (ω, value, quarter-period shifted value) of each, so that even′ = ω·odd.
+
+    Raises
+    ------
+    StepperError
+        The forcing is no sum of sinusoids.
+    """
+    time = model.time
+    forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing
+    waves = []
+    for term in sympy.Add.make_args(sympy.expand(forcing)):
+        if term == 0:
+            continue
+        factor, wave = term.as_independent(time)
+        if not isinstance(wave, sympy.cos | sympy.sin) or not _is_linear(wave.args[0], time):
+            raise StepperError(
+                f"FreeFlight needs excitations that are sums of sinusoids, and one has {term}; take Order8 or RK4."
+            )
+        angle = wave.args[0]
+        odd = -sympy.sin(angle) if isinstance(wave, sympy.cos) else sympy.cos(angle)
+        waves.append((sympy.diff(angle, time), factor * wave, factor * odd))
+    return waves
+
+
+def _is_linear(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
+    return sympy.diff(expression, variable, 2) == 0

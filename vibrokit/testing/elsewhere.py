@@ -1,0 +1,62 @@
+"""Runs scenes in a process of its own.
+
+A bare interpreter, not a spawned worker: that would run the script of whoever checks a part once more.
+"""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.kernel import write_source
+from vibrokit.kernels.rk4 import RK4
+from vibrokit.oscillator import Oscillator
+from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.testing.report import ConformanceError
+
+_STEPS_PER_TIME = 64
+_SECONDS = 300
+_MAIN = (
+    "import sys, pickle; paths, work = pickle.load(sys.stdin.buffer); sys.path[:] = paths; "
+    "from vibrokit.testing.elsewhere import serve; serve(work)"
+)
+
+
+def outcome(scene: Oscillator) -> tuple[str, bytes]:
+    """Return the code that is generated for a scene, derived afresh, and where it takes a few states."""
+    flow = Flow.STATE if scene.noise is None else Flow.NOISY
+    stepper = RK4(steps=max(1, round(_STEPS_PER_TIME * scene.section_interval)))
+    extra = 0 if scene.noise is None else len(scene.noise.extra_states)
+    starts = np.array([[0.3, 0.4], [-0.2, 0.9], [0.15, 0.0], [0.05, -0.6]])
+    starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])
+    stream = None if scene.noise is None else (7, 0)
+    ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, stream=stream)
+    return write_source(scene, flow, stepper), ended.states.tobytes()
+
+
+def outcomes_elsewhere(scenes: list[Oscillator]) -> list[tuple[str, bytes]]:
+    """Return the outcomes of scenes, computed by another process."""
+    work = pickle.dumps((sys.path, pickle.dumps(scenes)))
+    try:
+        process = subprocess.run([sys.executable, "-c", _MAIN], input=work, capture_output=True, timeout=_SECONDS)  # noqa: PLW1510 - its failure is told below
+    except subprocess.TimeoutExpired as error:
+        raise ConformanceError(f"Another process did not finish within {_SECONDS} s.") from error
+    if process.returncode:
+        last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise ConformanceError(
+            f"Another process failed ({''.join(last)}); define the class at the top level of a module that can be "
+            "imported."
+        )
+    found: Any = pickle.loads(process.stdout)
+    return list(found)
+
+
+def serve(work: bytes) -> None:
+    """Compute the outcomes of pickled scenes and write them to standard output."""
+    answer = pickle.dumps([outcome(scene) for scene in pickle.loads(work)])
+    sys.stdout.buffer.write(answer)
