@@ -105,7 +105,7 @@ class Oscillator(Scene):
         chosen = stepper or single_stepper(self, flow)
         seed = None if rng is None else seed_from(rng)
         path = record(self, flow, chosen, start, start_time, length / count, count, seed=seed)
-        times = start_time + length / count * np.arange(count + 1)
+        times: Array = start_time + length / count * np.arange(count + 1, dtype=float)
         if len(path) <= count:
             last = tuple(float(value) for value in path[-1])
             raise IntegrationError(

@@ -24,7 +24,8 @@ from vibrokit.registry import Group, load, name_of
 from vibrokit.results.atomic import write_atomically
 
 _BUNDLED = Path(__file__).parent / "scenes"
-_LARGEST_FILE = 1_000_000
+_LARGEST_FILE = 100_000
+_MOST_PARTS = 100
 _LONGEST_NAME = 100
 _KEYS = ("natural_frequency", "damping_ratio", "spring", "barriers", "excitations", "noise")
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
@@ -114,6 +115,8 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     SceneError
         A part is of a class that is not registered, so that no file could name it; or the file cannot be written.
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"save_scene: {shown(scene)} is no scene; give an Oscillator.")
     data = scene_data(scene)
     for kind, values in _named_parts(data):
         if ":" in values["name"]:
@@ -180,6 +183,8 @@ def _listed(key: str, data: Mapping[str, Any]) -> list[Any]:
     values = data.get(key, [])
     if not isinstance(values, list):
         raise SceneError(f"scene: {key} is {shown(values)}, no list; write a table [[{key}]] for each.")
+    if len(values) > _MOST_PARTS:
+        raise SceneError(f"scene: {key} has {len(values)} entries; at most {_MOST_PARTS} are allowed.")
     return values
 
 

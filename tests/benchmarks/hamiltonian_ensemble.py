@@ -4,7 +4,8 @@
 
 The scene is omega = 0.570 with two Hertz stops; five equations (x, v, two momenta, action), classical Runge-Kutta
 with 256 steps a period. Every round runs all contestants one after another, so that ratios compare neighbours in
-time. All must agree before they race: after one period to rounding, after the whole run as far as rounding grows.
+time. All must agree before they race: after one period to rounding, after the whole run as far as rounding has
+grown by then, for many of these trajectories are chaotic.
 To enter another contestant, add it to CONTESTANTS.
 """
 
@@ -54,7 +55,8 @@ def folded(x, v, p, q, f):
     """By symmetry: one depth, one root, no choice."""
     depth = max(abs(x) - GAP, 0.0)
     root = STIFFNESS * math.sqrt(depth)
-    return v, f - DAMPING * v - SQUARE * x - math.copysign(root * depth, x) + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+    force = -math.copysign(root * depth, x)
+    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
 
 
 @njit(**FLAGS)
@@ -62,8 +64,8 @@ def both_stops(x, v, p, q, f):
     """Each stop by itself, without a branch."""
     right, left = max(x - GAP, 0.0), max(-GAP - x, 0.0)
     pull, push = STIFFNESS * math.sqrt(right), STIFFNESS * math.sqrt(left)
-    force = push * left - pull * right
-    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * (pull + push)), DAMPING * q - p, 0.5 * q * q
+    force, root = push * left - pull * right, pull + push
+    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
 
 
 @njit(**FLAGS)
@@ -73,7 +75,8 @@ def branching(x, v, p, q, f):
     if depth <= 0.0:
         return v, f - DAMPING * v - SQUARE * x + q, q * SQUARE, DAMPING * q - p, 0.5 * q * q
     root = STIFFNESS * math.sqrt(depth)
-    return v, f - DAMPING * v - SQUARE * x - math.copysign(root * depth, x) + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+    force = -math.copysign(root * depth, x)
+    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
 
 
 def runge_kutta(slopes):
@@ -219,14 +222,17 @@ def start_states(trajectories: int) -> Array:
 
 
 def check(contestants: dict[str, Contestant], starts: Array, periods: int) -> None:
-    """All give the same trajectories; this also compiles them."""
+    """All give the same trajectories, as far as they are defined at all; this also compiles them."""
     print(f"median relative difference from {REFERENCE}")
+    reference = contestants[REFERENCE]
     for count, allowed in ((1, 1e-12), (periods, 1e-8)):
-        expected = contestants[REFERENCE](starts, count)
+        expected = reference(starts, count)
+        nudged = np.median(np.abs(reference(np.nextafter(starts, 1.0), count) / expected - 1))
+        print(f"  after {count} periods; starts that differ in the last bit: {nudged:.1e}")
         for name, contestant in contestants.items():
             difference = np.median(np.abs(contestant(starts, count) / expected - 1))
-            print(f"  {name:32}{count:3} periods{difference:9.1e}")
-            assert difference <= allowed, f"{name} differs by {difference:.1e} after {count} periods."
+            print(f"    {name:32}{difference:9.1e}")
+            assert difference <= max(allowed, 20 * nudged), f"{name} differs by {difference:.1e}."
 
 
 def race(contestants: dict[str, Contestant], rounds: int, starts: Array, periods: int) -> dict[str, Array]:

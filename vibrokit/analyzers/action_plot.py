@@ -62,7 +62,7 @@ class ActionPlot(Analyzer):
     radius: float = 1e-6
     points: int = 20_000
     source: int | None = None
-    exit: Exit = LeaveBasin()
+    exit: Exit = dataclasses.field(default_factory=LeaveBasin)
     stepper: Stepper | None = None
     budget: int | None = None
 
@@ -171,7 +171,7 @@ def _path(osc: Oscillator, start: Array, intervals: int, interval: float, steppe
     samples = max(1, round(_SAMPLES * interval / osc.section_interval))
     z = record(osc, Flow.HAMILTONIAN, stepper, start, 0.0, interval / samples, samples * intervals)
     size = (len(start) - 1) // 2
-    times = interval / samples * np.arange(len(z))
+    times: Array = interval / samples * np.arange(len(z), dtype=float)
     return ExitPath(times, z[:, :size], z[:, size : 2 * size], z[:, -1], np.arange(0, len(z), samples))
 
 

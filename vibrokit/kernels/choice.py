@@ -8,6 +8,10 @@ from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
 
+class CoarseStepsWarning(UserWarning):
+    """RK4 was given too few steps for a contact."""
+
+
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     return RK4()
 

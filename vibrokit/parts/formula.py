@@ -1,8 +1,8 @@
 """Formulas as text: arithmetic and a list of functions, checked before anything is made of them.
 
 The text may come from a stranger's scene file. `formula_text` reads it token by token; what is arithmetic
-by then becomes a syntax tree, whose constants and powers are checked here; `formula_expression` makes it a SymPy
-expression. Nothing is ever compiled or run, and SymPy is imported only when an expression is built.
+by then becomes a syntax tree, whose constants and powers are checked here, and `formula_expression` makes a SymPy
+expression of it. Nothing is ever compiled or run, and SymPy is imported only when an expression is built.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from vibrokit.parts.formula_text import (
 if TYPE_CHECKING:
     import sympy
 
-__all__ = ["Formula", "FormulaError", "check_parameter_name", "parse_formula"]
+__all__ = ["Formula", "FormulaError", "check_parameter_name", "parse_formula"]  # for users of formulas
 
 LARGEST_EXPONENT = 64
 
@@ -67,8 +67,8 @@ class Formula:
         Parameters
         ----------
         values : mapping of str to sympy.Expr
-            What stands for each name that the formula uses; real symbols as a rule. Numbers are accepted,
-            text is not.
+            What stands for each name that the formula uses; real symbols as a rule. Numbers are accepted, as
+            doubles; text is not.
 
         Raises
         ------

@@ -27,15 +27,14 @@ def build(text: str, tree: ast.expr, names: Sequence[str], values: Mapping[str, 
     for node in bottom_up(tree):
         parts = [built[part] for part in operands(node)]
         try:
-            expression = _built(text, node, parts, symbols)
-            built[node] = _settled(text, node, expression) if parts else expression
+            built[node] = _settled(text, node, _built(text, node, parts, symbols))
         except FormulaError:
             raise
         except _FAILURES as error:
             problem = f"SymPy makes no expression of this part ({error}); write it in another way"
             raise refusal(text, node.col_offset, problem) from error
     _check_expression(text, built[tree])
-    return built[tree].xreplace({number: _float(float(number)) for number in built[tree].atoms(sympy.Float)})
+    return built[tree]
 
 
 def _value(name: str, values: Mapping[str, Any]) -> sympy.Expr:
@@ -56,7 +55,7 @@ def _value(name: str, values: Mapping[str, Any]) -> sympy.Expr:
 
 
 def _float(value: float) -> sympy.Float:
-    """The same double, with the fewest digits that read back as it: 0.7 is printed 0.700000000000000."""
+    """The same double, with the fewest digits that read back as it: 0.7 is not printed as 0.69999999999999996."""
     if not math.isfinite(value):
         return sympy.Float(value)
     numbers = (sympy.Float(value, digits) for digits in (15, 16, 17))
@@ -86,8 +85,8 @@ def _built(text: str, node: ast.expr, parts: list[Any], symbols: Mapping[str, An
 def _power(text: str, node: ast.BinOp, base: Any, exponent: Any) -> Any:
     """Power with exponents such as 1.5 made exact, so that half-integer powers stay roots."""
     if exponent.is_number and abs(float(exponent)) > LARGEST_EXPONENT:
-        problem = f"an exponent comes to {_brief(exponent)}; allowed are -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}"
-        raise refusal(text, node.right.col_offset, problem)
+        problem = f"an exponent comes to {_brief(exponent)}; allowed are"
+        raise refusal(text, node.right.col_offset, f"{problem} -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}")
     if exponent.is_Float:
         exact = Fraction(float(exponent))
         if exact.denominator <= LARGEST_EXACT_DENOMINATOR:
@@ -109,7 +108,7 @@ def _settled(text: str, node: ast.expr, expression: sympy.Expr) -> sympy.Expr:
         is_long = sum(1 for _ in sympy.preorder_traversal(expression)) > LONGEST_EXACT_CONSTANT
         return _float(float(expression)) if has_float or is_long else expression
     if has_float:
-        roots = [power for power in expression.atoms(sympy.Pow) if _is_finite(power) and not power.is_Rational]
+        roots = [power for power in expression.atoms(sympy.Pow) if _is_finite(power)]
         return expression.xreplace({root: _float(float(root)) for root in roots})
     return expression
 

@@ -187,11 +187,11 @@ class _Scan:
             if len(word) > MOST_DIGITS:
                 self._refuse(f"a whole number has {len(word)} digits; at most {MOST_DIGITS} are allowed")
             if len(word) > 1 and word[0] == "0":
-                self._refuse(f"the whole number {word} starts with 0; write {int(word)}")
+                self._refuse(f"the whole number {word!r} starts with 0; write {int(word)}")
         elif not math.isfinite(float(word)):
-            self._refuse(f"the number {word} is too large; numbers must be below 1.8e308")
+            self._refuse(f"the number {_shortened(word, 1)} is too large; numbers must be below 1.8e308")
         elif float(word) == 0 and re.search("[1-9]", re.split("[eE]", word)[0]):
-            self._refuse(f"the number {word} is too small; numbers that are not 0 must be above 5e-324")
+            self._refuse(f"the number {_shortened(word, 1)} is too small; allowed are 0 and 5e-324 upwards")
 
     def _name(self, word: str) -> None:
         if word in self.known:
@@ -227,6 +227,8 @@ class _Scan:
 
     def _symbol(self, symbol: str) -> None:
         if self.wants_operand and symbol not in ("(", "+", "-"):
+            if symbol == "/" and self.text[: self.column - 1].endswith("/"):
+                self._refuse("'//' has no meaning in a formula; write / for a quotient")
             self._refuse(f"{symbol!r} stands where {_OPERAND} must stand")
         if symbol == "(":
             if not self.wants_operand:
@@ -250,7 +252,8 @@ class _Scan:
         several = function in SEVERAL_ARGUMENTS
         self.compared += commas + 1 if several else 0
         if self.compared > MOST_COMPARED:
-            self._refuse(f"min and max have {self.compared} arguments in all; at most {MOST_COMPARED} are allowed")
+            found = f"min and max have {self.compared} arguments in all"
+            self._refuse(f"{found}; at most {MOST_COMPARED} are allowed")
         if function and (commas > 0) != several:
             found = f"{commas + 1} argument{'s' * (commas > 0)}"
             allowed = "2 or more" if several else "only 1"

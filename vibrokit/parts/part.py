@@ -37,6 +37,7 @@ class Part(ABC):
                     f"inherit from {kind} instead and write the whole formula."
                 )
         dataclasses.dataclass(frozen=True, repr=False)(cls)
+        del cls.__setattr__, cls.__delattr__  # those below do, and an explicit decorator may put its own
         cls._declared = declared_parameters(cls)
 
     @classmethod
@@ -49,6 +50,12 @@ class Part(ABC):
             number = declared.checked(type(self).__name__, value)
             if isinstance(value, float) or not declared.structural:  # a structural fraction stays exact
                 object.__setattr__(self, declared.attribute, number)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise dataclasses.FrozenInstanceError(f"{type(self).__name__}: {name} cannot be set; use replace(...).")
+
+    def __delattr__(self, name: str) -> None:
+        raise dataclasses.FrozenInstanceError(f"{type(self).__name__}: {name} cannot be deleted.")
 
     def declared(self) -> tuple[Parameter, ...]:
         """Parameters of this part, in order."""

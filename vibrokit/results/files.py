@@ -90,10 +90,11 @@ def _read(dataset: xarray.Dataset, header: dict[str, Any]) -> Result:
         raise UnknownNameError(f"result of unknown kind {kind!r}{nearest(kind, _KINDS)}")
     energies = []
     for index, method in enumerate(header["methods"]):
-        numbers = {name: float(dataset[f"energy_{name}"][index]) for name in _NUMBERS}
-        labels = {name: int(numbers.pop(name)) for name in ("source", "target")}
+        source, target, value, lower, upper, residual = (float(dataset[f"energy_{n}"][index]) for n in _NUMBERS)
         path = _read_path(dataset, _PATH.format(index=index))
-        energies.append(ActivationEnergy(**labels, **numbers, method=method, path=path))
+        energies.append(
+            ActivationEnergy(int(source), int(target), value, lower, upper, method, residual, path)
+        )
     own = [name for name in dataset.variables if str(name).startswith(("energy_", "path"))]
     seed = header["seed"]
     return _KINDS[kind](

@@ -192,11 +192,16 @@ class Model:
         """∂b/∂q, n × n."""
         return self.drift.jacobian(list(self.state))
 
-    def _repr_latex_(self) -> str:
+    @property
+    def latex(self) -> str:
+        """The equations as an ``aligned`` block of LaTeX."""
         lines = [rf"\dot{{{as_latex(q)}}} &= {as_latex(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines.append(rf"\dot{{S}} &= {as_latex(self.action_rate)}")
-        return r"$\displaystyle \begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}$"
+        return r"\begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}"
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {self.latex}$"
 
     def __str__(self) -> str:
         lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]

@@ -76,6 +76,11 @@ class Compiled:
         return out
 
 
+# Where, in the rates of the Hamiltonian flow with its variations that start so, a force's derivatives of some orders
+# in x and v stand alone: p′, and the lower left of the matrix.
+ENTRIES = {(1, 0): 2, (0, 1): 3, (2, 0): 13, (1, 1): 14, (0, 2): 18}
+
+
 def hamiltonian_start(states: tuple[float, ...], momentum: float) -> Any:
     """State, momenta (the last is `momentum`, the others 0), no action, and the unit matrix.
 

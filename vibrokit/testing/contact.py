@@ -17,7 +17,7 @@ from vibrokit.parts.spring.cubic import CubicSpring
 from vibrokit.registry import Group
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.testing.compiled import Compiled, hamiltonian_start
+from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
 from vibrokit.testing.derivatives import ORDERS, check_compiled, check_derivatives, derivative
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import Function, function, rounding
@@ -27,7 +27,6 @@ _NEAREST = mpmath.mpf(10) ** -4000  # a depth at which even the 200th root of it
 _ORDERS_AT_TOUCH = range(1, 9)
 _TOUCH_DIGITS = 250
 _NEAR, _NEARER = mpmath.mpf("1e-6"), mpmath.mpf("1e-12")
-_ENTRIES = {(1, 0): (2, 1.0), (0, 1): (3, 1.0), (2, 0): (13, 1.0), (1, 1): (14, 1.0), (0, 2): (18, 1.0)}
 
 
 class ContactLawChecks(PartChecks[ContactLaw]):
@@ -102,6 +101,7 @@ class ContactLawChecks(PartChecks[ContactLaw]):
     def never_pulls(self) -> str:
         """As compiled for a barrier that is not adhesive, the force never pulls, and is 0 where nothing touches."""
         for part in self.samples:
+            self.expression(part)
             for side, sign in (("right", 1.0), ("left", -1.0)):
                 code = Compiled(_bare(part, side), Flow.STATE)
                 for depth, rate in self.points():
@@ -242,7 +242,7 @@ class _CompiledSide:
         without, with_momentum = (rates(hamiltonian_start(state, p)) for p in (0.0, 1.0))
         worst = 0.0
         for orders, (exact, bound) in self.exact.items():
-            index, turned = (1, without) if orders == (0, 0) else (_ENTRIES[orders][0], with_momentum)
+            index, turned = (1, without) if orders == (0, 0) else (ENTRIES[orders], with_momentum)
             # The force on the mass is −sign · law; p′ and the lower half of the matrix hold minus its derivatives.
             sign = (-1 if orders == (0, 0) else 1) * self.sign ** (1 + sum(orders))
             expected = exact(depth, rate) if pushing else mpmath.mpf(0)

@@ -39,10 +39,11 @@ def check_derivatives(
             for order, size in zip(orders, sizes, strict=True):
                 scale /= mpmath.mpf(size) ** order
             by_formula, by_difference = exact(*point), difference(value, point, orders, sizes)
-            if abs(by_formula - by_difference) <= _NOTHING * scale:
+            distance = apart(by_formula, by_difference)
+            if abs(by_formula) <= _NOTHING * scale and abs(by_difference) <= _NOTHING * scale:
                 continue
-            worst = max(worst, apart(by_formula, by_difference))
-            if worst > CLOSE:
+            worst = max(worst, distance)
+            if distance > CLOSE:
                 raise ConformanceError(
                     f"The derivative of orders {orders} of {subject!r} is {mpmath.nstr(by_formula, 15)} at {point} by "
                     f"its formula but {mpmath.nstr(by_difference, 15)} by differences of the force itself."

@@ -30,7 +30,7 @@ _MAIN = (
 def outcome(scene: Oscillator) -> tuple[str, bytes]:
     """Return the code that is generated for a scene, derived afresh, and where it takes a few states."""
     flow = Flow.STATE if scene.noise is None else Flow.NOISY
-    stepper = RK4(steps=max(1, round(_STEPS_PER_TIME * scene.section_interval)))
+    stepper = RK4(steps=max(1, round(_STEPS_PER_TIME * scene.time_unit)))
     extra = 0 if scene.noise is None else len(scene.noise.extra_states)
     starts = np.array([[0.3, 0.4], [-0.2, 0.9], [0.15, 0.0], [0.05, -0.6]])
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])

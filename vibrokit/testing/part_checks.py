@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import keyword
 import math
 import pickle
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -18,7 +19,7 @@ import mpmath
 import numpy as np
 import sympy
 
-from vibrokit.errors import DerivationError, VibrokitError
+from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.part import Part
@@ -66,7 +67,7 @@ class PartChecks(ABC, Generic[P]):
             Check("formula", self.formula),
             Check("numbers as symbols", self.numbers),
         )
-        return (*general, *self.physics(), *self._travels())
+        return tuple(Check(name, told(make)) for name, make in (*general, *self.physics(), *self._travels()))
 
     def _travels(self) -> tuple[Check, ...]:
         return (
@@ -111,11 +112,8 @@ class PartChecks(ABC, Generic[P]):
         return {symbol: part.parameters[name] for name, symbol in self.symbols(part).items()}
 
     def expression(self, part: Part) -> sympy.Expr:
-        """The formula of a part; a formula that cannot be had fails the check that asks."""
-        try:
-            return ask(part, self.method, self.symbols(part), self.arguments)
-        except DerivationError as error:
-            raise ConformanceError(str(error)) from error
+        """The formula of a part."""
+        return ask(part, self.method, self.symbols(part), self.arguments)
 
     def precise(self, part: Part, formula: sympy.Expr | None = None) -> Function:
         """The formula, or one that was derived from it, as a function at sixty digits."""
@@ -270,6 +268,23 @@ class PartChecks(ABC, Generic[P]):
     @abstractmethod
     def part_in(self, scene: Oscillator) -> P:
         """The part that a scene was made for."""
+
+
+def told(make: Callable[[], str]) -> Callable[[], str]:
+    """Return a check that fails with a sentence, whatever the part does."""
+
+    @functools.wraps(make)
+    def made() -> str:
+        try:
+            return make()
+        except ConformanceError:
+            raise
+        except VibrokitError as error:
+            raise ConformanceError(str(error)) from error
+        except Exception as error:
+            raise ConformanceError(f"The part raised {type(error).__name__}: {error}.") from error
+
+    return made
 
 
 def _as_number(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -39,7 +38,6 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
     """
     raw = sympy.lambdify([*arguments, *values], formula, modules=[_FUNCTIONS, "mpmath"])
 
-    @functools.wraps(raw)
     def evaluated(*point: Any, digits: int = DIGITS) -> Any:
         with mpmath.workdps(digits):
             try:
@@ -47,12 +45,12 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
             except (ArithmeticError, ValueError):
                 value = mpmath.nan
             except (NameError, TypeError, AttributeError) as error:
-                raise ConformanceError(f"{formula} cannot be evaluated ({type(error).__name__}: {error}).") from error
+                raise ConformanceError(f"The formula {formula} cannot be evaluated ({type(error).__name__}: {error}).") from error
             if not (mpmath.isfinite(value) and mpmath.im(value) == 0):
                 place = ", ".join(f"{a} = {mpmath.nstr(p, 6)}" for a, p in zip(arguments, point, strict=True))
                 shown = {str(symbol): number for symbol, number in values.items()}
                 raise ConformanceError(
-                    f"{formula} is {mpmath.nstr(value, 6)} at {place}, with {shown}; it must be finite and real."
+                    f"The formula {formula} is {mpmath.nstr(value, 6)} at {place}, with {shown}; it must be finite and real."
                 )
             return mpmath.re(value)
 
@@ -100,6 +98,8 @@ def _in_roundings(node: sympy.Expr) -> sympy.Expr:
     if isinstance(node, sympy.Piecewise):
         return sympy.Piecewise(*((_in_roundings(value), condition) for value, condition in node.args))
     errors = [_in_roundings(argument) for argument in node.args]
+    if isinstance(node, sympy.Pow) and node.exp.is_number:
+        errors[1] = sympy.Integer(0)
     if isinstance(node, sympy.Max | sympy.Min | sympy.Abs | sympy.sign):
         return abs(node) + sum(errors)
     if isinstance(node, sympy.Add):
@@ -118,5 +118,7 @@ def apart(found: Any, exact: Any) -> float:
     """Relative distance of two numbers; 0 where neither is more than 1e-300."""
     if not mpmath.isfinite(found):
         return math.inf
-    size = max(abs(exact), abs(mpmath.mpf(found)))
-    return 0.0 if size < 1e-300 else float(abs(mpmath.mpf(found) - exact) / size)
+    with mpmath.workdps(DIGITS):
+        found = mpmath.mpf(found)
+        size = max(abs(exact), abs(found))
+        return 0.0 if size < 1e-300 else float(abs(found - exact) / size)

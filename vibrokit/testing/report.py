@@ -27,12 +27,15 @@ class Finding:
 
     Attributes
     ----------
+    subject : str
+        The part that was checked.
     name : str
     passed : bool
     text : str
         What was measured, or what does not hold.
     """
 
+    subject: str
     name: str
     passed: bool
     text: str
@@ -49,12 +52,9 @@ class Report:
 
     Attributes
     ----------
-    subject : str
-        What was checked.
     findings : tuple of Finding
     """
 
-    subject: str
     findings: tuple[Finding, ...]
 
     @property
@@ -64,15 +64,18 @@ class Report:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The subject, then one line for each check."""
-        return (self.subject, *(f"  {finding.line}" for finding in self.findings))
+        """Each part that was checked, and under it one line for each check."""
+        lines: list[str] = []
+        subject = None
+        for finding in self.findings:
+            if finding.subject != subject:
+                subject = finding.subject
+                lines.append(subject)
+            lines.append(f"  {finding.line}")
+        return tuple(lines)
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
-
-    def __add__(self, other: Report) -> Report:
-        """Both reports as one."""
-        return Report(f"{self.subject}, {other.subject}", self.findings + other.findings)
 
 
 def make_all(subject: str, checks: Iterable[Check]) -> Report:
@@ -81,12 +84,12 @@ def make_all(subject: str, checks: Iterable[Check]) -> Report:
     told: dict[str, str] = {}
     for name, make in checks:
         try:
-            findings.append(Finding(name, True, make()))
+            findings.append(Finding(subject, name, True, make()))
         except ConformanceError as error:
             first = told.setdefault(str(error), name)
             text = str(error) if first == name else f"cannot be told before {first!r} holds."
-            findings.append(Finding(name, False, text))
-    return Report(subject, tuple(findings))
+            findings.append(Finding(subject, name, False, text))
+    return Report(tuple(findings))
 
 
 def raise_failures(report: Report) -> Report:
@@ -94,5 +97,5 @@ def raise_failures(report: Report) -> Report:
     failed = [f"{finding.name}: {finding.text}" for finding in report.findings if not finding.passed]
     if failed:
         count = f"{len(failed)} of {len(report.findings)} checks"
-        raise ConformanceError("\n".join([f"{report.subject} fails {count}.", *failed]))
+        raise ConformanceError("\n".join([f"{report.findings[0].subject}, fails {count}.", *failed]))
     return report

@@ -218,13 +218,15 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
     h = length_of(course, sigma, left if last else memory[CONTACT_STEP], i, y, theta)
     copy(y, desk[STAGE])
     slope(course, sigma, h, i, pushing, theta, desk, 0)
+    depth = max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30)
+    grain = 2.0 * EPSILON * abs(y[0]) * abs(push_at(i, y, theta)) / depth
     first, error = h, 0.0
     while True:
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
         attempt(course, sigma, h, y, i, pushing, theta, desk)
-        error = misfit(h, y, memory[SPAN], settings[0], desk)
+        error = misfit(h, y, memory[SPAN], settings[0], grain, desk)
         lapse = trial[CLOCK] - y[CLOCK]
         tiny = abs(lapse) <= EPSILON * (abs(y[CLOCK]) + memory[SPAN]) or abs(h) < 1e-12 * abs(first)
         if error > 1.0 and not tiny:

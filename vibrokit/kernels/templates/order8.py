@@ -43,7 +43,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
             if memory[COUNT] > settings[1]:
                 return STALLED
             attempt(TIME, 0.0, h, y, 0, pushing, theta, desk)
-            error = misfit(h, y, memory[SPAN], settings[0], desk)
+            error = misfit(h, y, memory[SPAN], settings[0], 0.0, desk)
             tiny = h <= EPSILON * (abs(y[CLOCK]) + memory[SPAN])
             if error > 1.0 and not tiny:
                 h *= min(0.7, stretch(error))

@@ -1,0 +1,388 @@
+"""Bad scene files: refused with one sentence, nothing executed, nothing half-written; and good ones come back whole."""
+
+import os
+import stat
+import time
+from pathlib import Path
+
+import pytest
+
+import vibrokit as vk
+from vibrokit.errors import SceneError, UnknownNameError, VibrokitError
+from vibrokit.results import atomic
+from vibrokit.scene_file import bundled_scenes, scene_data, scene_from_data
+
+GOOD = """natural_frequency = 1.0
+damping_ratio = 0.01
+[[barriers]]
+law = { name = "hertz", stiffness = 50.0 }
+position = 0.5
+side = "right"
+[[excitations]]
+name = "harmonic"
+amplitude = 0.18
+frequency = 0.57
+[noise]
+name = "white"
+intensity = 2e-5
+"""
+
+
+def refused(tmp_path, content, name="scene.toml", limit=0.5):
+    """What loading says: one line that names the file and ends with a period, said at once."""
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    before = sorted(os.listdir(tmp_path))
+    start = time.perf_counter()
+    with pytest.raises(VibrokitError) as error:
+        vk.load_scene(path)
+    seconds = time.perf_counter() - start
+    said = str(error.value)
+    assert "\n" not in said
+    assert said.endswith(".")
+    assert len(said) < 700 + len(str(path))
+    assert name in said
+    assert seconds < limit
+    assert sorted(os.listdir(tmp_path)) == before
+    return said
+
+
+def changed(old, new):
+    assert GOOD.count(old) == 1
+    return GOOD.replace(old, new)
+
+
+def test_the_good_one_is_good(tmp_path):
+    (tmp_path / "scene.toml").write_text(GOOD)
+    assert vk.load_scene(tmp_path / "scene.toml").parameters["barriers.0.law.stiffness"] == 50.0
+
+
+LOW, POSITIVE = "; give a finite number at least 0.", "; give a finite number greater than 0."
+NO_NUMBER = "which is no number; give a finite number at least 0."
+VALUES = {
+    "negative stiffness": ("stiffness = 50.0", "stiffness = -50.0", "barriers.0.law: Hertz: stiffness is -50" + LOW),
+    "nan stiffness": ("stiffness = 50.0", "stiffness = nan", "stiffness is nan" + LOW),
+    "damping": ("damping_ratio = 0.01", "damping_ratio = -1", "damping_ratio is -1" + LOW),
+    "nan damping": ("damping_ratio = 0.01", "damping_ratio = nan", "damping_ratio is nan" + LOW),
+    "negative intensity": ("intensity = 2e-5", "intensity = -2e-5", "noise: WhiteNoise: intensity is -2e-05" + LOW),
+    "zero frequency": ("\nfrequency = 0.57", "\nfrequency = 0", "excitations.0: Harmonic: frequency is 0" + POSITIVE),
+    "zero": ("natural_frequency = 1.0", "natural_frequency = 0", "natural_frequency is 0" + POSITIVE),
+    "text": ("stiffness = 50.0", 'stiffness = "50"', "stiffness is '50', " + NO_NUMBER),
+    "list": ("stiffness = 50.0", "stiffness = [50.0]", "stiffness is [50.0], " + NO_NUMBER),
+    "table": ("stiffness = 50.0", "stiffness = {k = 1}", "stiffness is {'k': 1}, " + NO_NUMBER),
+    "bool": ("stiffness = 50.0", "stiffness = true", "stiffness is True, " + NO_NUMBER),
+    "date": ("stiffness = 50.0", "stiffness = 2020-01-01", "stiffness is datetime.date(2020, 1, 1), " + NO_NUMBER),
+    "too large": ("stiffness = 50.0", "stiffness = 1e400", "stiffness is inf; give"),
+    "large integer": ("stiffness = 50.0", "stiffness = 1" + "0" * 400, "stiffness is beyond 1.8e308; give"),
+    "integer too long": ("stiffness = 50.0", "stiffness = 1" + "0" * 5000, "is no TOML: "),
+    "side": ('side = "right"', 'side = "rigth"', "barriers.0: Barrier: side is 'rigth'; give 'right' or 'left'."),
+    "side as number": ('side = "right"', "side = 1", "side is 1; give 'right' or 'left'."),
+    "adhesive": ('side = "right"', 'side = "right"\nadhesive = 1', "adhesive is 1; give True or False."),
+    "position": ("position = 0.5", 'position = "0.5"', "position is '0.5', which is no number; give a finite number."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "end"), VALUES.values(), ids=VALUES)
+def test_values(tmp_path, old, new, end):
+    assert end in refused(tmp_path, changed(old, new))
+
+
+NAMES = {
+    "key of the scene": ("damping_ratio", "noize = 1\ndamping_ratio", "unknown entry 'noize'; the nearest is 'noise'."),
+    "misspelt key": ("damping_ratio", "damping_ration", "unknown entry 'damping_ration'; the nearest is 'damping_ratio'."),
+    "key of a barrier": ("position = 0.5", "positoin = 0.5", "barriers.0 has an unknown entry 'positoin'; the nearest is 'position'."),
+    "key of a law": ("stiffness = 50.0", "stifness = 50.0", "(hertz) has an unknown entry 'stifness'; the nearest is 'stiffness'."),
+    "key of an excitation": ("amplitude", "ampltude", "(harmonic) has an unknown entry 'ampltude'; the nearest is 'amplitude'."),
+    "key of noise": ("intensity", "strength", "noise (white) has an unknown entry 'strength'; there is intensity."),
+    "law": ('name = "hertz"', 'name = "herz"', "There is no contact law 'herz'. Did you mean 'hertz'?"),
+    "excitation": ('name = "harmonic"', 'name = "harmonics"', "Did you mean 'harmonic'?"),
+    "noise model": ('name = "white"', 'name = "wite"', "Did you mean 'white'?"),
+    "law of another kind": ('name = "hertz"', 'name = "white"', "There is no contact law 'white'."),
+    "long name": ('name = "hertz"', f'name = "{"h" * 5000}"', "a name has at most 100 characters."),
+    "long key": ("intensity", "i" * 5000, "unknown entry 'iii"),
+    "empty name": ('name = "hertz"', 'name = ""', "There is no contact law ''."),
+    "class path": ('name = "hertz"', 'name = "os:system"', "There is no contact law 'os:system'."),
+    "dunder key": ("stiffness = 50.0", "stiffness = 50.0, __class__ = 1", "unknown entry '__class__'"),
+    "self": ("stiffness = 50.0", "stiffness = 50.0, self = 1", "unknown entry 'self'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), NAMES.values(), ids=NAMES)
+def test_unknown_names(tmp_path, old, new, said):
+    assert said in refused(tmp_path, changed(old, new))
+
+
+MISSING = {
+    "natural frequency": ("natural_frequency = 1.0\n", "", "scene lacks natural_frequency; it needs natural_frequency, damping_ratio."),
+    "damping": ("damping_ratio = 0.01\n", "", "scene lacks damping_ratio"),
+    "law": ('law = { name = "hertz", stiffness = 50.0 }\n', "", "barriers.0 lacks law; it needs law, position, side."),
+    "position": ("position = 0.5\n", "", "barriers.0 lacks position"),
+    "side": ('side = "right"\n', "", "barriers.0 lacks side"),
+    "stiffness": (", stiffness = 50.0", "", "barriers.0.law (hertz) lacks stiffness; it needs stiffness."),
+    "name of a law": ('name = "hertz", ', "", "barriers.0.law is {'stiffness': 50.0}; write a table with the part's name"),
+    "name of the noise": ('name = "white"\n', "", "noise is {'intensity': 2e-05}; write a table with the part's name"),
+    "name of an excitation": ('name = "harmonic"\n', "", "excitations.0 is {"),
+    "intensity": ("intensity = 2e-5\n", "", "noise (white) lacks intensity"),
+    "everything": (GOOD, "", "scene lacks natural_frequency"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISSING.values(), ids=MISSING)
+def test_missing_keys(tmp_path, old, new, said):
+    assert said in refused(tmp_path, changed(old, new))
+
+
+SHAPES = {
+    "[barriers]": ("[[barriers]]", "[barriers]", "scene: barriers is {'law': {", "write a table [[barriers]] for each."),
+    "[excitations]": ("[[excitations]]", "[excitations]", "scene: excitations is {", "write a table [[excitations]] for each."),
+    "[[noise]]": ("[noise]", "[[noise]]", "noise is [{", "write a table with the part's name and its parameters."),
+    "law as text": ('{ name = "hertz", stiffness = 50.0 }', '"hertz"', "barriers.0.law is 'hertz'; write a table", "."),
+    "name as list": ('name = "white"', 'name = ["white"]', "noise is {", "."),
+    "name as number": ('name = "white"', "name = 1", "'name': 1}; write a table", "."),
+    "noise as number": ('[noise]\nname = "white"\nintensity = 2e-5\n', "[noise.white]\n", "noise is {'white': {}}", "."),
+    "barriers of numbers": (GOOD, "natural_frequency=1\ndamping_ratio=0\nbarriers=[1, 2]\n", "barriers.0 is 1, no table; it has law", "."),
+    "excitations of text": (GOOD, "natural_frequency=1\ndamping_ratio=0\nexcitations=['a']\n", "excitations.0 is 'a'; write a table", "."),
+    "barriers as text": (GOOD, "natural_frequency=1\ndamping_ratio=0\nbarriers='two'\n", "barriers is 'two', no list", "."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said", "end"), SHAPES.values(), ids=SHAPES)
+def test_shapes(tmp_path, old, new, said, end):
+    message = refused(tmp_path, changed(old, new))
+    assert said in message
+    assert message.endswith(end)
+
+
+STOP = '[[barriers]]\nlaw = { name = "linear", stiffness = 1.0 }\n'
+
+
+def test_two_stops_on_one_side(tmp_path):
+    said = refused(tmp_path, GOOD + STOP + 'position = 0.7\nside = "right"\n')
+    assert "2 stops on the right side, at 0.5, 0.7; give at most one on each side." in said
+
+
+def test_crossed_stops(tmp_path):
+    said = refused(tmp_path, GOOD + STOP + 'position = 0.7\nside = "left"\n')
+    assert "the left stop, at 0.7, is to the right of the right stop, at 0.5" in said
+
+
+NO_TOML = {
+    "duplicated key": GOOD.replace("damping_ratio = 0.01", "damping_ratio = 0.01\ndamping_ratio = 0.02").encode(),
+    "duplicated table": (GOOD + '[noise]\nname = "white"\nintensity = 1\n').encode(),
+    "broken": b"natural_frequency = = 1\n",
+    "unfinished": GOOD[:-3].encode() + b"\n[",
+    "json": b'{"natural_frequency": 1.0}',
+    "nested arrays": b"x = " + b"[" * 40_000 + b"]" * 40_000,
+    "nested tables": b"x = " + b"{a = " * 10_000 + b"1" + b"}" * 10_000,
+    "control characters": b"natural_frequency = 1\x00\n",
+    "byte-order mark": "\ufeff".encode() + GOOD.encode(),
+}
+
+
+@pytest.mark.parametrize("content", NO_TOML.values(), ids=NO_TOML)
+def test_what_is_no_toml(tmp_path, content):
+    said = refused(tmp_path, content)
+    assert "is no TOML: " in said or "is nested too deeply" in said
+
+
+def test_binary(tmp_path):
+    assert "is no text in UTF-8 (at byte 0); a scene is a TOML file." in refused(
+        tmp_path, b"\x89PNG\r\n\x1a\n" + bytes(99)
+    )
+
+
+def test_utf16(tmp_path):
+    assert "is no text in UTF-8" in refused(tmp_path, GOOD.encode("utf-16"))
+
+
+def test_deep_dotted_keys(tmp_path):
+    deep = "stiffness" + ".a" * 3000
+    assert "stiffness is " in refused(tmp_path, changed("stiffness = 50.0", f"{deep} = 1"), limit=2.0)
+
+
+def test_huge(tmp_path):
+    said = refused(tmp_path, GOOD + "#" * 100_000)
+    assert "is too large for a scene; at most 100000 bytes are read." in said
+
+
+def test_a_megabyte_of_formula(tmp_path):
+    said = refused(tmp_path, changed('"hertz"', f'"custom", formula = "{"1+" * 500_000}1"'), limit=0.1)
+    assert "is too large for a scene" in said
+
+
+def test_endless_files_are_not_read_to_their_end():
+    if not os.path.exists("/dev/zero"):
+        pytest.skip("this system has no /dev/zero")
+    with pytest.raises(SceneError, match="is too large for a scene"):
+        vk.load_scene("/dev/zero")
+
+
+def test_many_barriers(tmp_path):
+    many = "".join(f"{STOP}position = {i}\nside = 'left'\n" for i in range(1000))
+    assert "scene: barriers has 1001 entries; at most 100 are allowed." in refused(tmp_path, GOOD + many)
+
+
+RUNS_CODE = {
+    "import": "__import__('os').system('touch ran')",
+    "attribute": "depth.__class__.__mro__",
+    "comprehension": "[open('ran', 'w') for i in (1,)]",
+    "power tower": "9**9**9**9",
+    "much": "1+" * 40_000 + "1",
+    "parentheses": "(" * 80_000,
+}
+
+
+@pytest.mark.parametrize("formula", RUNS_CODE.values(), ids=RUNS_CODE)
+@pytest.mark.parametrize("place", ["law", "spring", "noise"])
+def test_a_formula_that_would_run_code(tmp_path, monkeypatch, place, formula):
+    monkeypatch.chdir(tmp_path)
+    text = {
+        "law": f'[[barriers]]\nposition = 1.0\nside = "left"\nlaw = {{ name = "custom", formula = "{formula}" }}\n',
+        "spring": f'[spring]\nname = "custom"\nformula = "{formula}"\n',
+        "noise": f'[noise]\nname = "state-dependent"\nintensity = 1e-3\namplitude = "{formula}"\n',
+    }[place]
+    said = refused(tmp_path, f"natural_frequency = 1\ndamping_ratio = 0\n{text}", limit=0.1)
+    assert f"{'barriers.0.law' if place == 'law' else place}: The formula " in said
+    assert not (tmp_path / "ran").exists()
+
+
+def test_unknown_symbols_of_a_formula(tmp_path):
+    said = refused(
+        tmp_path, changed('name = "hertz", stiffness = 50.0', 'name = "custom", formula = "kk*depth", k = 1')
+    )
+    assert "the name 'kk' is unknown; names allowed are pi, depth, rate, k" in said
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("hertz-0.57", "the nearest is 'hertz-0.570'."),
+        ("no-such-scene", "."),
+        ("", "."),
+        ("x" * 5000, "."),
+        ("a\0b", "."),
+        ("missing/scene.toml", "."),
+    ],
+)
+def test_no_such_scene(source, said):
+    with pytest.raises((UnknownNameError, SceneError)) as error:
+        vk.load_scene(source)
+    assert str(error.value).endswith(said)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 500
+
+
+def test_a_folder(tmp_path):
+    with pytest.raises(SceneError, match=r"is a folder; give a TOML file or one of .*hertz-0\.570.*\.$"):
+        vk.load_scene(tmp_path)
+
+
+@pytest.mark.parametrize("source", [None, 3, b"hertz-0.570", ["hertz-0.570"]])
+def test_what_is_no_path(source):
+    with pytest.raises(SceneError, match=r"^the scene is .*; give the path of a TOML file or one of .*\.$"):
+        vk.load_scene(source)
+
+
+def test_a_file_that_may_not_be_read(tmp_path, monkeypatch):
+    path = tmp_path / "scene.toml"
+    path.write_text(GOOD)
+
+    def denied(*args, **kwargs):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", denied)
+    with pytest.raises(SceneError, match=r"scene\.toml cannot be read \(Permission denied\); give .*\.$"):
+        vk.load_scene(path)
+
+
+def everything():
+    return vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.1,
+        spring=vk.CustomSpring("a*x + b*x**3", a=1.0, b=1e-300),
+        barriers=(
+            vk.Barrier(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=1 / 3), 0.5, "right", adhesive=True),
+            vk.Barrier(vk.Linear(1e22), -0.1, "left"),
+        ),
+        excitations=(vk.Harmonic(0.1, 2 / 3, 0.3), vk.Constant(-0.2), vk.Harmonic(1e-17, 4 / 3)),
+        noise=vk.StateDependentNoise(5e-324, "1 + c*x**2", c=-0.5),
+    )
+
+
+class TestRoundTrip:
+    def test_everything(self, tmp_path):
+        vk.save_scene(everything(), tmp_path / "all.toml")
+        assert vk.load_scene(tmp_path / "all.toml") == everything()
+        assert vk.load_scene(str(tmp_path / "all.toml")) == everything()
+
+    @pytest.mark.parametrize("name", bundled_scenes())
+    def test_bundled(self, tmp_path, name):
+        osc = vk.load_scene(name)
+        vk.save_scene(osc, tmp_path / "copy.toml")
+        assert vk.load_scene(tmp_path / "copy.toml") == osc
+
+    def test_plain_data(self):
+        assert scene_from_data(scene_data(everything())) == everything()
+
+    def test_least(self, tmp_path):
+        osc = vk.Oscillator(natural_frequency=1, damping_ratio=0)
+        vk.save_scene(osc, tmp_path / "least.toml")
+        assert (tmp_path / "least.toml").read_text() == "natural_frequency = 1.0\ndamping_ratio = 0.0\n"
+        assert vk.load_scene(tmp_path / "least.toml") == osc
+
+    def test_a_file_of_ones_own_beats_a_bundled_scene_of_that_name(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        vk.save_scene(everything(), "hertz-0.570")
+        assert vk.load_scene("hertz-0.570") == everything()
+
+
+class TestSaving:
+    def keep(self, path):
+        path.write_text("old")
+        return path
+
+    def test_an_unregistered_part_is_refused_before_anything_is_written(self, tmp_path):
+        class Mine(vk.ContactLaw):
+            stiffness: float = vk.parameter("k", "s^-2")
+
+            def force(self, depth, rate):
+                return self.stiffness * depth
+
+        osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, barriers=[vk.Barrier(Mine(1.0), 0.5, "right")])
+        path = self.keep(tmp_path / "scene.toml")
+        with pytest.raises(SceneError, match=r"Mine is not registered.*entry-point group 'vibrokit\.contact_laws'\.$"):
+            vk.save_scene(osc, path)
+        assert path.read_text() == "old"
+        assert os.listdir(tmp_path) == ["scene.toml"]
+
+    @pytest.mark.parametrize("fails", ["replace", "chmod"])
+    def test_a_failure_on_the_way_leaves_the_old_file(self, tmp_path, monkeypatch, fails):
+        path = self.keep(tmp_path / "scene.toml")
+
+        def full(*args):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(atomic.os, fails, full)
+        with pytest.raises(SceneError, match=r"scene\.toml cannot be written \(No space left on device\); give .*\.$"):
+            vk.save_scene(everything(), path)
+        assert path.read_text() == "old"
+        assert os.listdir(tmp_path) == ["scene.toml"]
+
+    @pytest.mark.parametrize("place", ["missing/scene.toml", "file/scene.toml", ""])
+    def test_places_that_cannot_be_written(self, tmp_path, place):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(SceneError, match=r"cannot be written \(.*\); give a path in a folder that can be\.$"):
+            vk.save_scene(everything(), tmp_path / place)
+        assert os.listdir(tmp_path) == ["file"]
+
+    def test_the_file_is_as_open_as_any_other(self, tmp_path):
+        vk.save_scene(everything(), tmp_path / "scene.toml")
+        (tmp_path / "plain").write_text("")
+        modes = {stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("scene.toml", "plain")}
+        assert len(modes) == 1
+
+    @pytest.mark.parametrize("thing", [None, "hertz-0.570", {}, vk.Hertz(1.0)])
+    def test_what_is_no_scene(self, tmp_path, thing):
+        with pytest.raises(SceneError, match=r"^save_scene: .* is no scene; give an Oscillator\.$"):
+            vk.save_scene(thing, tmp_path / "scene.toml")
+        assert not os.listdir(tmp_path)

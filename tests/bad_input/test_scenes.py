@@ -1,0 +1,263 @@
+"""Bad parts and scenes: each is refused with one clear sentence that names what, its value, and what is allowed."""
+
+import math
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.errors import IntegrationError, NoSectionError, ParameterError, SceneError, StepperError, VibrokitError
+
+GOOD = {"natural_frequency": 1.0, "damping_ratio": 0.1}
+
+
+def scene(**more):
+    return vk.Oscillator(**(GOOD | more))
+
+
+def stop(side, position=0.5, law=None):
+    return vk.Barrier(law or vk.Hertz(50.0), position, side)
+
+
+def refused(kind, make):
+    """What was said: one line, one sentence or two, ended by a period."""
+    with pytest.raises(kind) as error:
+        make()
+    said = str(error.value)
+    assert "\n" not in said
+    assert said.endswith(".")
+    assert len(said) < 600
+    return said
+
+
+NO_NUMBERS = [
+    "1",
+    None,
+    [1.0],
+    (1.0,),
+    {"a": 1},
+    True,
+    1j,
+    b"1",
+    object(),
+    float,
+    np.ones(3),
+    "9" * 10000,
+    [[[[1]]]] * 9,
+]
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: f"{type(value).__name__}")
+@pytest.mark.parametrize("name", ["natural_frequency", "damping_ratio"])
+def test_numbers_of_the_scene(name, value):
+    said = refused(ParameterError, lambda: scene(**{name: value}))
+    allowed = "greater than 0" if name == "natural_frequency" else "at least 0"
+    assert said.startswith(f"scene: {name} is ")
+    assert said.endswith(f", which is no number; give a finite number {allowed}.")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("natural_frequency", 0.0, "greater than 0"),
+        ("natural_frequency", -1.0, "greater than 0"),
+        ("natural_frequency", math.nan, "greater than 0"),
+        ("natural_frequency", math.inf, "greater than 0"),
+        ("damping_ratio", -0.01, "at least 0"),
+        ("damping_ratio", math.nan, "at least 0"),
+        ("damping_ratio", -math.inf, "at least 0"),
+    ],
+)
+def test_ranges_of_the_scene(name, value, allowed):
+    said = refused(ParameterError, lambda: scene(**{name: value}))
+    assert said == f"scene: {name} is {value:g}; give a finite number {allowed}."
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: vk.Hertz(-50.0), "Hertz: stiffness is -50; give a finite number at least 0."),
+        (lambda: vk.Linear(math.nan), "Linear: stiffness is nan; give a finite number at least 0."),
+        (lambda: vk.WhiteNoise(-2e-5), "WhiteNoise: intensity is -2e-05; give a finite number at least 0."),
+        (lambda: vk.WhiteNoise(math.nan), "WhiteNoise: intensity is nan; give a finite number at least 0."),
+        (lambda: vk.Harmonic(0.1, 0.0), "Harmonic: frequency is 0; give a finite number greater than 0."),
+        (lambda: vk.Harmonic(math.inf, 1.0), "Harmonic: amplitude is inf; give a finite number."),
+        (lambda: vk.CustomLaw("k*depth", k=math.nan), "CustomLaw: k is nan; give a finite number."),
+        (lambda: vk.CubicSpring(1.0, "b"), "CubicSpring: cubic is 'b', which is no number; give a finite number."),
+    ],
+)
+def test_parts(make, said):
+    assert refused(ParameterError, make) == said
+
+
+def test_two_stops_on_one_side():
+    said = refused(SceneError, lambda: scene(barriers=[stop("left", -0.5), stop("left", -0.7)]))
+    assert said == "scene: 2 stops on the left side, at -0.5, -0.7; give at most one on each side."
+
+
+def test_crossed_stops():
+    said = refused(SceneError, lambda: scene(barriers=[stop("left", 0.25), stop("right", -0.75)]))
+    assert "the left stop, at 0.25, is to the right of the right stop, at -0.75" in said
+    assert "equal places are allowed" in said
+
+
+def test_a_zero_gap_is_legal():
+    assert len(scene(barriers=[stop("left", 0.25), stop("right", 0.25)]).barriers) == 2
+
+
+@pytest.mark.parametrize(
+    "value", [3, None, "stop", b"stop", object(), vk.Barrier, vk.Hertz(1.0), [vk.Hertz(1.0)], [[]]]
+)
+@pytest.mark.parametrize("name", ["barriers", "excitations"])
+def test_what_is_no_sequence_of_parts(name, value):
+    said = refused(SceneError, lambda: scene(**{name: value}))
+    assert said.startswith(f"scene: {name} ")
+    assert {"barriers": "Barrier", "excitations": "Excitation"}[name] in said
+
+
+def test_a_single_part_where_a_sequence_is_due():
+    assert "is a single Barrier; give a sequence" in refused(SceneError, lambda: scene(barriers=stop("right")))
+    assert "is a single Constant; give a seq" in refused(SceneError, lambda: scene(excitations=vk.Constant(1.0)))
+
+
+@pytest.mark.parametrize("value", [0.1, "white", vk.WhiteNoise, [vk.WhiteNoise(0.1)], vk.Hertz(1.0)])
+@pytest.mark.parametrize(("name", "kind"), [("noise", "NoiseModel"), ("spring", "Spring")])
+def test_what_is_no_part(name, kind, value):
+    said = refused(SceneError, lambda: scene(**{name: value}))
+    assert said.startswith(f"scene: {name} has ")
+    assert said.endswith(f"which is no {kind}; give one.")
+
+
+ATTACKS = {
+    "attribute": "depth.__class__",
+    "dunder": "__import__('os').system('touch FILE')",
+    "call": "open('FILE', 'w')",
+    "getattr": "getattr(depth, 'x')",
+    "comprehension": "sum([open('FILE','w') for i in (1,)])",
+    "lambda": "(lambda: open('FILE','w'))()",
+    "walrus": "(x := open('FILE','w'))",
+    "f-string": "f'{open(1)}'",
+    "subscript": "().__class__.__bases__[0]",
+    "eval": "eval('open(1)')",
+    "statement": "depth; import os",
+    "newline": "depth\nimport os",
+    "null byte": "depth\0",
+    "power tower": "9**9**9**9",
+    "hidden tower": "((9**60)**60)**60",
+    "growing powers": "((((depth**9)**9)**9)**9)**9",
+    "factorial": "factorial(99999)",
+    "megabyte": "1+" * 500_000 + "1",
+    "parentheses": "(" * 100_000 + "1" + ")" * 100_000,
+    "signs": "-" * 1_900 + "depth",
+    "digits": "9" * 1_900,
+    "exponent": "1e999999999",
+    "shift": "1 << 10**9",
+    "unicode": "ｄｅｐｔｈ",
+    "unknown": "stiffness*depth",
+    "keyword": "depth if depth else 0",
+    "comparison": "depth > 0",
+    "text": "'depth'",
+    "star": "max(*depth)",
+    "keyword argument": "max(depth, key=abs)",
+    "imaginary": "1j*depth",
+    "division": "1/0*depth",
+    "root of a negative": "sqrt(-1)*depth",
+}
+
+
+@pytest.mark.parametrize("text", ATTACKS.values(), ids=ATTACKS)
+def test_formulas_that_would_run_code_or_never_end(text, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    start = time.perf_counter()
+    said = refused(VibrokitError, lambda: vk.CustomLaw(text))
+    seconds = time.perf_counter() - start
+    assert said.startswith("The formula ")
+    assert seconds < 0.1
+    assert not os.listdir(tmp_path)
+
+
+def test_refusing_a_formula_does_not_load_sympy():
+    code = (
+        "import sys, vibrokit as vk\n"
+        "try:\n    vk.CustomLaw('__import__(1)')\n"
+        "except ValueError: print('sympy' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "False"
+
+
+class TestIntegration:
+    runaway = scene(spring=vk.CubicSpring(1.0, -1.0))
+
+    def test_a_trajectory_that_runs_away(self):
+        with pytest.raises(IntegrationError) as error:
+            self.runaway.trajectory((3.0, 1.0), periods=3, stepper=vk.RK4())
+        said = str(error.value)
+        assert "\n" not in said
+        assert said.endswith(".")
+        assert f"t = {error.value.time:g}" in said
+        assert str(error.value.state) in said
+        assert 0.0 < error.value.time < 2.0
+        assert all(map(math.isfinite, error.value.state))
+
+    def test_one_of_an_ensemble(self):
+        with pytest.raises(IntegrationError, match=r"1 of 3 .* number 1 from \(3\.0, 1\.0\), .* t = 0,.*\.$") as error:
+            self.runaway.section_map([[0.0, 0.0], [3.0, 1.0], [0.1, 0.0]], periods=3, stepper=vk.RK4())
+        assert error.value.time == 0.0
+        assert error.value.state == (3.0, 1.0)
+
+    @pytest.mark.parametrize(
+        "states",
+        [[[0.0, math.nan]], [[math.inf, 0.0]], "ab", [["a", "b"]], [[1, 2, 3]], [1.0], None, [[[0.0, 0.0]]], {}],
+    )
+    def test_states(self, states):
+        assert "state" in refused(ParameterError, lambda: scene().section_map(states))
+
+    @pytest.mark.parametrize("periods", [-1, 1.5, "2", None, True, math.nan, [1]])
+    def test_periods(self, periods):
+        said = refused(ParameterError, lambda: scene().section_map([[0.0, 0.0]], periods))
+        assert said.startswith("section_map: periods is ")
+        assert said.endswith("; give a whole number, 0 or more.")
+
+    @pytest.mark.parametrize(
+        ("arguments", "name"),
+        [
+            ({}, "periods or duration"),
+            ({"periods": 1, "duration": 1.0}, "periods or duration"),
+            ({"periods": 0}, "periods"),
+            ({"periods": "2"}, "periods"),
+            ({"duration": -1.0}, "duration"),
+            ({"duration": math.inf}, "duration"),
+            ({"duration": math.nan}, "duration"),
+            ({"periods": 1, "samples": 0}, "samples"),
+            ({"periods": 1, "samples": 2.5}, "samples"),
+            ({"periods": 1, "start_time": math.nan}, "start_time"),
+            ({"periods": 1e12}, "samples"),
+        ],
+    )
+    def test_trajectory_arguments(self, arguments, name):
+        said = refused(ParameterError, lambda: scene().trajectory((0.0, 0.0), **arguments))
+        assert said.startswith("trajectory: ")
+        assert name in said
+
+    def test_noise_that_is_not_there(self):
+        said = refused(SceneError, lambda: scene().section_map([[0.0, 0.0]], rng=1))
+        assert "the scene has no noise" in said
+
+    def test_no_section(self):
+        osc = scene(excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, math.e)))
+        assert "no common period" in refused(NoSectionError, lambda: osc.section_map([[0.0, 0.0]]))
+
+    @pytest.mark.parametrize("stepper", ["rk4", 256, vk.RK4])
+    def test_what_is_no_stepper(self, stepper):
+        said = refused(StepperError, lambda: scene().section_map([[0.0, 0.0]], stepper=stepper))
+        assert said.startswith("the stepper is ")
+        assert "RK4(steps=256)" in said
+
+    @pytest.mark.parametrize("steps", [0, -1, 2.5, "256", True, None, 10**9])
+    def test_steps(self, steps):
+        assert refused(StepperError, lambda: vk.RK4(steps=steps)).startswith("RK4: steps is ")

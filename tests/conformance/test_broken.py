@@ -1,0 +1,76 @@
+"""For every check there is a part that is broken in just that way, and the check catches it."""
+
+import pytest
+
+from tests.conformance import broken
+from vibrokit import Constant, CubicSpring, Hertz, WhiteNoise
+from vibrokit.errors import UnknownNameError
+from vibrokit.testing import (
+    ConformanceError,
+    check,
+    check_contact_law,
+    contact_law_checks,
+    excitation_checks,
+    noise_model_checks,
+    spring_checks,
+)
+
+KINDS = [
+    (contact_law_checks, broken.LAWS),
+    (spring_checks, broken.SPRINGS),
+    (excitation_checks, broken.EXCITATIONS),
+    (noise_model_checks, broken.NOISE_MODELS),
+]
+CASES = [
+    pytest.param(checks, name, part, id=f"{getattr(part, '__name__', part)}-{name}")
+    for checks, cases in KINDS
+    for name, part in cases
+]
+
+
+@pytest.mark.parametrize(("checks", "name", "part"), CASES)
+def test_caught(checks, name, part):
+    with pytest.raises(ConformanceError) as caught:
+        dict(checks(part))[name]()
+    text = str(caught.value)
+    assert text[0].isupper(), text
+    assert text.endswith("."), text
+
+
+def test_every_check_of_a_law_has_a_law_that_it_catches():
+    assert {name for name, _ in contact_law_checks(Hertz)} == {name for name, _ in broken.LAWS}
+
+
+@pytest.mark.parametrize(
+    ("checks", "good", "caught"),
+    [
+        (spring_checks, CubicSpring, broken.SPRINGS),
+        (excitation_checks, Constant, broken.EXCITATIONS),
+        (noise_model_checks, WhiteNoise, broken.NOISE_MODELS),
+    ],
+)
+def test_every_check_of_another_kind_has_a_part_that_it_catches(checks, good, caught):
+    general = {name for name, _ in broken.LAWS}  # shared by all kinds, one code
+    assert {name for name, _ in checks(good)} <= {name for name, _ in caught} | general
+
+
+def test_all_failures_are_told_at_once():
+    with pytest.raises(ConformanceError, match=r"(?s)HasNoUnit, a contact law, fails 1 of \d+ checks\.\nsymbols"):
+        check_contact_law(broken.HasNoUnit)
+
+
+def test_one_cause_is_told_once():
+    with pytest.raises(ConformanceError) as caught:
+        check_contact_law(broken.UsesStrangeSymbol)
+    assert str(caught.value).count("temperature") == 1
+    assert "cannot be told before 'formula' holds." in str(caught.value)
+
+
+def test_the_wrong_kind_is_refused():
+    with pytest.raises(TypeError, match="no ContactLaw"):
+        check_contact_law(CubicSpring)
+
+
+def test_unknown_name_is_told_with_the_nearest():
+    with pytest.raises(UnknownNameError, match="no part 'herz' to check; the nearest is 'hertz'"):
+        check("herz")

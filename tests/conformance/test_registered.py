@@ -1,0 +1,106 @@
+"""Every registered part, built in or of an installed plug-in, conforms; so do formulas, and instances as users have them."""
+
+import math
+from typing import ClassVar
+
+import pytest
+
+import vibrokit as vk
+from vibrokit import testing
+from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.excitation.excitation import Excitation
+from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.spring.spring import Spring
+from vibrokit.registry import Group, load_all
+
+KINDS = [
+    (Group.CONTACT_LAWS, ContactLaw, testing.contact_law_checks),
+    (Group.SPRINGS, Spring, testing.spring_checks),
+    (Group.EXCITATIONS, Excitation, testing.excitation_checks),
+    (Group.NOISE_MODELS, NoiseModel, testing.noise_model_checks),
+]
+REGISTERED = [
+    pytest.param(make, id=f"{group.noun}-{name}-{check}")
+    for group, kind, checks in KINDS
+    for name, part in load_all(group, kind).items()
+    for check, make in checks(part, rng=1)
+]
+
+
+@pytest.mark.parametrize("make", REGISTERED)
+def test_registered(make):
+    make()
+
+
+LAWS = [
+    vk.Hertz(stiffness=1e6),
+    vk.CustomLaw("k*depth + c*rate", k=20.0, c=0.3),
+    vk.CustomLaw("k*(exp(60*depth) - 1)", k=0.5),
+    vk.CustomLaw("k*depth**1.3*(1 + c*sign(rate)/4)", k=20.0, c=1.0),
+    vk.CustomLaw("k*sqrt(depth) + theta*depth*tanh(rate)", k=20.0, theta=1.0),
+    vk.CustomLaw("k*max(depth - gap, 0) + p_1*depth**2 + c0*asin(depth/2)", k=20.0, gap=0.01, p_1=3.0, c0=1.5),
+]
+SPRINGS = [
+    vk.CustomSpring("c0*x + c1*sin(c0*x)*v**2 + p_1*x**3 + f1*cos(v)", c0=1.0, c1=0.3, p_1=0.2, f1=0.1),
+    vk.CustomSpring("k*abs(x)*x + max(x, v, 0.1)", k=1.0),
+]
+NOISES = [vk.StateDependentNoise(1e-2, "1 + a*x*v", a=0.4), vk.StateDependentNoise(1e-2, "2 + cos(depth*x)", depth=0.4)]
+EXAMPLES = [
+    *((testing.contact_law_checks, part) for part in LAWS),
+    *((testing.spring_checks, part) for part in SPRINGS),
+    *((testing.noise_model_checks, part) for part in NOISES),
+]
+
+
+@pytest.mark.parametrize(("checks", "part"), EXAMPLES, ids=lambda value: repr(value) if "=" in repr(value) else "")
+def test_examples(checks, part):
+    for name, make in checks(part, rng=2):
+        if name != "another process":  # told of every class already, and slow
+            make()
+
+
+def test_report_reads_as_a_table():
+    report = testing.check("linear")  # a law and a spring
+    assert report.passed
+    assert report.lines[0] == "Linear, a contact law"
+    assert "LinearSpring, a spring" in report.lines
+    assert "  ok      leading power: 1" in report.lines
+
+
+class Pulse(vk.Excitation):
+    """An excitation that never repeats."""
+
+    amplitude: float = vk.parameter("f", "m s^-2")
+    width: float = vk.parameter("tau", "s", above=0)
+
+    def force(self, t):
+        return self.amplitude / (1 + (t / self.width) ** 2)
+
+    @property
+    def period(self):
+        return math.inf
+
+
+class Coloured(vk.NoiseModel):
+    """Ornstein–Uhlenbeck noise: a state of its own."""
+
+    extra_states: ClassVar = ("y",)
+
+    rate: float = vk.parameter("r", "s^-1", above=0)
+
+    def amplitude(self, x, v):
+        return self.rate
+
+    def force(self, y):
+        return y
+
+    def drift(self, x, v, y):
+        return (-self.rate * y,)
+
+
+def test_excitation_that_never_repeats():
+    testing.check_excitation(Pulse)
+
+
+def test_noise_with_a_state_of_its_own():
+    testing.check_noise_model(Coloured)

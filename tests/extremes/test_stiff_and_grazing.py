@@ -1,0 +1,40 @@
+"""Stops from soft to rigid, hit squarely and grazed: after whole exact periods the state is back where it was."""
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from tests.extremes.exact import exact_period
+
+CYCLES = 10
+STEPPERS = [vk.FreeFlight(tolerance=1e-12), vk.Order8(tolerance=1e-12)]
+
+
+@pytest.mark.parametrize("stepper", STEPPERS, ids=lambda s: s.name)
+@pytest.mark.parametrize("law", ["hertz", "linear"])
+@pytest.mark.parametrize("stiffness", [1.0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
+@pytest.mark.parametrize("excess", [1.0, 1e-2, 1e-4, 1e-6, 1e-8], ids=lambda e: f"excess{e:g}")
+def test_back_after_whole_periods(stepper, law, stiffness, excess):
+    place = 0.3
+    speed = place * (1 + excess)
+    make, power = {"hertz": (vk.Hertz, 1.5), "linear": (vk.Linear, 1.0)}[law]
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.0, barriers=(vk.Barrier(make(stiffness), place, "right"),)
+    )
+    period = exact_period(stiffness, power, place, speed)
+    path = osc.trajectory([0.0, speed], duration=CYCLES * period, samples=1, stepper=stepper)
+    np.testing.assert_allclose(path.states[-1], [0.0, speed], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("stepper", STEPPERS, ids=lambda s: s.name)
+@pytest.mark.parametrize("stiffness", [1.0, 1e6, 1e12])
+def test_zero_gap(stepper, stiffness):
+    """Both stops at 0: a mass that is always in one of them."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.0,
+        barriers=(vk.Barrier(vk.Hertz(stiffness), 0.0, "right"), vk.Barrier(vk.Hertz(stiffness), 0.0, "left")),
+    )
+    half = exact_period(stiffness, 1.5, 0.0, 0.8) - np.pi  # the right half; the left one is its mirror image
+    path = osc.trajectory([0.0, 0.8], duration=CYCLES * 2 * half, samples=1, stepper=stepper)
+    np.testing.assert_allclose(path.states[-1], [0.0, 0.8], rtol=0, atol=1e-8)

@@ -1,0 +1,234 @@
+"""Scenes: paths of parameters, changes, common periods, the time from section to section."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.errors import NoSectionError, ParameterError, SceneError
+
+
+def scene(*excitations, **more):
+    return vk.Oscillator(**{"natural_frequency": 2.0, "damping_ratio": 0.01} | more, excitations=excitations)
+
+
+def harmonic(frequency, amplitude=0.1):
+    return vk.Harmonic(amplitude, frequency)
+
+
+@pytest.fixture
+def full():
+    return vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.01,
+        spring=vk.CustomSpring("a*x + b*x**3", a=1.0, b=0.1),
+        barriers=(
+            vk.Barrier(vk.Hertz(50.0), 0.5, "right"),
+            vk.Barrier(vk.CustomLaw("k*depth", k=40.0), -0.5, "left"),
+        ),
+        excitations=(vk.Harmonic(0.18, 0.57), vk.Constant(0.2)),
+        noise=vk.StateDependentNoise(2e-5, "1 + c*x", c=0.3),
+    )
+
+
+class TestParameters:
+    def test_paths(self, full):
+        assert full.parameters == {
+            "natural_frequency": 1.0,
+            "damping_ratio": 0.01,
+            "spring.formula": "a*x + b*x**3",
+            "spring.a": 1.0,
+            "spring.b": 0.1,
+            "barriers.0.position": 0.5,
+            "barriers.0.law.stiffness": 50.0,
+            "barriers.1.position": -0.5,
+            "barriers.1.law.formula": "k*depth",
+            "barriers.1.law.k": 40.0,
+            "excitations.0.amplitude": 0.18,
+            "excitations.0.frequency": 0.57,
+            "excitations.0.phase": 0.0,
+            "excitations.1.force": 0.2,
+            "noise.intensity": 2e-5,
+            "noise.amplitude": "1 + c*x",
+            "noise.c": 0.3,
+        }
+
+    def test_every_path_can_be_replaced(self, full):
+        for path, value in full.parameters.items():
+            new = f"1.5*({value})" if isinstance(value, str) else value + 0.0625
+            changed = full.replace({path: new})
+            assert changed.parameters == full.parameters | {path: new}
+            assert type(changed) is vk.Oscillator
+            assert changed != full
+        assert full.replace({}) == full
+
+    def test_several_at_once_are_checked_together(self, full):
+        moved = full.replace({"barriers.0.position": -1.0, "barriers.1.position": -2.0})
+        assert [barrier.position for barrier in moved.barriers] == [-1.0, -2.0]
+        with pytest.raises(SceneError, match="the left stop, at -0.5, is to the right of the right stop, at -1"):
+            full.replace({"barriers.0.position": -1.0})
+
+    @pytest.mark.parametrize(
+        ("path", "said"),
+        [
+            ("excitations.0.freqency", "the nearest is 'excitations.0.frequency'"),
+            ("barriers.7.position", "the nearest is 'barriers.1.position'"),
+            ("barriers", "."),
+            ("barriers.0.side", "."),
+            ("", "there are "),
+            (3, "there are "),
+            ("x" * 10000, "there are "),
+        ],
+    )
+    def test_unknown_paths(self, full, path, said):
+        with pytest.raises(ParameterError) as refused:
+            full.replace({path: 1.0})
+        message = str(refused.value)
+        assert message.startswith("scene has no parameter ")
+        assert said in message
+        assert message.endswith(".")
+        assert len(message) < 600
+
+    def test_replaced_values_are_checked(self, full):
+        with pytest.raises(ParameterError, match="Hertz: stiffness is -1; give a finite number at least 0"):
+            full.replace({"barriers.0.law.stiffness": -1.0})
+
+    def test_values(self, full):
+        assert pickle.loads(pickle.dumps(full)) == full
+        assert hash(full) == hash(full.replace({}))
+        _ = full.model  # looked at: what it derived does not travel
+        assert pickle.loads(pickle.dumps(full)) == full
+        assert len(pickle.dumps(full)) < 3000
+
+    def test_sequences_become_tuples(self):
+        osc = vk.Oscillator(
+            natural_frequency=1.0, damping_ratio=0.1, barriers=[vk.Barrier(vk.Hertz(1.0), 0.5, "right")],
+            excitations=(e for e in [harmonic(1.0)]),
+        )  # fmt: skip
+        assert isinstance(osc.barriers, tuple)
+        assert isinstance(osc.excitations, tuple)
+        assert hash(osc) == hash(osc.replace({}))
+
+
+class TestPeriods:
+    @pytest.mark.parametrize(
+        ("frequencies", "base"),
+        [
+            ((0.57,), 0.57),
+            ((0.57, 0.57), 0.57),
+            ((1.0, 2.0), 1.0),
+            ((2.0, 3.0), 1.0),
+            ((1.0, 1.5, 2.5), 0.5),
+            ((0.3, 0.7), 0.1),
+            ((1.0, 1.001), 0.001),
+            ((0.1, 0.3, 0.7), 0.1),
+            ((1 / 3, 1 / 7), 1 / 21),
+        ],
+    )
+    def test_common_period(self, frequencies, base):
+        osc = scene(*map(harmonic, frequencies))
+        period = osc.period
+        for frequency in frequencies:
+            cycles = period * frequency / (2 * math.pi)
+            assert cycles == pytest.approx(round(cycles), abs=1e-9)
+            assert round(cycles) >= 1
+        assert period == pytest.approx(2 * math.pi / base, rel=1e-12)
+        assert osc.section_interval == period
+        assert not osc.autonomous
+
+    def test_the_common_period_is_the_least(self):
+        assert scene(harmonic(2.0), harmonic(3.0)).period == pytest.approx(2 * math.pi, rel=1e-14)
+        assert scene(harmonic(4.0), harmonic(6.0)).period == pytest.approx(math.pi, rel=1e-14)
+
+    def test_order_does_not_matter(self):
+        assert scene(harmonic(2.0), harmonic(3.0)).period == scene(harmonic(3.0), harmonic(2.0)).period
+
+    @pytest.mark.parametrize("excitations", [(), (vk.Constant(0.2),)], ids=["nothing", "constant"])
+    def test_autonomous(self, excitations):
+        osc = scene(*excitations)
+        assert osc.autonomous
+        assert osc.period is None
+        assert osc.section_interval == math.pi  # 2π/ω_n
+        assert osc.time_unit == math.pi
+
+    def test_a_constant_changes_no_period(self):
+        assert scene(harmonic(0.57), vk.Constant(0.2)).period == 2 * math.pi / 0.57
+
+
+INCOMMENSURATE = {"√2": (1.0, math.sqrt(2)), "nearly 1": (1.0, 1.0000001), "1009/1013": (1.009, 1.013)}
+
+
+@pytest.mark.parametrize("frequencies", INCOMMENSURATE.values(), ids=INCOMMENSURATE)
+class TestWithoutSection:
+    def test_it_is_a_scene(self, frequencies):
+        osc = scene(*map(harmonic, frequencies))
+        assert not osc.autonomous
+        assert osc.replace({"damping_ratio": 0.5}).damping_ratio == 0.5
+        assert osc.time_unit == math.pi
+
+    def test_the_section_is_refused(self, frequencies):
+        osc = scene(*map(harmonic, frequencies))
+        for ask in (lambda: osc.period, lambda: osc.section_interval):
+            with pytest.raises(NoSectionError, match=r"^scene: excitations of periods .* no common period.*1000\.$"):
+                ask()
+
+
+class Pulse(vk.Excitation):
+    """A push that never comes again."""
+
+    height: float = vk.parameter("P", "m s^-2")
+
+    def force(self, t):
+        return self.height / (1 + t**2)
+
+    @property
+    def period(self):
+        return math.inf
+
+
+def test_an_excitation_that_never_repeats():
+    osc = scene(Pulse(0.3), harmonic(1.0))
+    assert not osc.autonomous
+    with pytest.raises(NoSectionError, match=r"^scene: an excitation never repeats, so there is no section; .*\.$"):
+        _ = osc.section_interval
+    with pytest.raises(NoSectionError, match="never repeats"):
+        osc.section_map([[0.0, 0.0]], stepper=vk.RK4())
+    path = scene(Pulse(0.3)).trajectory((0.0, 0.0), duration=6.0, stepper=vk.RK4(steps=64))
+    exact = scene(Pulse(0.3)).trajectory((0.0, 0.0), duration=6.0, stepper=vk.RK4(steps=512))
+    assert path.x[-1] == pytest.approx(exact.x[-1], rel=1e-6)
+    assert 0.01 < abs(path.x).max() < 0.3
+
+
+@pytest.mark.parametrize("period", [0, 0.0, -1.0, math.nan, "1", True, [1.0]])
+def test_a_period_is_a_positive_number(period):
+    class Strange(vk.Excitation):
+        def force(self, t):
+            return 0
+
+        @property
+        def period(self):
+            return period
+
+    with pytest.raises(SceneError, match=r"^scene: excitations\.0, a Strange, has the period .*; give a positive.*\.$"):
+        scene(Strange())
+
+
+def test_repeats_after():
+    forced, free = scene(harmonic(1.0)), scene()
+    assert forced.repeats_after(2 * math.pi)
+    assert forced.repeats_after(10 * math.pi)
+    assert not forced.repeats_after(math.pi)
+    assert not forced.repeats_after(2.1 * math.pi)
+    assert free.repeats_after(0.123)
+    assert not scene(harmonic(1.0), harmonic(math.sqrt(2))).repeats_after(2 * math.pi)
+
+
+def test_a_multi_harmonic_orbit_has_the_common_period():
+    """Two harmonics whose common period is twice the longest: states repeat after that and not before."""
+    osc = scene(harmonic(2.0), harmonic(3.0), damping_ratio=0.5)
+    settled = osc.section_map([[0.0, 0.0]], periods=20, stepper=vk.RK4())
+    assert np.abs(osc.section_map(settled, stepper=vk.RK4()) - settled).max() < 1e-8
+    half = osc.trajectory(settled[0], duration=math.pi, stepper=vk.RK4())
+    assert abs(half.states[-1] - settled[0]).max() > 1e-3

@@ -1,0 +1,42 @@
+"""Without forcing and damping a conservative scene keeps its energy; with damping it loses what friction takes."""
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+
+
+def energy(x, v, k, b, power):
+    depth = np.maximum(np.abs(x) - b, 0.0)
+    return 0.5 * v**2 + 0.5 * x**2 + k * depth ** (power + 1) / (power + 1)
+
+
+@pytest.mark.parametrize(
+    ("stepper", "tolerance"), [(vk.Order8(1e-14), 1e-11), (vk.FreeFlight(1e-14), 1e-11), (vk.RK4(4096), 2e-6)], ids=str
+)
+@pytest.mark.parametrize(("law", "power"), [(vk.Hertz(50.0), 1.5), (vk.Linear(300.0), 1.0)], ids=["hertz", "linear"])
+def test_energy_is_kept(stepper, tolerance, law, power):
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.0,
+        barriers=(vk.Barrier(law, 0.3, "right"), vk.Barrier(law, -0.3, "left")),
+    )
+    path = osc.trajectory([0.1, 0.8], 20, stepper=stepper, samples=64)
+    values = energy(path.x, path.v, law.stiffness, 0.3, power)
+    assert np.abs(values / values[0] - 1).max() < tolerance
+    assert np.abs(path.x).max() > 0.31  # it did hit the stops
+
+
+@pytest.mark.parametrize("stepper", [vk.Order8(1e-12), vk.FreeFlight(1e-12), vk.RK4(4096)], ids=str)
+def test_friction_takes_what_it_should(stepper):
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(vk.Hertz(50.0), 0.3, "right"),)
+    )
+    path = osc.trajectory([0.0, 0.8], 5, stepper=stepper, samples=4000)
+    depth = np.maximum(path.x - 0.3, 0.0)
+    values = 0.5 * path.v**2 + 0.5 * path.x**2 + 50.0 * depth**2.5 / 2.5
+    step = path.t[1] - path.t[0]
+    power = -2 * 0.05 * path.v**2
+    # Simpson's rule over the samples, an even number of intervals.
+    work = step / 3 * (power[0] + 4 * power[1::2].sum() + 2 * power[2:-1:2].sum() + power[-1])
+    assert values[-1] - values[0] == pytest.approx(work, abs=2e-8)

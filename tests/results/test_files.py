@@ -1,0 +1,72 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.errors import VibrokitError
+from vibrokit.results.files import ResultFileError
+
+
+@pytest.fixture(scope="module")
+def result():
+    osc = vk.load_scene("double-well")
+    return vk.ActionPlot(points=100).run(osc, vk.find_structure(osc, cells=(40, 40), starts=(6, 6)))
+
+
+def test_round_trip(result, tmp_path):
+    result.save(tmp_path / "r.nc")
+    again = vk.load_result(tmp_path / "r.nc")
+    assert type(again) is type(result)
+    for name in ("scene", "settings", "status", "seconds", "versions", "seed"):
+        assert getattr(again, name) == getattr(result, name)
+    for old, new in zip(result.energies, again.energies, strict=True):
+        for name in ("source", "target", "value", "lower", "upper", "method", "residual"):
+            assert getattr(old, name) == getattr(new, name)
+        for name in ("t", "q", "p", "action", "section"):
+            np.testing.assert_array_equal(getattr(old.path, name), getattr(new.path, name))
+    for name in result.data.data_vars:
+        np.testing.assert_array_equal(result.data[name].values, again.data[name].values)
+
+
+def test_opens_and_plots_without_numba_or_sympy(result, tmp_path):
+    result.save(tmp_path / "r.nc")
+    code = (
+        "import sys, vibrokit as vk\n"
+        f"r = vk.load_result({str(tmp_path / 'r.nc')!r})\n"
+        "r.plot()[0].get_figure().savefig(sys.argv[1]); r.plot_paths()\n"
+        "assert not {'numba', 'sympy'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "p.png")], check=True, capture_output=True)
+    assert (tmp_path / "p.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("content", [b"", b"not a result", b"CDF\x01" + bytes(200), b"\x80\x04\x95pickle"])
+def test_strange_files_are_refused_in_a_sentence(content, tmp_path):
+    (tmp_path / "bad.nc").write_bytes(content)
+    with pytest.raises(ResultFileError, match="no result"):
+        vk.load_result(tmp_path / "bad.nc")
+
+
+def test_a_truncated_file_is_refused(result, tmp_path):
+    result.save(tmp_path / "r.nc")
+    whole = (tmp_path / "r.nc").read_bytes()
+    (tmp_path / "r.nc").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(VibrokitError):
+        vk.load_result(tmp_path / "r.nc")
+
+
+def test_a_failed_save_leaves_the_old_file(result, tmp_path, monkeypatch):
+    target = tmp_path / "r.nc"
+    result.save(target)
+    before = target.read_bytes()
+
+    def fail(*arguments):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("os.replace", fail)
+    with pytest.raises(OSError, match="disk full"):
+        result.save(target)
+    assert target.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [target]

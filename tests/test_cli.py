@@ -1,0 +1,88 @@
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from vibrokit.cli import main
+
+QUICK = ["--cells", "50", "--set", "points=200"]
+
+
+def test_run_prints_a_table_and_saves_a_figure(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "double-well", *QUICK, "-o", "r.nc"]) == 0
+    out = capsys.readouterr().out
+    assert "equilibrium" in out
+    assert "ΔU" in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["double-well-action-plot.png", "r.nc"]
+    assert main(["plot", "r.nc"]) == 0
+    assert (tmp_path / "r.png").stat().st_size > 5000
+
+
+def test_json_is_one_object_of_the_promised_shape(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "double-well", *QUICK, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert list(record) == ["scene", "attractors", "saddles", "energies", "versions", "seed", "seconds"]
+    assert list(record["attractors"][0]) == ["label", "kind", "period", "impacts", "points", "basin_fraction"]
+    assert list(record["energies"][0]) == ["source", "target", "method", "value", "lower", "upper", "residual"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_equations(capsys):
+    assert main(["equations", "hertz-0.570"]) == 0
+    assert "p_2" in capsys.readouterr().out
+    assert main(["equations", "hertz-0.570", "--latex"]) == 0
+    assert r"\dot{x}" in capsys.readouterr().out
+
+
+def test_list(capsys):
+    assert main(["list"]) == 0
+    out = capsys.readouterr().out
+    for name in ("hertz", "linear", "custom", "cubic", "harmonic", "white", "action-plot", "hertz-0.525"):
+        assert name in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "herz-0.570"], "hertz-0.570"),
+        (["run", "double-well", "--set", "ponts=3"], "points"),
+        (["run", "double-well", "--set", "points"], "FIELD=NUMBER"),
+        (["run", "double-well", "--cells", "1"], "--cells"),
+        (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
+        (["plot", "nothing.nc"], "nothing.nc"),
+        (["check", "herz"], "hertz"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_status_two(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err.strip()
+    assert error.startswith("vibrokit: ")
+    assert words in error
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_is_quick_and_light():
+    # Half a second is generous for a busy machine; alone it takes a tenth of that.
+    times = []
+    for _ in range(3):
+        began = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "vibrokit.cli", "--help"], check=True, capture_output=True)
+        times.append(time.perf_counter() - began)
+    assert min(times) < 0.5
+
+
+def test_interrupting_leaves_nothing_half_written(tmp_path, monkeypatch, capsys):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("vibrokit.structure.find.run_ensemble", interrupt)
+    assert main(["run", "double-well", *QUICK, "-o", "r.nc"]) == 130
+    assert not list(Path(tmp_path).iterdir())
