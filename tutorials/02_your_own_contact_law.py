@@ -1,8 +1,8 @@
 """Your own contact law
 
 Real stops do not give back all they take. Hunt and Crossley's law adds to Hertz's a loss that grows with the rate at
-which the mass goes deeper, :math:`F = k\\,\\delta^{3/2} (1 + \\tfrac32 c\\,\\dot\\delta)`. A slow mass that meets such a
-stop with speed :math:`v` comes back with :math:`(1 - c v)\\,v`, whatever the stiffness.
+which the mass goes deeper, :math:`F = k\\,\\delta^{3/2} (1 + \\tfrac32 c\\,\\dot\\delta)`. A slow mass that meets such
+a stop with speed :math:`v` comes back with :math:`(1 - c v)\\,v`, whatever the stiffness.
 
 This tutorial writes that law in three ways: as a formula, as a class, and as a plug-in that scene files can name. It
 shows that all three are one and the same motion, measures what a bounce costs, has the law examined by the
@@ -46,14 +46,14 @@ class HuntCrossley(vk.ContactLaw):
     """Hertz's law with Hunt and Crossley's loss: k δ^(3/2) (1 + (3/2) c δ′)."""
 
     stiffness: float = vk.parameter("k", "m^(-1/2) s^-2", minimum=0)
-    loss: float = vk.parameter("c", "s m^-1", minimum=0)
+    dissipation: float = vk.parameter("c", "s m^-1", minimum=0)
 
     def force(self, depth, rate):
         """Push on the mass."""
-        return self.stiffness * depth ** Rational(3, 2) * (1 + Rational(3, 2) * self.loss * rate)
+        return self.stiffness * depth ** Rational(3, 2) * (1 + Rational(3, 2) * self.dissipation * rate)
 
 
-BY_CLASS = HuntCrossley(stiffness=50.0, loss=0.2)
+BY_CLASS = HuntCrossley(stiffness=50.0, dissipation=0.2)
 
 # ---------------------------------------------------------------------------------------------------------------------
 # 3. As a plug-in
@@ -65,13 +65,14 @@ PYPROJECT = """
 [project]
 name = "vibrokit-hunt-crossley"
 version = "0.1.0"
-dependencies = ["vibrokit"]
+dependencies = ["vibrokit>=0.1"]
 
 [project.entry-points."vibrokit.contact_laws"]
 hunt-crossley = "vibrokit_hunt_crossley:HuntCrossley"
 """
 
-# That distribution exists, in plugins/vibrokit-hunt-crossley. Installed, its law has a name like any other:
+# That distribution exists, in plugins/vibrokit-hunt-crossley; its law has the exponent as a third parameter, 3/2 unless
+# given. Once it is installed, the law has a name like any other:
 
 SCENE_FILE = """
 natural_frequency = 1.0
@@ -154,16 +155,16 @@ def free_mass(law):
     )
 
 
-def restitution(loss, speed):
+def restitution(dissipation, speed):
     """Return speed after over speed before, of a mass that starts at the stop."""
-    mass = free_mass(HuntCrossley(stiffness=50.0, loss=loss))
+    mass = free_mass(HuntCrossley(stiffness=50.0, dissipation=dissipation))
     ((_, after),) = mass.section_map([[0.0, speed]], stepper=vk.RK4(steps=8192))
     return -after / speed
 
 
-def bounce(loss, speed):
+def bounce(dissipation, speed):
     """Return depth and push while in contact. The method of a law takes numbers as well as symbols."""
-    law = HuntCrossley(stiffness=50.0, loss=loss)
+    law = HuntCrossley(stiffness=50.0, dissipation=dissipation)
     path = free_mass(law).trajectory((0.0, speed), duration=2.0, samples=4096, stepper=vk.RK4(steps=8192))
     depth, rate = path.x[path.x >= 0], path.v[path.x >= 0]
     return depth, np.array([float(law.force(*state)) for state in zip(depth, rate, strict=True)])
@@ -174,11 +175,11 @@ def measure_bounces():
     print("c v      1 - c v    restitution")
     table = {}
     for product in (0.01, 0.1, 0.4):
-        table[product] = restitution(loss=product, speed=1.0)
+        table[product] = restitution(dissipation=product, speed=1.0)
         print(f"{product:<7g}  {1 - product:<9.4f}  {table[product]:.6f}")
-    depth, force = bounce(loss=0.2, speed=1.0)
+    depth, force = bounce(dissipation=0.2, speed=1.0)
     area = np.trapezoid(force, depth)
-    cost = (1 - restitution(loss=0.2, speed=1.0) ** 2) / 2
+    cost = (1 - restitution(dissipation=0.2, speed=1.0) ** 2) / 2
     print(f"a bounce at c v = 0.2 costs {cost:.6f} of 0.5; the loop has the area {area:.6f}")
     return SimpleNamespace(restitution=table, cost=cost, area=area)
 
@@ -215,8 +216,8 @@ class Pressed(vk.ContactLaw):
 
 
 MISTAKES = {
-    "a negative stiffness": lambda: HuntCrossley(stiffness=-50.0, loss=0.2),
-    "a loss that is no number": lambda: HuntCrossley(stiffness=50.0, loss=math.nan),
+    "a negative stiffness": lambda: HuntCrossley(stiffness=-50.0, dissipation=0.2),
+    "a dissipation that is no number": lambda: HuntCrossley(stiffness=50.0, dissipation=math.nan),
     "a slip of the pen": lambda: vk.CustomLaw("k*depth**1.5*(1 + 1.5*c*rat)", k=50.0, c=0.2),
     "a formula that tries to run code": lambda: vk.CustomLaw("__import__('os').system('echo got in')"),
     "a law that pushes at rest": lambda: check_contact_law(Pressed),
@@ -240,10 +241,10 @@ def make_mistakes():
 
 
 def draw_loops(axes):
-    """Draw force against depth through a bounce, for three losses; the enclosed area is the energy lost."""
-    for loss in (0.0, 0.2, 0.4):
-        depth, force = bounce(loss, speed=1.0)
-        axes.plot(depth, force, linewidth=1.2, label=f"$c$ = {loss:g} s/m")
+    """Draw force against depth through a bounce, for three dissipations; the enclosed area is the energy lost."""
+    for dissipation in (0.0, 0.2, 0.4):
+        depth, force = bounce(dissipation, speed=1.0)
+        axes.plot(depth, force, linewidth=1.2, label=f"$c$ = {dissipation:g} s/m")
     axes.set_xlabel(r"depth $\delta$ (m)")
     axes.set_ylabel(r"push on the mass (m s$^{-2}$)")
     axes.legend(fontsize=8)

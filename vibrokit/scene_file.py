@@ -199,7 +199,7 @@ def _part(place: str, group: Group, kind: type, data: Any) -> Any:
         raise SceneError(f"{place} is {shown(data)}; write a table with the part's name and its parameters.")
     if len(data["name"]) > _LONGEST_NAME:
         raise SceneError(f"{place} has the name {shown(data['name'])}; a name has at most {_LONGEST_NAME} characters.")
-    part = load(group, data["name"], kind)
+    part: type = load(group, data["name"], kind)
     values = {key: value for key, value in data.items() if key != "name"}
     accepted = inspect.signature(part).parameters.values()
     open_ended = any(p.kind is p.VAR_KEYWORD for p in accepted)

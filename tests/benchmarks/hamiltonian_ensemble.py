@@ -36,6 +36,7 @@ NATURAL = NUMBERS["natural_frequency"]
 DAMPING = 2 * NUMBERS["damping_ratio"] * NATURAL
 SQUARE = NATURAL**2
 GAP, STIFFNESS = NUMBERS["barriers.0.position"], NUMBERS["barriers.0.law.stiffness"]
+SLOPE = 1.5 * STIFFNESS
 AMPLITUDE, FREQUENCY = NUMBERS["excitations.0.amplitude"], NUMBERS["excitations.0.frequency"]
 CONSTANT = NUMBERS["excitations.1.force"]
 H = 2 * math.pi / FREQUENCY / STEPS
@@ -47,36 +48,39 @@ Array = NDArray[np.float64]
 Contestant = Callable[[Array, int], Array]
 
 
-# --- the right-hand side, by hand, with the contact in three forms
+# --- the right-hand side, by hand, with the contact in three forms; what arrives last, the root, is used last
 
 
 @njit(**FLAGS)
 def folded(x, v, p, q, f):
     """By symmetry: one depth, one root, no choice."""
     depth = max(abs(x) - GAP, 0.0)
-    root = STIFFNESS * math.sqrt(depth)
-    force = -math.copysign(root * depth, x)
-    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+    root = math.sqrt(depth)
+    free_flight = f - SQUARE * x - DAMPING * v + q
+    push = math.copysign(STIFFNESS * depth, x)
+    return v, free_flight - push * root, q * (SQUARE + SLOPE * root), DAMPING * q - p, 0.5 * q * q
 
 
 @njit(**FLAGS)
 def both_stops(x, v, p, q, f):
     """Each stop by itself, without a branch."""
     right, left = max(x - GAP, 0.0), max(-GAP - x, 0.0)
-    pull, push = STIFFNESS * math.sqrt(right), STIFFNESS * math.sqrt(left)
-    force, root = push * left - pull * right, pull + push
-    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+    one, other = math.sqrt(right), math.sqrt(left)
+    free_flight = f - SQUARE * x - DAMPING * v + q
+    force = STIFFNESS * left * other - STIFFNESS * right * one
+    return v, free_flight + force, q * (SQUARE + SLOPE * (one + other)), DAMPING * q - p, 0.5 * q * q
 
 
 @njit(**FLAGS)
 def branching(x, v, p, q, f):
     """A predicted branch costs less than waiting for a square root."""
     depth = abs(x) - GAP
+    free_flight = f - SQUARE * x - DAMPING * v + q
     if depth <= 0.0:
-        return v, f - DAMPING * v - SQUARE * x + q, q * SQUARE, DAMPING * q - p, 0.5 * q * q
-    root = STIFFNESS * math.sqrt(depth)
-    force = -math.copysign(root * depth, x)
-    return v, f - DAMPING * v - SQUARE * x + force + q, q * (SQUARE + 1.5 * root), DAMPING * q - p, 0.5 * q * q
+        return v, free_flight, q * SQUARE, DAMPING * q - p, 0.5 * q * q
+    root = math.sqrt(depth)
+    push = math.copysign(STIFFNESS * depth, x)
+    return v, free_flight - push * root, q * (SQUARE + SLOPE * root), DAMPING * q - p, 0.5 * q * q
 
 
 def runge_kutta(slopes):
@@ -106,21 +110,25 @@ def lane_packed(slopes) -> Contestant:
     step = runge_kutta(slopes)
 
     @njit(**FLAGS)
-    def packed_step(x, v, p, q, s, f0, f1, f2):
+    def packed_step(z, f0, f1, f2):
         for i in range(LANES):
-            x[i], v[i], p[i], q[i], s[i] = step(x[i], v[i], p[i], q[i], s[i], f0, f1, f2)
+            z[0, i], z[1, i], z[2, i], z[3, i], z[4, i] = step(z[0, i], z[1, i], z[2, i], z[3, i], z[4, i], f0, f1, f2)
+
+    @njit(**FLAGS)
+    def packed_block(starts, final, periods, forcing):
+        z = np.empty((5, LANES))
+        z[:] = starts.T
+        for _ in range(periods):
+            for k in range(STEPS):
+                packed_step(z, forcing[2 * k], forcing[2 * k + 1], forcing[2 * k + 2])
+        final[:] = z.T
 
     @njit(**FLAGS, parallel=True)
     def run(starts, periods, forcing):
         final = np.empty_like(starts)
         for block in prange(starts.shape[0] // LANES):
             here = slice(block * LANES, (block + 1) * LANES)
-            z = starts[here].T.copy()
-            for _ in range(periods):
-                for k in range(STEPS):
-                    f0, f1, f2 = forcing[2 * k], forcing[2 * k + 1], forcing[2 * k + 2]
-                    packed_step(z[0], z[1], z[2], z[3], z[4], f0, f1, f2)
-            final[here] = z.T
+            packed_block(starts[here], final[here], periods, forcing)
         return final
 
     return lambda starts, periods: run(starts, periods, FORCING)

@@ -67,7 +67,7 @@ class TestParameters:
     def test_several_at_once_are_checked_together(self, full):
         moved = full.replace({"barriers.0.position": -1.0, "barriers.1.position": -2.0})
         assert [barrier.position for barrier in moved.barriers] == [-1.0, -2.0]
-        with pytest.raises(SceneError, match="the left stop, at -0.5, is to the right of the right stop, at -1"):
+        with pytest.raises(SceneError, match=r"the left stop, at -0\.5, is to the right of the right stop, at -1"):
             full.replace({"barriers.0.position": -1.0})
 
     @pytest.mark.parametrize(

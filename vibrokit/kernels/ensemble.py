@@ -112,7 +112,7 @@ def run_ensemble(
     """
     kernel = kernel_for(scene, flow, stepper)
     starts = np.ascontiguousarray(states, dtype=float)
-    budgets = np.ascontiguousarray(np.broadcast_to(np.asarray(budget, dtype=np.int64), len(starts)))
+    budgets = np.broadcast_to(budget, len(starts))
     span = scene.section_interval if interval is None else interval
     common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)))
     tasks = []
@@ -138,10 +138,17 @@ def _advance_block(
 ) -> Ensemble:
     count = len(starts)
     ended = Ensemble(np.empty_like(starts), *(np.zeros(count, dtype=np.int64) for _ in range(3)))
-    tests = (stop.region, stop.labels, stop.home, stop.points, stop.point_labels, stop.tolerance)
+    starts, region, points = (_plain(array, float) for array in (starts, stop.region, stop.points))
+    budget, point_labels = _plain(budget, np.int64), _plain(stop.point_labels, np.int64)
+    tests = (region, _plain(stop.labels, np.int16), stop.home, points, point_labels, stop.tolerance)
     outputs = (ended.states, ended.intervals, ended.status, ended.label)
     kernel.module.advance(starts, *common, *streams, budget, *tests, *outputs)
     return ended
+
+
+def _plain(array: Array, kind: type) -> Array:
+    """The same numbers as Numba sees them always: a read-only or strided array would be compiled for anew."""
+    return np.require(array, kind, ("C", "W"))
 
 
 def _joined(parts: list[Ensemble], equations: int) -> Ensemble:

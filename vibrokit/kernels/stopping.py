@@ -5,6 +5,7 @@ Compiled into every stepper, so that an ensemble stops trajectory by trajectory 
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 RAN_OUT = 0  # nothing stopped it: the budget of intervals is spent
 LEFT_REGION = 1
@@ -15,7 +16,16 @@ STALLED = 5  # the step limit of one interval was not enough
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def section_status(x, v, region, labels, home, points, point_labels, tolerance):
+def section_status(
+    x: float,
+    v: float,
+    region: NDArray[np.float64],
+    labels: NDArray[np.int8],
+    home: int,
+    points: NDArray[np.float64],
+    point_labels: NDArray[np.int64],
+    tolerance: float,
+) -> tuple[int, int]:
     """Decide whether a trajectory stops at this section, and with which label.
 
     Parameters
@@ -50,17 +60,17 @@ def section_status(x, v, region, labels, home, points, point_labels, tolerance):
         if distance <= least:
             nearest, least = k, distance
     if nearest >= 0:
-        return REACHED, point_labels[nearest]
+        return REACHED, int(point_labels[nearest])
     if labels.size > 0:
         label = labels[
             _cell(x, region[0, 0], region[0, 1], labels.shape[0]),
             _cell(v, region[1, 0], region[1, 1], labels.shape[1]),
         ]
         if label >= 0 and label != home:
-            return LEFT_BASIN, np.int64(label)
+            return LEFT_BASIN, int(label)
     return RAN_OUT, -1
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _cell(value, low, high, count):
+def _cell(value: float, low: float, high: float, count: int) -> int:
     return min(int((value - low) / (high - low) * count), count - 1)

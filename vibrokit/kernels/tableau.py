@@ -2,7 +2,7 @@
 
 Hairer, Norsett and Wanner, "Solving Ordinary Differential Equations I", section II.10 (the method of DOP853).
 ``STAGES`` slopes make a step: stage ``s`` stands at the fraction ``NODES[s]`` and is built with row ``s`` of
-``WEIGHTS``; ``RESULT`` combines the slopes into the step of order 8, ``FIFTH`` and ``THIRD`` into its two error estimates.
+``WEIGHTS``; ``RESULT`` combines the slopes into the step of order 8, ``FIFTH`` and ``THIRD`` into two error estimates.
 """
 
 import numpy as np

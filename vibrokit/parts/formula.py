@@ -75,7 +75,7 @@ class Formula:
         FormulaError
             If a name has no value, or the formula comes to something infinite or not real.
         """
-        from vibrokit.parts.formula_expression import build  # noqa: PLC0415
+        from vibrokit.parts.formula_expression import build
 
         return build(self.text, syntax_tree(self.text), self.names, values)
 
@@ -144,7 +144,6 @@ def _check_constants(text: str, tree: ast.expr) -> None:
     degrees: dict[ast.expr, float] = {}  # largest product of exponents on a way down from the node
     for node in bottom_up(tree):
         parts = operands(node)
-        constants[node] = _constant(text, node, [constants[part] for part in parts])
         degrees[node] = max((degrees[part] for part in parts), default=1.0)
         if _is_power(node):
             exponent = constants[parts[1]]
@@ -155,6 +154,7 @@ def _check_constants(text: str, tree: ast.expr) -> None:
                 raise refusal(text, parts[1].col_offset, f"{problem}; at most {LARGEST_EXPONENT} is allowed")
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div) and constants[node.right] == 0:
             raise refusal(text, node.right.col_offset, "it divides by zero; a divisor must not be 0")
+        constants[node] = _constant(text, node, [constants[part] for part in parts])
 
 
 def _check_exponent(text: str, exponent: ast.expr, value: float | None) -> None:

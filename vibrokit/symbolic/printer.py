@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -12,11 +14,33 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
     """Python printer that writes powers so that loops over lanes can be vectorised.
 
     Whole powers become products and half-integer ones products with a square root: a call of ``pow`` would keep
-    the loop scalar and cost eight times as much.
+    the loop scalar and cost eight times as much. The compiler keeps the order of sums and products, so square roots
+    and the symbols that arrive last are written last: nothing that need not wait for them does.
+
+    Parameters
+    ----------
+    arrival : dict, optional
+        Symbols with their places in the order in which values become known; 0 for those not named.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, arrival: Mapping[sympy.Symbol, int] | None = None) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
+        self._arrival = arrival or {}
+
+    def _as_ordered_terms(self, expression: sympy.Expr, order: str | None = None) -> list[sympy.Expr]:
+        terms = super()._as_ordered_terms(expression, order=order)
+        return sorted(terms, key=lambda term: max((self._arrival.get(s, 0) for s in term.free_symbols), default=0))
+
+    def _print_Mul(self, expression: sympy.Mul) -> str:
+        roots = [factor for factor in expression.args if _is_root(factor)]
+        if not roots:
+            return str(super()._print_Mul(expression))
+        others = sympy.Mul(*(factor for factor in expression.args if factor not in roots))
+        product = "*".join("*".join(self._factors(*root.args)) for root in roots)
+        if abs(others) == 1:
+            return f"-{product}" if others == -1 else product
+        text = self._print(others)
+        return f"({text})*{product}" if others.is_Add else f"{text}*{product}"
 
     def _print_Float(self, expression: sympy.Float) -> str:
         return repr(float(expression))
@@ -33,6 +57,8 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
     def _print_NumberSymbol(self, expression: sympy.NumberSymbol) -> str:
         return repr(float(expression))
 
+    _print_Pi = _print_Exp1 = _print_NumberSymbol
+
     def _print_Pow(self, expression: sympy.Pow, rational: bool = False) -> str:
         base, exponent = expression.args
         if exponent.is_Rational and exponent.q in (1, 2) and abs(exponent) <= _LARGEST_PRODUCT:
@@ -40,13 +66,16 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
         return f"({self._print(base)})**({self._print(exponent)})"
 
     def _product(self, base: sympy.Expr, exponent: sympy.Rational) -> str:
-        factor = f"({self._print(base)})" if not base.is_Symbol else self._print(base)
-        whole, root = divmod(abs(exponent), 1)
-        factors = [factor] * int(whole) + [f"sqrt({self._print(base)})"] * (root != 0)
+        factors = self._factors(base, exponent)
         product = "*".join(factors)
         if exponent < 0:
             return f"(1.0/({product}))"
-        return product if len(factors) == 1 and root else f"({product})"
+        return product if exponent == sympy.S.Half else f"({product})"
+
+    def _factors(self, base: sympy.Expr, exponent: sympy.Rational) -> list[str]:
+        factor = f"({self._print(base)})" if not base.is_Symbol else self._print(base)
+        whole, root = divmod(abs(exponent), 1)
+        return [factor] * int(whole) + [f"sqrt({self._print(base)})"] * (root != 0)
 
     def _print_Piecewise(self, expression: sympy.Piecewise) -> str:
         text = "0.0"
@@ -74,6 +103,11 @@ class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
         return text
 
 
+def _is_root(factor: sympy.Expr) -> bool:
+    exponent = factor.exp if factor.is_Pow else sympy.Integer(0)
+    return bool(exponent.is_Rational and exponent.q == 2 and 0 < exponent <= _LARGEST_PRODUCT)
+
+
 def printable(expression: sympy.Expr) -> sympy.Expr:
     """Rewrite what differentiation leaves behind and no compiler knows: steps and spikes at kinks."""
     expression = expression.replace(sympy.DiracDelta, lambda *arguments: sympy.Integer(0))
@@ -81,7 +115,10 @@ def printable(expression: sympy.Expr) -> sympy.Expr:
 
 
 def assignments(
-    targets: dict[str, sympy.Expr], temporary: str, indent: str = "    "
+    targets: dict[str, sympy.Expr],
+    temporary: str,
+    indent: str = "    ",
+    arrival: Mapping[sympy.Symbol, int] | None = None,
 ) -> tuple[list[str], dict[str, str]]:
     """Print expressions with their common parts taken out.
 
@@ -92,7 +129,7 @@ def assignments(
     texts : dict of str
         Text of each target in terms of these.
     """
-    printer = SourcePrinter()
+    printer = SourcePrinter(arrival)
     names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))  # no parameter begins with "_"
     shared, reduced = sympy.cse([printable(e) for e in targets.values()], symbols=names, optimizations=None)
     lines = [f"{indent}{name} = {printer.doprint(value)}" for name, value in shared]

@@ -182,7 +182,8 @@ class _SceneWriter:
     def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:
         nothing = dict.fromkeys(zero, sympy.Integer(0))
         rates = [rate.xreplace(nothing) for rate in self.equations.rates]
-        return assignments(dict(zip(self.variables, rates, strict=True)), "c")
+        arrival = {**dict.fromkeys(self.equations.variables, 1), **dict.fromkeys(self.equations.contacts, 2)}
+        return assignments(dict(zip(self.variables, rates, strict=True)), "c", arrival=arrival)
 
     def _uses(self, name: str) -> bool:
         symbol = next(variable for variable in self.equations.variables if str(variable) == name)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from vibrokit.errors import VibrokitError
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -94,9 +95,12 @@ def hamiltonian_start(states: tuple[float, ...], momentum: float) -> Any:
 def _guarded(work: Callable[[], Any]) -> Any:
     try:
         return work()
+    except VibrokitError:
+        raise
     except Exception as error:
-        first = str(error).strip().splitlines()
+        lines = [line for line in str(error).splitlines() if line and not line.startswith("Failed in")]
+        reason = lines[0] if lines else ""
         raise ConformanceError(
-            f"The formula does not compile ({type(error).__name__}: {first[-1] if first else ''}); use arithmetic and "
-            "the functions of vibrokit.parts.functions only."
+            f"The formula does not compile ({type(error).__name__}: {reason}); use arithmetic and the functions of "
+            "vibrokit.parts.functions only."
         ) from error

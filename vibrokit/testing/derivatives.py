@@ -28,7 +28,10 @@ def derivative(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], orders: S
 
 
 def check_derivatives(
-    subject: Any, value: Function, derived: Iterable[tuple[tuple[int, int], Function]], points: Sequence[tuple[float, ...]]
+    subject: Any,
+    value: Function,
+    derived: Iterable[tuple[tuple[int, int], Function]],
+    points: Sequence[tuple[float, ...]],
 ) -> float:
     """Hold derivatives against central differences of the formula itself; return the largest relative distance."""
     worst = 0.0
@@ -56,6 +59,6 @@ def check_compiled(subject: Any, what: str, point: Any, found: float, exact: Any
     distance = apart(found, exact)
     if distance > CLOSE and not abs(mpmath.mpf(found) - exact) <= bound:
         raise ConformanceError(
-            f"Compiled, {what} of {subject!r} is {found!r} at {point}; its formula gives {mpmath.nstr(exact, 17)} there."
+            f"Compiled, {what} of {subject!r} is {found!r} at {point}; its formula gives {mpmath.nstr(exact, 17)}."
         )
     return distance

@@ -21,6 +21,7 @@ from vibrokit.testing.report import ConformanceError
 
 _STEPS_PER_TIME = 64
 _SECONDS = 300
+_ADVICE = "define the class at the top level of a module that can be imported."
 _MAIN = (
     "import sys, pickle; paths, work = pickle.load(sys.stdin.buffer); sys.path[:] = paths; "
     "from vibrokit.testing.elsewhere import serve; serve(work)"
@@ -41,17 +42,16 @@ def outcome(scene: Oscillator) -> tuple[str, bytes]:
 
 def outcomes_elsewhere(scenes: list[Oscillator]) -> list[tuple[str, bytes]]:
     """Return the outcomes of scenes, computed by another process."""
-    work = pickle.dumps((sys.path, pickle.dumps(scenes)))
     try:
+        work = pickle.dumps((sys.path, pickle.dumps(scenes)))
         process = subprocess.run([sys.executable, "-c", _MAIN], input=work, capture_output=True, timeout=_SECONDS)  # noqa: PLW1510 - its failure is told below
     except subprocess.TimeoutExpired as error:
         raise ConformanceError(f"Another process did not finish within {_SECONDS} s.") from error
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise ConformanceError(f"Nothing can be sent to another process ({error}); {_ADVICE}") from error
     if process.returncode:
         last = process.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise ConformanceError(
-            f"Another process failed ({''.join(last)}); define the class at the top level of a module that can be "
-            "imported."
-        )
+        raise ConformanceError(f"Another process failed ({''.join(last)}); {_ADVICE}")
     found: Any = pickle.loads(process.stdout)
     return list(found)
 

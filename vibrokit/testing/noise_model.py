@@ -66,7 +66,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
         try:
             part.replace(intensity=0.0)
         except VibrokitError as error:
-            raise ConformanceError(f"{self.cls.__name__} refuses the intensity 0, which is no noise: {error}") from error
+            raise ConformanceError(f"{self.cls.__name__} refuses the intensity 0, no noise: {error}") from error
         try:
             part.replace(intensity=-1.0)
         except VibrokitError:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import functools
 import keyword
-import math
 import pickle
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -19,16 +17,15 @@ import mpmath
 import numpy as np
 import sympy
 
-from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.part import Part
 from vibrokit.registry import Group, name_of
 from vibrokit.scene_file import load_scene, save_scene
 from vibrokit.symbolic.formulas import ask
 from vibrokit.testing.elsewhere import outcome, outcomes_elsewhere
-from vibrokit.testing.precise import CLOSE, DIGITS, Function, apart, function
-from vibrokit.testing.report import Check, ConformanceError
+from vibrokit.testing.precise import CLOSE, DIGITS, Function, apart, function, rounding
+from vibrokit.testing.ranges import check_inside, check_refused, outside
+from vibrokit.testing.report import Check, ConformanceError, told
 from vibrokit.testing.samples import samples
 
 P = TypeVar("P", bound=Part)
@@ -92,13 +89,13 @@ class PartChecks(ABC, Generic[P]):
     @cached_property
     def samples(self) -> tuple[P, ...]:
         """Instances with random parameters."""
-        return samples(self.part, self.rng)  # type: ignore[arg-type,return-value]
+        return samples(self.part, self.rng)  # type: ignore[return-value]
 
     # -- what follows from a formula ------------------------------------------------------------------------------
 
-    def symbols(self, part: Part) -> dict[str, sympy.Symbol]:
+    def symbols(self, part: P) -> dict[str, sympy.Symbol]:
         """A symbol for each parameter that is a number, with the assumptions that its range allows."""
-        model = self.scene(part).model  # type: ignore[arg-type]
+        model = self.scene(part).model
         place = self.place
         return {d.name: model.symbols[f"{place}.{d.name}"] for d in part.declared() if not d.structural}
 
@@ -107,15 +104,15 @@ class PartChecks(ABC, Generic[P]):
     def place(self) -> str:
         """Path of the part in its scene."""
 
-    def values(self, part: Part) -> dict[sympy.Symbol, float]:
+    def values(self, part: P) -> dict[sympy.Symbol, float]:
         """Value of each symbol."""
         return {symbol: part.parameters[name] for name, symbol in self.symbols(part).items()}
 
-    def expression(self, part: Part) -> sympy.Expr:
+    def expression(self, part: P) -> sympy.Expr:
         """The formula of a part."""
         return ask(part, self.method, self.symbols(part), self.arguments)
 
-    def precise(self, part: Part, formula: sympy.Expr | None = None) -> Function:
+    def precise(self, part: P, formula: sympy.Expr | None = None) -> Function:
         """The formula, or one that was derived from it, as a function at sixty digits."""
         return function(self.expression(part) if formula is None else formula, self.arguments, self.values(part))
 
@@ -154,9 +151,9 @@ class PartChecks(ABC, Generic[P]):
                 value = part.parameters[declared.name]
                 if isinstance(value, str):
                     continue
-                _check_inside(self.cls.__name__, declared, value)
-                for wrong in _outside(declared):
-                    _check_refused(part, declared, wrong)
+                check_inside(self.cls.__name__, declared, value)
+                for wrong in outside(declared):
+                    check_refused(part, declared, wrong)
                     count += 1
         return f"{count} wrong values refused"
 
@@ -169,15 +166,16 @@ class PartChecks(ABC, Generic[P]):
         worst = 0.0
         for part, exact in self.each():
             values = {d.name: _as_number(part.parameters[d.name]) for d in part.declared()}
+            bound = self.precise(part, rounding(self.expression(part)))
             for point in self.points():
                 given = [sympy.Float(number, DIGITS) for number in point]
                 found = sympy.sympify(getattr(part.twin(values), self.method)(*given)).evalf(DIGITS)
-                distance = apart(mpmath.mpmathify(found), exact(*point)) if found.is_number else math.inf
-                worst = max(worst, distance)
-                if distance > CLOSE:
+                right = exact(*point)
+                worst = max(worst, distance := apart(mpmath.mpmathify(found), right))
+                if distance > CLOSE and not abs(mpmath.mpmathify(found) - right) <= bound(*point):
                     raise ConformanceError(
-                        f"{part!r} gives {found} for the numbers {point}, but its formula for symbols, "
-                        f"{self.expression(part)}, gives {mpmath.nstr(exact(*point), 17)} there; write one formula "
+                        f"{part!r} gives {mpmath.nstr(found, 17)} for the numbers {point}, but its formula for "
+                        f"symbols, {self.expression(part)}, gives {mpmath.nstr(right, 17)} there; write one formula "
                         "for all values, without asking what an argument or a field is."
                     )
         return f"within {worst:.1g}"
@@ -186,7 +184,7 @@ class PartChecks(ABC, Generic[P]):
         """A part cannot be changed; equal parts are one key of a dict."""
         for part in self.samples:
             twin = type(part)(**part.parameters) if self._remakes(part) else copy.copy(part)
-            for field in dataclasses.fields(part):
+            for field in dataclasses.fields(part):  # type: ignore[arg-type]
                 try:
                     setattr(twin, field.name, None)
                 except AttributeError:
@@ -270,50 +268,5 @@ class PartChecks(ABC, Generic[P]):
         """The part that a scene was made for."""
 
 
-def told(make: Callable[[], str]) -> Callable[[], str]:
-    """Return a check that fails with a sentence, whatever the part does."""
-
-    @functools.wraps(make)
-    def made() -> str:
-        try:
-            return make()
-        except ConformanceError:
-            raise
-        except VibrokitError as error:
-            raise ConformanceError(str(error)) from error
-        except Exception as error:
-            raise ConformanceError(f"The part raised {type(error).__name__}: {error}.") from error
-
-    return made
-
-
 def _as_number(value: Any) -> Any:
     return value if isinstance(value, str) else sympy.Float(value, DIGITS)
-
-
-def _check_inside(owner: str, declared: Parameter, value: Any) -> None:
-    try:
-        declared.checked(owner, value)
-    except VibrokitError as error:
-        raise ConformanceError(f"{error} The instance holds that value all the same: call super().__post_init__().") from error
-
-
-def _outside(declared: Parameter) -> list[Any]:
-    """Values that a parameter must not have."""
-    wrong: list[Any] = [math.nan, math.inf, "1", None]
-    wrong += [] if declared.minimum is None else [declared.minimum - 1.0]
-    wrong += [] if declared.above is None else [declared.above]
-    return wrong + ([] if declared.maximum is None else [declared.maximum + 1.0])
-
-
-def _check_refused(part: Part, declared: Parameter, wrong: Any) -> None:
-    try:
-        made = type(part)(**(part.parameters | {declared.name: wrong}))
-    except VibrokitError:
-        return
-    except Exception as error:
-        raise ConformanceError(
-            f"{type(part).__name__} with {declared.name} = {wrong!r} raises {type(error).__name__}: {error}; let the "
-            "range check refuse it with a sentence, before anything is computed."
-        ) from error
-    raise ConformanceError(f"{made!r} was made, though {declared.name} must be {declared.allowed}.")

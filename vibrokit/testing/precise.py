@@ -45,12 +45,14 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
             except (ArithmeticError, ValueError):
                 value = mpmath.nan
             except (NameError, TypeError, AttributeError) as error:
-                raise ConformanceError(f"The formula {formula} cannot be evaluated ({type(error).__name__}: {error}).") from error
+                problem = f"{type(error).__name__}: {error}"
+                raise ConformanceError(f"The formula {formula} cannot be evaluated ({problem}).") from error
             if not (mpmath.isfinite(value) and mpmath.im(value) == 0):
                 place = ", ".join(f"{a} = {mpmath.nstr(p, 6)}" for a, p in zip(arguments, point, strict=True))
                 shown = {str(symbol): number for symbol, number in values.items()}
                 raise ConformanceError(
-                    f"The formula {formula} is {mpmath.nstr(value, 6)} at {place}, with {shown}; it must be finite and real."
+                    f"The formula {formula} is {mpmath.nstr(value, 6)} at {place}, with {shown}; it must be finite "
+                    "and real."
                 )
             return mpmath.re(value)
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
+
+from vibrokit.errors import VibrokitError
 
 
 class ConformanceError(AssertionError):
@@ -76,6 +79,23 @@ class Report:
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
+
+
+def told(make: Callable[[], str]) -> Callable[[], str]:
+    """Return a check that fails with a sentence, whatever the part does."""
+
+    @functools.wraps(make)
+    def made() -> str:
+        try:
+            return make()
+        except ConformanceError:
+            raise
+        except VibrokitError as error:
+            raise ConformanceError(str(error)) from error
+        except Exception as error:
+            raise ConformanceError(f"The part raised {type(error).__name__}: {error}.") from error
+
+    return made
 
 
 def make_all(subject: str, checks: Iterable[Check]) -> Report:

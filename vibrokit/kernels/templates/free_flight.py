@@ -1,6 +1,6 @@
 """Free flight in closed form: between the stops of a linear scene the Taylor series of the motion is exact.
 
-A touch is the first zero of a polynomial. The search for it never passes one: from each point it goes only as far as the
+A touch is the first zero of a polynomial. The search for it never passes one: from each point it goes only as far as
 bounds on the second and third derivative prove free.
 """
 
@@ -12,7 +12,6 @@ from vibrokit.kernels.templates.located import settle
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
     EQUATIONS,
-    OPTIONS,
     ORDER,
     SIDES,
     flight_rate,

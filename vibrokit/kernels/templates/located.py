@@ -1,12 +1,13 @@
 """The stops: what touches, how a step is shortened to end on an event, how a contact is followed to its end.
 
-Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; every change of it happens between steps.
-At most one stop is touched at a time.
+Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; it changes only between steps. At
+most one stop is touched at a time.
 """
 
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.cubic import crossing, summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
 from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES, law, rhs, stop
 from vibrokit.kernels.templates.steps import (
@@ -15,6 +16,7 @@ from vibrokit.kernels.templates.steps import (
     COUNT,
     EPSILON,
     FIRST_STEP,
+    INNER,
     PULLED,
     ROOT_DEPTH,
     ROOT_TIME,
@@ -31,12 +33,13 @@ from vibrokit.kernels.templates.steps import (
     misfit,
     slope,
     stretch,
+    stuck,
 )
 
 # --- scene above, stepper below ---
 
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
-SOME_CLAMPED = True in CLAMPED
+SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
 
 
 @njit(**INNER)
@@ -104,7 +107,7 @@ def land(goal, course, sigma, h, y, i, pushing, theta, desk):
         else:
             move = -value * (length - before) / (value - last)
         if length == h and goal == DEPTH_GOAL and course == TIME:
-            move = cubic_root(start, SIDES[i] * y[1], value, SIDES[i] * trial[1], h) - h
+            move = crossing(start, SIDES[i] * y[1], value, SIDES[i] * trial[1], h) - h
         new = length + move
         if not min(low, high) < new < max(low, high):
             new = 0.5 * (low + high)
@@ -129,47 +132,6 @@ def land(goal, course, sigma, h, y, i, pushing, theta, desk):
             trial[CLOCK] += move
             return length + move
     return length
-
-
-@njit(**INNER)
-def cubic_root(d0, r0, d1, r1, h):
-    """Zero in (0, h) of the cubic with these end values and slopes, d0 and d1 of opposite sign."""
-    low, high = 0.0, 1.0
-    s = d0 / (d0 - d1)
-    for _ in range(40):
-        value = cubic(d0, r0, d1, r1, h, s)
-        if (value > 0.0) == (d1 > 0.0):
-            high = s
-        else:
-            low = s
-        rate = (cubic(d0, r0, d1, r1, h, s + 1e-6) - value) * 1e6
-        new = s - value / rate
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - s) < 1e-7:
-            return new * h
-        s = new
-    return s * h
-
-
-@njit(**INNER)
-def cubic(d0, r0, d1, r1, h, s):
-    """Cubic Hermite interpolant at the fraction s of a step h."""
-    q = 1.0 - s
-    return q * q * ((1.0 + 2.0 * s) * d0 + s * h * r0) + s * s * ((3.0 - 2.0 * s) * d1 - q * h * r1)
-
-
-@njit(**INNER)
-def swing(d0, r0, d1, r1, h):
-    """Largest depth within a step that begins with r0 > 0 and ends with r1 < 0, estimated."""
-    low, high = 0.0, 1.0
-    for _ in range(24):
-        s = 0.5 * (low + high)
-        if cubic(d0, r0, d1, r1, h, s + 1e-5) > cubic(d0, r0, d1, r1, h, s - 1e-5):
-            low = s
-        else:
-            high = s
-    return cubic(d0, r0, d1, r1, h, 0.5 * (low + high))
 
 
 @njit(**INNER)
@@ -219,17 +181,20 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
     copy(y, desk[STAGE])
     slope(course, sigma, h, i, pushing, theta, desk, 0)
     depth = max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30)
-    grain = 2.0 * EPSILON * abs(y[0]) * abs(push_at(i, y, theta)) / depth
-    first, error = h, 0.0
+    grain = grain_of(i, depth, y, theta)
+    first, before, misses = h, np.inf, 0
     while True:
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
         attempt(course, sigma, h, y, i, pushing, theta, desk)
-        error = misfit(h, y, memory[SPAN], settings[0], grain, desk)
+        haze = 4.0 * EPSILON * abs(y[0]) / max(depth, SIDES[i] * (trial[0] - stop(i, theta)))
+        error = misfit(h, y, memory[SPAN], settings[0], grain, haze, desk)
         lapse = trial[CLOCK] - y[CLOCK]
         tiny = abs(lapse) <= EPSILON * (abs(y[CLOCK]) + memory[SPAN]) or abs(h) < 1e-12 * abs(first)
-        if error > 1.0 and not tiny:
+        if error > 1.0 and not tiny and misses < 2:
+            misses = misses + 1 if stuck(error, before, settings[0]) else 0
+            before = error
             h *= min(0.7, stretch(error))
             continue
         if not np.isfinite(error):
@@ -246,6 +211,14 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
 
 
 @njit(**INNER)
+def grain_of(i, depth, y, theta):
+    """How uncertain the law is because x is rounded."""
+    more = 0.5 * depth + 64.0 * EPSILON * abs(y[0])
+    rate = SIDES[i] * y[1]
+    return 3.0 * EPSILON * abs(y[0]) * abs(law(i, depth + more, rate, theta) - law(i, depth, rate, theta)) / more
+
+
+@njit(**INNER)
 def leaves(i, y, lapse, theta, trial):
     """Whether a step in time ends outside the stop, or may have been outside between."""
     wall, before, after = stop(i, theta), SIDES[i] * y[1], SIDES[i] * trial[1]
@@ -254,7 +227,7 @@ def leaves(i, y, lapse, theta, trial):
         return True
     if before < 0.0 < after:
         start = SIDES[i] * (y[0] - wall)
-        least = -swing(-start, -before, -end, -after, lapse)
+        least = -summit(-start, -before, -end, -after, lapse)
         return least < 0.1 * (max(start, end) - least)
     return False
 

@@ -1,15 +1,18 @@
 """Free flight by steps of order 8, each ended at the first touch of a stop."""
 
+import numpy as np
 from numba import njit
 
+from vibrokit.kernels.cubic import summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land, settle, swing
+from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land, settle
 from vibrokit.kernels.templates.scene import BARRIERS, SIDES, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     COUNT,
     EPSILON,
     FREE_STEP,
+    INNER,
     SPAN,
     SPARE,
     STAGE,
@@ -20,6 +23,7 @@ from vibrokit.kernels.templates.steps import (
     misfit,
     slope,
     stretch,
+    stuck,
 )
 
 # --- scene above, stepper below ---
@@ -35,7 +39,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
         left = end - y[CLOCK]
         last = memory[FREE_STEP] >= 0.99 * left
         h = left if last else memory[FREE_STEP]
-        first, touched, length = h, CLEAR, h
+        first, touched, length, before, misses = h, CLEAR, h, np.inf, 0
         copy(y, desk[STAGE])
         slope(TIME, 0.0, h, 0, pushing, theta, desk, 0)
         while True:
@@ -43,12 +47,14 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
             if memory[COUNT] > settings[1]:
                 return STALLED
             attempt(TIME, 0.0, h, y, 0, pushing, theta, desk)
-            error = misfit(h, y, memory[SPAN], settings[0], 0.0, desk)
+            error = misfit(h, y, memory[SPAN], settings[0], 0.0, 0.0, desk)
             tiny = h <= EPSILON * (abs(y[CLOCK]) + memory[SPAN])
-            if error > 1.0 and not tiny:
+            if error > 1.0 and not tiny and misses < 2:
+                misses = misses + 1 if stuck(error, before, settings[0]) else 0
+                before = error
                 h *= min(0.7, stretch(error))
                 continue
-            if error == np.inf:
+            if not np.isfinite(error):
                 return NOT_FINITE
             length = h
             if BARRIERS > 0:
@@ -71,7 +77,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
 
 @njit(**INNER)
 def watch(h, tiny, y, pushing, theta, desk):
-    """Look for a touch within the step in TRIAL; shorten the step to end on it. Returns what was found and the length."""
+    """Look for a touch within the step in TRIAL and shorten the step to end on it: what was found, and the length."""
     trial = desk[TRIAL]
     for i in range(BARRIERS):
         wall, side = stop(i, theta), SIDES[i]
@@ -89,7 +95,7 @@ def watch(h, tiny, y, pushing, theta, desk):
             rise, fall = side * y[1], side * trial[1]
             if not (rise > 0.0 > fall):
                 continue
-            top = swing(before, rise, after, fall, h)
+            top = summit(before, rise, after, fall, h)
             if top + 0.3 * (top - min(before, after)) <= 0.0:
                 continue
             turn = land(RATE_GOAL, TIME, 0.0, h, y, i, pushing, theta, desk)
@@ -103,7 +109,7 @@ def watch(h, tiny, y, pushing, theta, desk):
 
 @njit(**INNER)
 def turns_of(side, final, desk):
-    """How often the velocity turns within a step, from its stages, and whether the first turn is from towards a stop to away."""
+    """How often the velocity turns within a step, by its stages, and whether it first turns away from a stop."""
     largest = max(abs(desk[0, 0]), abs(desk[5, 0]), abs(final))
     turns, up, before = 0, False, 0.0
     for s in (0, 3, 5, 9, 10, 12):

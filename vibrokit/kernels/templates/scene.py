@@ -1,7 +1,7 @@
 """A hand-written sample of what the emitter generates, so that the templates can be read, checked and tested.
 
-Two Hertz stops, a linear spring, harmonic and constant forcing; the Hamiltonian flow z = (x, v, p1, p2, S). `theta` holds
-the damping 2ζω_n, ω_n², the amplitude and frequency of the harmonic force, the constant force, and stiffness and
+Two Hertz stops, a linear spring, harmonic and constant forcing; the Hamiltonian flow z = (x, v, p1, p2, S). `theta`
+holds the damping 2ζω_n, ω_n², the amplitude and frequency of the harmonic force, the constant force, and stiffness and
 position of the right and of the left stop.
 """
 

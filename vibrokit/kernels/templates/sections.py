@@ -13,10 +13,12 @@ from vibrokit.kernels.templates.steps import (
     COUNT,
     FIRST_STEP,
     FREE_STEP,
+    INNER,
     MEMORY,
     ROWS,
     SPAN,
     SPARE,
+    TIMED,
     TOUCHED,
 )
 
@@ -45,7 +47,7 @@ def begin(y, interval, memory, pushing, theta, desk):
 @njit(**INNER)
 def travel(y, end, memory, pushing, theta, settings, desk, coefficients):
     """Carry y to the time `end`, from contact to contact."""
-    memory[COUNT] = 0.0
+    memory[COUNT], memory[TIMED] = 0.0, 0.0
     status = RAN_OUT
     while y[CLOCK] < end and status == RAN_OUT:
         if BARRIERS > 0 and memory[TOUCHED] >= 0.0:
@@ -109,7 +111,7 @@ def record(state, theta, start_time, spacing, settings, out):
     copy_state(state, out[0])
     copy_state(state, y)
     y[CLOCK] = start_time
-    begin(y, spacing, memory, pushing, theta, desk)
+    begin(y, spacing * (out.shape[0] - 1), memory, pushing, theta, desk)
     for sample in range(1, out.shape[0]):
         status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, desk, coefficients)
         if status != RAN_OUT:

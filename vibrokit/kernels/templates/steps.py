@@ -27,6 +27,7 @@ EPSILON = 2.220446049250313e-16
 # Functions that only kernels call: Numba need not wrap them for Python.
 INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 BLOCKS = error_blocks(STATES, EQUATIONS)
+HAZY = 2 * STATES + 1 if EQUATIONS > 4 * STATES**2 else EQUATIONS  # the first derivative of momenta
 
 
 @njit(**INNER)
@@ -104,18 +105,19 @@ def attempt(course, sigma, h, y, i, pushing, theta, desk):
 
 
 @njit(**INNER)
-def misfit(h, y, span, tolerance, grain, desk):
+def misfit(h, y, span, tolerance, grain, haze, desk):
     """Estimated error of the step in TRIAL, in units of the tolerance: the largest over the components.
 
-    Each block is judged by its own size; a velocity that vanishes by x over `span`, the time to travel. `grain` is how
-    far the acceleration is uncertain because x is rounded: no step is asked to be better than that.
+    Each block is judged by its own size; a velocity that vanishes by a hundredth of x over `span`, the time to travel. no step
+    is asked to be better than the rounding of x allows: `grain` is the uncertainty of the acceleration from it, `haze`
+    the relative one of the second derivative of a law, which only derivatives of the momenta feel.
     """
     size, trial = desk[SIZE], desk[TRIAL]
     for e in range(EQUATIONS):
         size[e] = 0.0
     for e in range(EQUATIONS):
         size[BLOCKS[e]] = max(size[BLOCKS[e]], abs(y[e]), abs(trial[e]), abs(h * desk[0, e]))
-    size[BLOCKS[1]] = max(size[BLOCKS[1]], size[BLOCKS[0]] / span)
+    size[BLOCKS[1]] = max(size[BLOCKS[1]], 0.01 * size[BLOCKS[0]] / span)
     blur = grain * abs(trial[CLOCK] - y[CLOCK])
     if blur > tolerance * size[BLOCKS[1]]:
         tolerance = blur / size[BLOCKS[1]]
@@ -126,6 +128,8 @@ def misfit(h, y, span, tolerance, grain, desk):
             a += FIFTH[s] * desk[s, e]
             b += THIRD[s] * desk[s, e]
         unit = size[BLOCKS[e]] if e < EQUATIONS else min(span, size[0] / (abs(trial[1]) + size[0] / span))
+        if HAZY <= e < EQUATIONS and haze > tolerance:
+            unit *= haze / tolerance
         if not (np.isfinite(trial[e]) and np.isfinite(a)):
             return np.inf
         if unit > 0.0:
@@ -137,6 +141,12 @@ def misfit(h, y, span, tolerance, grain, desk):
     # The fifth-order estimate can vanish by chance. In a step that is short enough the error is 0.02 to 0.1 times the
     # square of the third-order one.
     return max(error, 0.01 * (h * third) ** 2) / tolerance
+
+
+@njit(**INNER)
+def stuck(error, before, tolerance):
+    """Whether shortening a step has not helped, so that rounding is all that is left of its error."""
+    return error > 0.8 * before and error * tolerance < 1e-6
 
 
 @njit(**INNER)

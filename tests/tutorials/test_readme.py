@@ -1,0 +1,122 @@
+"""Every snippet of the README and the manual does what it says."""
+
+import dataclasses
+import re
+import runpy
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit import cli
+
+REPOSITORY = Path(__file__).parents[2]
+README = REPOSITORY / "README.md"
+PAGES = sorted([README, *REPOSITORY.glob("docs/*.rst"), *REPOSITORY.glob("docs/how-to/*.rst")])
+QUICK = ("list", "equations", "check")  # commands of seconds at most; of the others the words are checked
+
+
+def snippets(page, language):
+    """Snippets of one language in a page, Markdown or reStructuredText, in order."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".md":
+        return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    blocks = re.findall(rf"^\.\. code-block:: {language}\n((?:\n|   .*\n)+)", text, re.MULTILINE)
+    return [re.sub(r"^   ", "", block, flags=re.MULTILINE) for block in blocks]
+
+
+def commands(page):
+    """Command lines of a page, split into words."""
+    lines = "".join(snippets(page, "console")).splitlines()
+    return [shlex.split(line[2:], comments=True) for line in lines if line.startswith("$ ")]
+
+
+def pages_with(language):
+    """Pages that have snippets of a language."""
+    return [pytest.param(page, id=page.name) for page in PAGES if snippets(page, language)]
+
+
+def run_python(page, folder):
+    """Run the Python snippets of a page as one script, and return its names."""
+    script = folder / f"{page.stem.lower()}.py"
+    script.write_text("\n".join(snippets(page, "python")), encoding="utf-8")
+    return runpy.run_path(str(script), run_name="__main__")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", pages_with("python"))
+def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made = run_python(page, tmp_path)
+    printed = capsys.readouterr().out
+    if page == README:
+        assert made["osc"] == vk.load_scene("hertz-0.570")
+        assert [state.impacts for state in made["states"].attractors] == [0, 2]
+        assert 8e-5 < made["result"].energies[0].value < 9.5e-5  # what the README says of it: about 9e-5
+        assert "paths" in printed
+        assert float(made["Cubic"](stiffness=2.0).force(0.5, 1.0)) == 0.25
+    elif page.stem == "contact-law":
+        assert "False False 3/2" in printed
+        assert "FAILED" not in printed
+    elif page.stem == "steppers":
+        assert "RK4: steps is 0; give a whole number from 1 to 10000000." in printed
+        errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
+        assert errors.shape == (3, 2)
+        orders = np.log(errors[:-1] / errors[1:]) / np.log(4)
+        assert np.all(orders[:, 0] > 3.5)  # free of contact, until rounding is met
+        assert np.all(orders[:, 1] > 1.0)
+
+
+def test_readme_has_ten_lines():
+    first = snippets(README, "python")[0]
+    assert len(first.splitlines()) == 10
+
+
+@pytest.mark.parametrize("line", sorted({shlex.join(words) for page in PAGES for words in commands(page)}))
+def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    program, *words = shlex.split(line)
+    if program == "make":
+        makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
+        assert re.search(rf"^{words[0]}:", makefile, re.MULTILINE)
+        return
+    assert program == "vibrokit"
+    if words[0] in QUICK:
+        assert cli.main(words) == 0
+        assert capsys.readouterr().out
+    else:
+        assert callable(cli._parser().parse_args(words).command)
+
+
+def test_settings_in_the_manual_are_settings():
+    words = [word for page in PAGES for line in commands(page) for word in line]
+    given = [words[i + 1].partition("=")[0] for i, word in enumerate(words) if word == "--set"]
+    assert given
+    assert set(given) <= {field.name for field in dataclasses.fields(vk.ActionPlot)}
+
+
+@pytest.mark.parametrize("page", pages_with("toml"))
+def test_toml_snippets_are_read(page, tmp_path):
+    for number, snippet in enumerate(snippets(page, "toml")):
+        data = tomllib.loads(snippet)
+        if "natural_frequency" in data:
+            path = tmp_path / f"{number}.toml"
+            path.write_text(snippet, encoding="utf-8")
+            assert vk.load_scene(path).barriers
+        else:
+            assert set(data) <= {"project", "barriers"}
+
+
+def test_files_that_the_readme_names_exist():
+    text = README.read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:docs|tutorials|plugins)/[\w./-]*|[A-Z]+\.cff)`", text))
+    named |= set(re.findall(r"\]\((docs/[\w./-]+)\)", text))
+    assert {"docs/images/overview.png", "CITATION.cff", "docs/how-to/steppers.rst"} <= named
+    assert [name for name in sorted(named) if not (REPOSITORY / name).exists()] == []
+
+
+def test_the_picture_is_small():
+    assert (REPOSITORY / "docs/images/overview.png").stat().st_size < 200_000

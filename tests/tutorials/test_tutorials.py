@@ -1,0 +1,187 @@
+"""The tutorials run, and what they find agrees with formulas that owe nothing to the code."""
+
+import importlib
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.optimize import brentq
+
+REPOSITORY = Path(__file__).parents[2]
+OMEGA_N, ZETA, OMEGA, F0, F1 = 1.0, 0.01, 0.57, 0.18, 0.2
+PERIOD = 2 * np.pi / OMEGA
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Import a tutorial by name, which runs it, from a folder in which it must leave nothing behind."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("elsewhere")
+        patch.chdir(folder)
+        patch.syspath_prepend(str(REPOSITORY / "tutorials"))
+        yield importlib.import_module
+    assert not list(folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def scene(run):
+    return run("01_a_scene")
+
+
+@pytest.fixture(scope="module")
+def law(run):
+    return run("02_your_own_contact_law")
+
+
+@pytest.fixture(scope="module")
+def found(law):
+    return law.main()
+
+
+def response():
+    """Complex amplitude of the linear oscillator's steady state."""
+    return F0 / (OMEGA_N**2 - OMEGA**2 + 2j * ZETA * OMEGA_N * OMEGA)
+
+
+# -- 01: a scene ------------------------------------------------------------------------------------------------------
+
+
+def test_clear_motion_is_that_of_a_linear_oscillator(scene):
+    amplitude = F0 / np.sqrt((OMEGA_N**2 - OMEGA**2) ** 2 + (2 * ZETA * OMEGA_N * OMEGA) ** 2)
+    assert scene.offset == pytest.approx(F1 / OMEGA_N**2, abs=1e-10)
+    assert scene.amplitude == pytest.approx(amplitude, rel=2e-6)  # the crest lies between samples
+    expected = [F1 / OMEGA_N**2 + response().real, (1j * OMEGA * response()).real]
+    assert scene.clear == pytest.approx(expected, abs=1e-10)
+
+
+def test_stop_hits(scene):
+    assert scene.hits(scene.clear_orbit) == (0, 0)
+    assert scene.hits(scene.hammering_orbit) == (2, 0)
+    assert scene.clear_orbit.x.max() < 0.5 < scene.hammering_orbit.x.max()
+
+
+def test_steady_states_come_back(scene):
+    for orbit in (scene.clear_orbit, scene.hammering_orbit):
+        assert orbit.states[-1] == pytest.approx(orbit.states[0], abs=1e-8)
+    assert scene.osc.period == pytest.approx(PERIOD, rel=1e-15)
+    assert scene.errors.max() < 1e-6
+
+
+def test_stops_give_back_what_they_take(scene):
+    for orbit in (scene.clear_orbit, scene.hammering_orbit):
+        work, loss = scene.power_balance(orbit)
+        assert work == pytest.approx(loss, rel=1e-5)
+    by_formula = np.pi * 2 * ZETA * OMEGA_N * OMEGA * abs(response()) ** 2
+    assert scene.power_balance(scene.clear_orbit)[1] == pytest.approx(by_formula, rel=1e-6)
+
+
+def test_areas_shrink_with_the_damping(scene):
+    for derivative in (scene.clear_derivative, scene.hammering_derivative):
+        assert np.linalg.det(derivative) == pytest.approx(np.exp(-2 * ZETA * OMEGA_N * PERIOD), rel=1e-6)
+
+
+def test_multipliers_of_the_clear_motion(scene):
+    multiplier = np.exp(OMEGA_N * (-ZETA + 1j * np.sqrt(1 - ZETA**2)) * PERIOD)
+    found = np.sort_complex(np.linalg.eigvals(scene.clear_derivative))
+    assert found == pytest.approx(np.sort_complex([multiplier, multiplier.conjugate()]), abs=1e-7)
+    assert np.abs(np.linalg.eigvals(scene.hammering_derivative)).max() < 1
+
+
+def test_divergence_and_numbers(scene):
+    symbols = scene.osc.model.symbols
+    assert scene.divergence == -2 * symbols["damping_ratio"] * symbols["natural_frequency"]
+    assert scene.osc.parameters["excitations.0.amplitude"] == F0
+    assert scene.gentler.parameters["excitations.0.amplitude"] == 0.1
+
+
+def test_noise_makes_it_jump(scene):
+    assert 0 < scene.jump < 80
+    with_stops = scene.shaken.x[scene.shaken.t > scene.jump * PERIOD]
+    assert with_stops.max() > 0.5
+
+
+def test_pictures_of_the_scene(scene, tmp_path):
+    scene.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["01-jump.png", "01-steady-states.png"]
+    axes = Figure().add_subplot()
+    scene.draw_states(axes)
+    assert {text.get_text() for text in axes.get_legend().get_texts()} == {"runs clear", "hammers"}
+
+
+# -- 02: a contact law ------------------------------------------------------------------------------------------------
+
+
+def exact_restitution(product):
+    """Speed after over speed before, for c v = `product`: from v dv/dδ = −k δ^(3/2) (1 + (3/2) c v), integrated."""
+    a = 1.5 * product
+    before = a - np.log1p(a)
+    return brentq(lambda e: -a * e - np.log1p(-a * e) - before, 0.0, min(1.0, (1 - 1e-12) / a), xtol=1e-14)
+
+
+def test_all_ways_are_one_motion(found):
+    assert {"formula", "class"} <= set(found.ends)
+    for states in found.ends.values():
+        np.testing.assert_allclose(states, found.ends["formula"], rtol=0, atol=1e-13)
+
+
+def test_plug_in_is_used_where_it_is_installed(law, found):
+    law_by_name = law.scene_by_plugin()
+    if law_by_name is None:
+        pytest.skip("vibrokit-hunt-crossley is not installed")
+    assert "plug-in" in found.ends
+    assert type(law_by_name.barriers[0].law).__module__.startswith("vibrokit_hunt_crossley")
+
+
+def test_lines_shown_are_those_of_the_plug_in(law):
+    shown = tomllib.loads(law.PYPROJECT)["project"]
+    project = REPOSITORY / "plugins/vibrokit-hunt-crossley/pyproject.toml"
+    if not project.exists():
+        pytest.skip("the plug-in is not in this tree")
+    real = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
+    assert (shown["name"], shown["entry-points"]) == (real["name"], real["entry-points"])
+
+
+def test_restitution(found, law):
+    for product, measured in found.bounces.restitution.items():
+        assert measured == pytest.approx(exact_restitution(product), rel=1e-6)
+    first_order = (1 - found.bounces.restitution[0.01]) / 0.01
+    assert first_order == pytest.approx(1.0, abs=0.02)
+    assert law.restitution(dissipation=0.0, speed=1.0) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_energy_lost_in_a_bounce(found):
+    expected = (1 - exact_restitution(0.2) ** 2) / 2
+    assert found.bounces.cost == pytest.approx(expected, rel=1e-6)
+    assert found.bounces.area == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_kit_passes_the_law(found):
+    assert found.report.passed
+    assert len(found.report.findings) > 10
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        ("a negative stiffness", ("ParameterError", "stiffness is -50", "at least 0")),
+        ("a dissipation that is no number", ("ParameterError", "dissipation is nan")),
+        ("a slip of the pen", ("FormulaError", "'rat' is unknown", "nearest is rate")),
+        ("a formula that tries to run code", ("FormulaError", "'__import__' is unknown")),
+        ("a law that pushes at rest", ("ConformanceError", "at rest")),
+    ],
+)
+def test_what_is_said_of_mistakes(found, mistake, words):
+    assert all(word in found.said[mistake] for word in words)
+
+
+def test_a_formula_runs_no_code(law, capfd):
+    with pytest.raises(ValueError, match="refused"):
+        law.MISTAKES["a formula that tries to run code"]()
+    assert "got in" not in capfd.readouterr().out
+
+
+def test_picture_of_the_bounce(law, tmp_path):
+    law.save_picture(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["02-bounce.png"]
