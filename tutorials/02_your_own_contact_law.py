@@ -68,7 +68,7 @@ version = "0.1.0"
 dependencies = ["vibrokit>=0.1"]
 
 [project.entry-points."vibrokit.contact_laws"]
-hunt-crossley = "vibrokit_hunt_crossley:HuntCrossley"
+hunt-crossley = "vibrokit_hunt_crossley.law:HuntCrossley"
 """
 
 # That distribution exists, in plugins/vibrokit-hunt-crossley; its law has the exponent as a third parameter, 3/2 unless

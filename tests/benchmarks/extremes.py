@@ -72,9 +72,7 @@ def zero_gap(stiffness: float) -> Callable[[object], float]:
 
 def forced(damping: float, frequency: float, periods: int) -> Callable[[object], float]:
     """Distance from the closed form of the forced linear motion after many periods."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping, excitations=(vk.Harmonic(0.1, frequency),)
-    )
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=damping, excitations=(vk.Harmonic(0.1, frequency),))
     duration = periods * osc.section_interval
     if damping == 0 and frequency == 1:
         start, exact = np.zeros(2), np.array([0.05 * duration * math.sin(duration), 0.05 * duration])

@@ -9,6 +9,7 @@ To enter another contestant, add it to CONTESTANTS.
 """
 
 import argparse
+import concurrent.futures as futures
 import math
 import subprocess
 import sys
@@ -22,8 +23,13 @@ import numpy as np
 from numba import njit
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+import vibrokit
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.streams import normal_pairs, seed_lane
+from vibrokit.symbolic.flow_kind import Flow
 
+SCENE = vibrokit.load_scene("hertz-0.570")
 STEPS = 256
 LANES = 32
 DAMPING, STIFFNESS, GAP = 0.02, 50.0, 0.5
@@ -171,9 +177,20 @@ def c_program(folder: str, compiler: str) -> Callable[[int, int, int], Outcome]:
     return contestant
 
 
+def generated(trajectories: int, periods: int, seed: int) -> Outcome:
+    starts = np.zeros((trajectories, 2))
+    with futures.ThreadPoolExecutor(1) as pool:
+        start = time.perf_counter_ns()
+        ended = run_ensemble(SCENE, Flow.NOISY, RK4(STEPS), starts, periods, stream=(seed, 0), executor=pool)
+        elapsed = time.perf_counter_ns() - start
+    final = ended.states[:, 0]
+    return Outcome(elapsed / (trajectories * periods * STEPS), float(final.mean()), float(final.std()))
+
+
 REFERENCE = "lane-packed Numba"
 CONTESTANTS: dict[str, Callable[[int, int, int], Outcome]] = {
     REFERENCE: lane_packed,
+    "vibrokit, generated": generated,
     "scalar Numba, np.random": numba_scalar,
     "scalar Numba, Generator": numba_scalar_ziggurat,
 }

@@ -8,6 +8,8 @@ from vibrokit.symbolic.scene_text import SceneText
 
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
+_FORCES = ("f0", "f1", "f2")
+_NORMALS = ("first", "second")
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 
 
@@ -17,26 +19,45 @@ def lane_count(text: SceneText) -> int:
 
 
 def lane_step(text: SceneText) -> str:
-    """Function `step_lanes(z, f0, f1, f2, theta, h)`: one classical Runge–Kutta step of every lane.
+    """Function `step_lanes(z, f0, f1, f2, first, second, theta, h)`: one step of every lane.
 
     `z` has shape (EQUATIONS, LANES); f0, f1, f2 is the forcing at the step's start, middle and end, the same for
-    all lanes because they share the phase.
+    all lanes because they share the phase; first, second are two standard normals for each lane. A scene without
+    forcing and a flow without noise have no such arguments.
+
+    The step is a classical Runge–Kutta step, between two kicks where there is noise. With U₁, U₂ standard normal,
+    ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
     """
     names = text.variables
-    forces = "f0, f1, f2, " if text.forced else ""
-    lines = [f"LANES = {lane_count(text)}", "", "", "@njit(**OPTIONS)", f"def step_lanes(z, {forces}theta, h):"]
+    noisy = bool(text.amplitude)
+    driven = names[text.states - 1]
+    arguments = ["z", *(_FORCES if text.forced else []), *(_NORMALS if noisy else []), "theta", "h"]
+    lines = [f"LANES = {lane_count(text)}", "", "", "@njit(**INLINED)", f"def step_lanes({', '.join(arguments)}):"]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
     lines += [f"        {name} = z[{index}, lane]" for index, name in enumerate(names)]
+    lines += _kicks(driven, text) if noisy else []
     for stage, (factor, before) in enumerate(_STAGES, start=1):
         point = [f"{name} + {factor}{before}{name}" if before else name for name in names]
-        force = [f"f{(stage // 2)}"] if text.forced else []
+        force = [_FORCES[stage // 2]] if text.forced else []
         targets = ", ".join(f"k{stage}_{name}" for name in names)
         lines.append(f"        {targets} = derivative({', '.join([*point, *force, *text.parameters])})")
     for index, name in enumerate(names):
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
-        lines.append(f"        z[{index}, lane] = {name} + h/6.0*({slopes})")
+        after = " + _later" if noisy and name == driven else ""
+        lines.append(f"        z[{index}, lane] = {name} + h/6.0*({slopes}){after}")
     return "\n".join([*lines, ""])
+
+
+def _kicks(driven: str, text: SceneText) -> list[str]:
+    """Lines that kick the driven state before the step and keep the kick after it; Milstein's term is in the latter."""
+    milstein = " + _size*sqrt(h)*slope(x, v, theta)*(first[lane]*first[lane] - 1.0)" if text.slope else ""
+    return [
+        "        _size = _half*amplitude(x, v, theta)",
+        f"        _later = _size*(first[lane] - {_ROOT_THIRD!r}*second[lane]){milstein}",
+        f"        {driven} += _size*(first[lane] + {_ROOT_THIRD!r}*second[lane])",
+    ]
 
 
 def tabulation(text: SceneText) -> str:
@@ -45,36 +66,10 @@ def tabulation(text: SceneText) -> str:
         return ""
     return "\n".join(
         [
-            "@njit(**OPTIONS)",
+            "@njit(**INLINED)",
             "def tabulate(start, h, theta, table):",
             "    for half in range(table.size):",
             "        table[half] = forcing(start + 0.5*h*half, theta)",
             "",
         ]
     )
-
-
-def kicks(text: SceneText) -> str:
-    """Functions `kick_before` and `kick_after`: the noise of one step, in two parts.
-
-    With U₁, U₂ standard normal, ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
-    """
-    driven = text.states - 1
-    milstein = " + 0.5*size*slope(x, v, theta)*h*(first[lane]*first[lane] - 1.0)" if text.slope else ""
-    return f"""
-@njit(**OPTIONS)
-def kick_before(z, first, second, theta, h, later):
-    half = 0.5*sqrt(h)
-    for lane in range(LANES):
-        x = z[0, lane]
-        v = z[1, lane]
-        size = amplitude(x, v, theta)
-        z[{driven}, lane] += half*size*(first[lane] + {_ROOT_THIRD!r}*second[lane])
-        later[lane] = half*size*(first[lane] - {_ROOT_THIRD!r}*second[lane]){milstein}
-
-
-@njit(**OPTIONS)
-def kick_after(z, later):
-    for lane in range(LANES):
-        z[{driven}, lane] += later[lane]
-"""

@@ -6,8 +6,8 @@ import dataclasses
 from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import kicks, lane_step, tabulation
-from vibrokit.kernels.stepper import Stepper, repeats
+from vibrokit.kernels.lanes import lane_step, tabulation
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.scene_text import SceneText
 
@@ -45,9 +45,9 @@ class RK4(Stepper):
         return float(steps), float(scene.repeats_after(interval)), unit / self.steps
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The lane-packed step, and the kicks of the noisy flow."""
-        step = [text.constants, text.forcing, tabulation(text), text.derivative, lane_step(text)]
-        return [*step, text.amplitude, text.slope, kicks(text)] if text.amplitude else step
+        """The lane-packed step, and what it calls."""
+        noise = [text.amplitude, text.slope]
+        return [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]
 
     def refined(self) -> Self:
         """Twice the steps."""

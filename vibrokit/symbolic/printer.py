@@ -10,7 +10,7 @@ from sympy.printing.pycode import PythonCodePrinter
 _LARGEST_PRODUCT = 16
 
 
-class SourcePrinter(PythonCodePrinter):  # type: ignore[misc]
+class SourcePrinter(PythonCodePrinter):
     """Python printer that writes powers so that loops over lanes can be vectorised.
 
     Whole powers become products and half-integer ones products with a square root: a call of ``pow`` would keep

@@ -22,7 +22,7 @@ class _Reading:
         return super()._print_Relational(expression)  # type: ignore[misc]
 
 
-class _Text(_Reading, StrPrinter):  # type: ignore[misc]
+class _Text(_Reading, StrPrinter):
     def _print_Piecewise(self, expression: sympy.Piecewise) -> str:
         (value, condition), *others = expression.args
         if condition == sympy.true:
@@ -31,7 +31,7 @@ class _Text(_Reading, StrPrinter):  # type: ignore[misc]
         return f"({self._print(value)} if {self._print(condition)} else {rest})"
 
 
-class _Latex(_Reading, LatexPrinter):  # type: ignore[misc]
+class _Latex(_Reading, LatexPrinter):
     pass
 
 

@@ -32,6 +32,9 @@ import numpy as np
 from numba import njit
 
 OPTIONS = {{"nogil": True, "cache": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
+# A function that is compiled into its callers and once by itself may round differently in the two, and which one is
+# called depends on whether this process compiled the module or found it on disk.
+INLINED = {{**OPTIONS, "forceinline": True}}
 '''
 
 
@@ -113,7 +116,7 @@ class _SceneWriter:
             return ""
         lines, texts = assignments({"f": self.model.forcing}, "c")
         body = [*self._unpack(self.model.forcing), *lines, f"    return {texts['f']}"]
-        return "\n".join(["@njit(**OPTIONS)", "def forcing(t, theta):", *body, ""])
+        return "\n".join(["@njit(**INLINED)", "def forcing(t, theta):", *body, ""])
 
     def derivative(self) -> str:
         """Function `derivative(x, v, …, f, parameters…)`, and the names of the parameters it takes."""
@@ -122,7 +125,7 @@ class _SceneWriter:
         arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameter_names()]
         head = f"def derivative({', '.join(arguments)}):"
         values = ", ".join(texts[name] for name in self.variables)
-        return "\n".join(["@njit(**OPTIONS)", head, *contact_lines, *lines, f"    return {values}", ""])
+        return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
 
     def rhs(self) -> str:
         """Function `rhs(t, z, pushing, theta, out)`."""
@@ -163,7 +166,7 @@ class _SceneWriter:
     def _of_state(self, name: str, value: sympy.Expr) -> str:
         lines, texts = assignments({name: value}, "c")
         body = [*self._unpack(value), *lines, f"    return {texts[name]}"]
-        return "\n".join(["@njit(**OPTIONS)", f"def {name}(x, v, theta):", *body, ""])
+        return "\n".join(["@njit(**INLINED)", f"def {name}(x, v, theta):", *body, ""])
 
     def parameter_names(self) -> list[str]:
         """Names of the parameters that the right-hand side uses, in the order of `theta`."""

@@ -22,8 +22,6 @@ from vibrokit.kernels.templates.scene import (
     LANES,
     OPTIONS,
     forcing,
-    kick_after,
-    kick_before,
     step_lanes,
     tabulate,
 )
@@ -62,7 +60,6 @@ def advance(
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
     second = np.zeros(LANES)  # noisy
-    later = np.zeros(LANES)  # noisy
     holder = np.full(LANES, -1, dtype=np.int64)
     done = np.zeros(LANES, dtype=np.int64)
     waiting = 0
@@ -95,10 +92,16 @@ def advance(
         before[:, :] = z
         for step in range(steps):
             normal_pairs(stream, first, second)  # noisy
-            kick_before(z, first, second, theta, h, later)  # noisy
-            step_lanes(z, table[2 * step], table[2 * step + 1], table[2 * step + 2], theta, h)  # forced
-            step_lanes(z, theta, h)  # unforced
-            kick_after(z, later)  # noisy
+            step_lanes(
+                z,
+                table[2 * step],  # forced
+                table[2 * step + 1],  # forced
+                table[2 * step + 2],  # forced
+                first,  # noisy
+                second,  # noisy
+                theta,
+                h,
+            )
         elapsed += 1  # forced
         for lane in range(LANES):
             index = holder[lane]
@@ -146,7 +149,6 @@ def record(
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
     second = np.zeros(LANES)  # noisy
-    later = np.zeros(LANES)  # noisy
     seed_lane(stream, 0, seed, index)  # noisy
     for e in range(EQUATIONS):
         z[e, 0] = state[e]
@@ -158,10 +160,16 @@ def record(
             if given.shape[0] > 0:  # noisy
                 first[0] = given[(sample - 1) * steps + step, 0]  # noisy
                 second[0] = given[(sample - 1) * steps + step, 1]  # noisy
-            kick_before(z, first, second, theta, h, later)  # noisy
-            step_lanes(z, forcing(t, theta), forcing(t + 0.5 * h, theta), forcing(t + h, theta), theta, h)  # forced
-            step_lanes(z, theta, h)  # unforced
-            kick_after(z, later)  # noisy
+            step_lanes(
+                z,
+                forcing(t, theta),  # forced
+                forcing(t + 0.5 * h, theta),  # forced
+                forcing(t + h, theta),  # forced
+                first,  # noisy
+                second,  # noisy
+                theta,
+                h,
+            )
         for e in range(EQUATIONS):
             if not np.isfinite(z[e, 0]):
                 return sample

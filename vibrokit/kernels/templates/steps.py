@@ -108,9 +108,9 @@ def attempt(course, sigma, h, y, i, pushing, theta, desk):
 def misfit(h, y, span, tolerance, grain, haze, desk):
     """Estimated error of the step in TRIAL, in units of the tolerance: the largest over the components.
 
-    Each block is judged by its own size; a velocity that vanishes by a hundredth of x over `span`, the time to travel. no step
-    is asked to be better than the rounding of x allows: `grain` is the uncertainty of the acceleration from it, `haze`
-    the relative one of the second derivative of a law, which only derivatives of the momenta feel.
+    Each block is judged by its own size; a velocity that vanishes by a hundredth of x over `span`, the time to travel.
+    No step is asked to be better than the rounding of x allows: `grain` is the uncertainty of the acceleration from it,
+    `haze` the relative one of the second derivative of a law, which only derivatives of the momenta feel.
     """
     size, trial = desk[SIZE], desk[TRIAL]
     for e in range(EQUATIONS):

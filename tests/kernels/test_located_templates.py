@@ -1,0 +1,293 @@
+"""The steppers that locate every contact, pasted under the sample scene."""
+
+import importlib.util
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+
+from vibrokit.kernels import templates
+from vibrokit.kernels.stopping import LEFT_REGION, NOT_FINITE, RAN_OUT, STALLED
+
+MARKER = "# --- scene above, stepper below ---\n"
+IMPORTS = """
+import numpy as np
+from vibrokit.kernels.cubic import crossing, summit
+from vibrokit.kernels.error_blocks import error_blocks
+from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED, section_status
+from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
+"""
+DAMPING, STIFFNESS, AMPLITUDE, FREQUENCY, FORCE, HERTZ, STOP = 0.02, 1.0, 0.18, 0.57, 0.2, 50.0, 0.5
+PERIOD = 2 * np.pi / FREQUENCY
+EVERYWHERE = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
+# A Hunt-Crossley law: its force would pull at release.
+CLAMPED = {
+    "CLAMPED = (False, False)": "CLAMPED = (True, True)",
+    "depth * sqrt(depth)\n    return": "depth * sqrt(depth) * (1.0 + 3.0 * rate)\n    return",
+    "theta[7] * depth * sqrt(depth)\n\n": "theta[7] * depth * sqrt(depth) * (1.0 + 3.0 * rate)\n\n",
+    "push -= theta[5] * depth * sqrt(depth)": "push -= theta[5] * depth * sqrt(depth) * (1.0 + 3.0 * v)",
+    "push += theta[7] * depth * sqrt(depth)": "push += theta[7] * depth * sqrt(depth) * (1.0 - 3.0 * v)",
+}
+
+
+def theta(**changes):
+    values = {
+        "damping": DAMPING, "stiffness": STIFFNESS, "amplitude": AMPLITUDE, "frequency": FREQUENCY, "force": FORCE,
+        "right": HERTZ, "right_stop": STOP, "left": HERTZ, "left_stop": -STOP,
+    }  # fmt: skip
+    return np.array(list((values | changes).values()))
+
+
+def pasted(folder, stepper, changes=()):
+    room = Path(templates.__file__).parent
+    scene = (room / "scene.py").read_text(encoding="utf-8")
+    for old, new in dict(changes).items():
+        assert old in scene
+        scene = scene.replace(old, new)
+    pieces = [(room / f"{name}.py").read_text("utf-8") for name in ("steps", "located", stepper, "sections")]
+    path = folder / f"{stepper}.py"
+    path.write_text("\n\n".join([scene, IMPORTS, *(piece.split(MARKER)[1] for piece in pieces)]), encoding="utf-8")
+    specification = importlib.util.spec_from_file_location(f"pasted_{stepper}", path)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module", params=["order8", "free_flight"])
+def module(request, tmp_path_factory):
+    return pasted(tmp_path_factory.mktemp("pasted"), request.param)
+
+
+@pytest.fixture(scope="module")
+def clamped(tmp_path_factory):
+    return pasted(tmp_path_factory.mktemp("clamped"), "order8", CLAMPED)
+
+
+def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None, limit=1e5, region=EVERYWHERE):
+    states = np.atleast_2d(np.asarray(states, dtype=float))
+    count = len(states)
+    out, done, status, label = np.empty_like(states), *(np.zeros(count, dtype=np.int64) for _ in range(3))
+    none = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), 0.0
+    module.advance(
+        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0]),
+        np.full(count, intervals), region, np.zeros((0, 0), dtype=np.int8), -1, *none, out, done, status, label,
+    )  # fmt: skip
+    return out, done, status
+
+
+def starts(count, momentum=1e-6):
+    rng = np.random.default_rng(5)
+    x, v = rng.uniform(-0.49, 0.49, count), rng.uniform(-0.9, 0.9, count)
+    return np.column_stack([x, v, momentum * rng.normal(size=(count, 2)), np.zeros(count)])
+
+
+def slopes(t, z, side):
+    """Sample scene with p in units of 1e-6, touching the stop on one side (0: none)."""
+    x, v, p1, p2 = z[:4]
+    depth = max(side * x - STOP, 0.0)
+    force = AMPLITUDE * np.cos(FREQUENCY * t) + FORCE - DAMPING * v - STIFFNESS * x - side * HERTZ * depth**1.5
+    stiffness = STIFFNESS + 1.5 * HERTZ * depth**0.5
+    return np.array([v, force + 1e-6 * p2, stiffness * p2, DAMPING * p2 - p1, 0.5 * p2 * p2])
+
+
+def solved(rates, start, y, stop, event=None, direction=1):
+    """SciPy's DOP853; with an event: where it happens, by Newton's method from SciPy's estimate."""
+    accuracy = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-16}
+    if event is not None:
+        event.terminal, event.direction = True, direction
+        found = solve_ivp(rates, (start, stop), y, events=event, max_step=0.1, **accuracy)
+        if not found.t_events[0].size:
+            return stop, found.y[:, -1], False
+        stop = found.t_events[0][0]
+        for _ in range(2):
+            end = solve_ivp(rates, (start, stop), y, **accuracy).y[:, -1]
+            slope = (event(stop, end + 1e-7 * rates(stop, end)) - event(stop, end)) / 1e-7
+            stop -= event(stop, end) / slope
+    return stop, solve_ivp(rates, (start, stop), y, **accuracy).y[:, -1] if stop != start else y, event is not None
+
+
+def reference(z, end):
+    """Independent solution: SciPy restarted at each touch, turning point and release."""
+    t, side = 0.0, 0
+    while t < end:
+        if side == 0:
+            hits = [
+                (*solved(lambda t, z: slopes(t, z, 0), t, z, end, lambda t, z, s=s: s * z[0] - STOP), s)
+                for s in (1, -1)
+            ]
+            t, z, hit, side = min(hits, key=lambda found: found[0])
+            side = side if hit else 0
+            continue
+        touch = t
+        rates = lambda q, z: 2 * q * slopes(touch + q * q, z, side)  # noqa: B023, E731
+        q, z, turned = solved(rates, 0.0, z, np.sqrt(end - touch), lambda q, z: side * z[1], -1)  # noqa: B023
+        t = touch + q * q
+        if not turned:
+            return z
+        level = 0.6 * (side * z[0] - STOP)
+        rates = lambda t, z: slopes(t, z, side)  # noqa: B023, E731
+        t, z, left = solved(rates, t, z, end, lambda t, z: side * z[0] - STOP - level, -1)  # noqa: B023
+        if not left:
+            return z
+
+        def outward(u, y):
+            z = np.array([side * (STOP + u * u), *y[1:-1]])  # noqa: B023
+            return 2 * u / (side * z[1]) * np.array([*slopes(y[-1], z, side), 1.0])  # noqa: B023
+
+        *released, after = solved(outward, np.sqrt(side * z[0] - STOP), np.array([*z, t]), 0.0)[1]
+        if after > end:
+            return solved(rates, t, z, end)[1]
+        t, z, side = after, np.array([side * STOP, *released[1:]]), 0
+    return z
+
+
+@pytest.fixture(scope="module")
+def solutions():
+    states = starts(8)
+    units = np.array([1.0, 1.0, 1e-6, 1e-6, 1e-12])
+    return states, np.array([reference(state / units, 2 * PERIOD) * units for state in states])
+
+
+def errors(found, true):
+    """Of the state; of p and S relative to their size."""
+    off = np.abs(found - true)
+    momentum = off[:, 2:4].max(axis=1) / np.abs(true[:, 2:4]).max(axis=1)
+    return off[:, :2].max(axis=1), momentum, off[:, 4] / true[:, 4]
+
+
+def test_flows_agree_with_scipy(module, solutions):
+    states, true = solutions
+    out, done, status = advance(module, states, 1e-14, intervals=2)
+    assert (status == RAN_OUT).all()
+    assert (done == 2).all()
+    for error in errors(out, true):
+        assert np.median(error) < 1e-11
+        assert error.max() < 1e-9
+
+
+def test_error_follows_the_tolerance(module, solutions):
+    states, true = solutions
+    medians = [np.median(errors(advance(module, states, 10.0**-k, 2)[0], true)[0]) for k in (5, 7, 9, 11)]
+    assert all(finer < 0.1 * coarser for coarser, finer in itertools.pairwise(medians))
+    assert medians[-1] < 1e-9
+
+
+def test_action_scales_with_tiny_momenta(module):
+    large, small = (advance(module, starts(8, momentum), 1e-12, 2)[0] for momentum in (1e-11, 1e-13))
+    assert np.allclose(large[:, 2:4] * 1e-2, small[:, 2:4], rtol=1e-6, atol=0)
+    assert np.allclose(large[:, 4] * 1e-4, small[:, 4], rtol=1e-6, atol=0)
+
+
+def test_start_exactly_at_touch(module):
+    """Going in, it is the mirror of coming out; at rest, the acceleration decides; resting, it stays."""
+    free = theta(damping=0.0, amplitude=0.0, force=0.0)
+    into, duration = [STOP, 0.4, 0, 0, 0], 0.2
+    deep = advance(module, into, 1e-14, interval=duration, values=free)[0][0]
+    assert deep[0] > STOP
+    back = advance(module, deep * [1, -1, 1, 1, 1], 1e-14, interval=duration, values=free)[0][0]
+    assert back[:2] == pytest.approx([STOP, -0.4], abs=1e-12)
+    away = advance(module, [STOP, 0, 0, 0, 0], 1e-13, interval=1.0, values=free)[0][0]
+    assert away[:2] == pytest.approx([STOP * np.cos(1.0), -STOP * np.sin(1.0)], abs=1e-12)
+    pressed = theta(damping=2.0, amplitude=0.0, force=2.0)
+    rest = advance(module, [STOP, 0, 0, 0, 0], 1e-13, intervals=8, values=pressed)[0][0]
+    assert rest[1] == pytest.approx(0.0, abs=1e-12)
+    assert STIFFNESS * rest[0] + HERTZ * (rest[0] - STOP) ** 1.5 == pytest.approx(2.0, abs=1e-12)
+    balanced = theta(damping=0.1, amplitude=0.0, force=STOP)
+    still = advance(module, [STOP, 0, 0, 0, 0], 1e-13, intervals=3, values=balanced)[0][0]
+    assert still[:2] == pytest.approx([STOP, 0.0], abs=1e-14)
+
+
+def time_in_contact(beyond, stiffness):
+    """Of an undamped mass that would turn `beyond` the stop without it."""
+    # Energy: beyond (1 + beyond) = depth + depth² + 0.8 k depth^(5/2) at the turning point.
+    energy = beyond * (1 + beyond)
+    deepest = brentq(lambda d: d + d * d + 0.8 * stiffness * d**2.5 - energy, 0, beyond, xtol=1e-30, rtol=1e-15)
+
+    def rate(s):
+        left = deepest * s * s * (1 + deepest * (2 - s * s))
+        left += 0.8 * stiffness * deepest**2.5 * -np.expm1(2.5 * np.log1p(-s * s))
+        return 2 * deepest * s / np.sqrt(left)
+
+    return 2 * quad(rate, 0, 1, epsabs=0, epsrel=1e-11)[0]
+
+
+@pytest.mark.parametrize("beyond", [1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-9, -1e-12, -1e-6])
+def test_grazing_is_not_missed(module, beyond):
+    """A mass that would turn `beyond` a hard stop comes back earlier, by a known time."""
+    values = theta(damping=0.0, amplitude=0.0, force=0.0, right=1e12, left_stop=-5.0)
+    out = advance(module, [0, STOP + beyond, 0, 0, 0], 1e-12, interval=np.pi, values=values)[0][0]
+    early = 0.0
+    if beyond > 0:
+        early = 2 * np.arctan(np.sqrt(beyond * (1 + beyond)) / STOP) - time_in_contact(beyond, 1e12)
+    assert out[0] == pytest.approx(-(STOP + beyond) * np.sin(early), abs=1e-9)
+
+
+def test_energy_at_any_stiffness_and_without_gap(module):
+    """Stiff stops lose what the rounding of x hides; without a gap, energy drifts from bounce to bounce."""
+    scenes = [(1.0, 0.5, 1e-12), (1e6, 0.5, 1e-11), (1e12, 0.5, 1e-9), (50.0, 0.0, 1e-11), (1e6, 0.0, 1e-9)]
+    for stiffness, stop, drift in scenes:
+        values = theta(
+            damping=0.0, amplitude=0.0, force=0.0, right=stiffness, left=stiffness, right_stop=stop, left_stop=-stop
+        )
+        states = starts(6, 0.0) * [0.9 if stop else 0.0, 1, 1, 1, 1]
+        out, _, status = advance(module, states, 1e-13, 5, values=values)
+        energy = [
+            (z[:, 1] ** 2 + z[:, 0] ** 2) / 2 + 0.4 * stiffness * np.maximum(np.abs(z[:, 0]) - stop, 0) ** 2.5
+            for z in (states, out)
+        ]
+        assert (status == RAN_OUT).all()
+        assert np.allclose(*energy, rtol=drift, atol=0)
+
+
+def test_law_that_would_pull_is_let_go(clamped):
+    """The fine solution agrees with small Runge–Kutta steps of max(law, 0), which lose order at the kinks."""
+    states = starts(6, 0.0)
+    fine, coarse = (advance(clamped, states, tolerance, interval=4.0)[0][:, :2] for tolerance in (1e-13, 1e-9))
+
+    def rates(t, z):
+        x, v = z[:, 0], z[:, 1]
+        depth = np.maximum(np.abs(x) - STOP, 0.0)
+        push = np.maximum(HERTZ * depth**1.5 * (1 + 3 * np.sign(x) * v), 0.0) * np.sign(x)
+        return np.column_stack([v, AMPLITUDE * np.cos(FREQUENCY * t) + FORCE - DAMPING * v - STIFFNESS * x - push])
+
+    z, h = states[:, :2], 4.0 / 8000
+    for step in range(8000):
+        k1 = rates(step * h, z)
+        k2 = rates((step + 0.5) * h, z + 0.5 * h * k1)
+        k3 = rates((step + 0.5) * h, z + 0.5 * h * k2)
+        z = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates((step + 1) * h, z + h * k3))
+    assert fine == pytest.approx(z, abs=2e-7)
+    assert coarse == pytest.approx(fine, abs=1e-7)
+
+
+def test_record_passes_through_the_sections(module):
+    out = np.empty((41, 5))
+    state = starts(1)[0]
+    assert module.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0]), out) == 41
+    sections = [advance(module, state, 1e-13, k)[0][0] for k in (1, 2)]
+    assert out[[20, 40], :2] == pytest.approx(np.array(sections)[:, :2], abs=1e-10)
+
+
+def test_intervals_are_memoryless(module):
+    state = starts(1)[0]
+    twice = advance(module, advance(module, state, 1e-8)[0][0], 1e-8)[0]
+    assert (twice == advance(module, state, 1e-8, 2)[0]).all()
+
+
+def test_stops_are_reported(module):
+    states = starts(2)
+    _, done, status = advance(module, states, 1e-10, 3, region=np.array([[-1e-9, 1e-9], [-1e-9, 1e-9]]))
+    assert (status == LEFT_REGION).all()
+    assert (done == 1).all()
+    out, done, status = advance(module, states, 1e-12, 3, limit=4)
+    assert (status == STALLED).all()
+    assert (out == states).all()
+    states[1, 2:4] = 1e300
+    out, done, status = advance(module, states, 1e-6, 3, values=theta(damping=60.0))
+    assert status[1] == NOT_FINITE
+    assert np.isfinite(out).all()
+    samples = np.empty((9, 5))
+    assert module.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0]), samples) < 9
