@@ -119,7 +119,15 @@ def load_all(group: Group, kind: type[T]) -> dict[str, type[T]]:
 def name_of(group: Group, cls: type) -> str:
     """Return the name that a class is registered under, or ``module:Class`` if it is not registered."""
     place = f"{cls.__module__}:{cls.__qualname__}"
-    return next((entry.name for entry in _entry_points(group) if entry.value == place), place)
+    entries = list(_entry_points(group))
+    for entry in entries:
+        if entry.value == place:
+            return entry.name
+    top = cls.__module__.partition(".")[0]
+    for entry in entries:  # a package may offer a class under a shorter path
+        if entry.value.startswith((f"{top}.", f"{top}:")) and _first_working(group, [entry], cls) is cls:
+            return entry.name
+    return place
 
 
 def _entry_points(group: str) -> Iterable[EntryPoint]:
@@ -156,7 +164,7 @@ def _first_working(group: Group, entries: list[EntryPoint], kind: type[T]) -> ty
     """Import entries until one is sound; warns of each that is not."""
     for entry in entries:
         try:
-            loaded = entry.load()
+            loaded: object = entry.load()
         except (Exception, SystemExit) as error:  # whatever a plug-in does at import, it stops nothing
             flaw = f"importing {entry.value} raised {type(error).__name__}: {error}"
         else:

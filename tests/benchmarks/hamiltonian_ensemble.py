@@ -5,8 +5,7 @@
 The scene is omega = 0.570 with two Hertz stops; five equations (x, v, two momenta, action), classical Runge-Kutta
 with 256 steps a period. Every round runs all contestants one after another, so that ratios compare neighbours in
 time. All must agree before they race: after one period to rounding, after the whole run as far as rounding has
-grown by then, for many of these trajectories are chaotic.
-To enter another contestant, add it to CONTESTANTS.
+grown by then, for many of these trajectories are chaotic. To enter another contestant, add it to CONTESTANTS.
 """
 
 import argparse

@@ -45,7 +45,18 @@ class RK4(Stepper):
         return float(steps), float(scene.repeats_after(interval)), unit / self.steps
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The lane-packed step, and what it calls."""
+        """The lane-packed step, and what it calls.
+
+        Raises
+        ------
+        StepperError
+            Derivatives of a force that jumps: steps across the jump cannot have them.
+        """
+        if text.jumps:
+            raise StepperError(
+                "RK4 steps across contacts, and the derivatives of a motion whose contact force jumps at first touch "
+                "jump too; take FreeFlight or Order8 for them."
+            )
         noise = [text.amplitude, text.slope]
         return [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]
 

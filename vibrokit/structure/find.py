@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.choice import ensemble_stepper
+from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import Progress, run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
@@ -29,6 +29,8 @@ _LONGEST_WAIT = 20000
 _LONGEST_PERIOD = 16
 _SAMPLES = 4096
 _RECURRENCE = 1e-5
+_NEAR = 1e-3  # what a coarse stepper may make of an orbit
+_EQUAL = 1e-6
 _ROUNDS = 4
 
 Array = NDArray[np.float64]
@@ -82,15 +84,16 @@ def find_structure(
     """
     wait = _wait(osc) if budget is None else _checked_budget(budget)
     chosen = stepper or ensemble_stepper(osc, Flow.STATE)
+    exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
     search = _search_region(osc) if region is None else Region.of(region)
     states = _starts(osc, search, starts, np.random.default_rng(rng))
-    orbits, unsettled = _orbits(osc, states, wait, chosen, executor)
+    orbits, unsettled = _orbits(osc, states, wait, (chosen, exact), executor)
     if not orbits:
         raise StructureError(
             f"no steady state of period up to {_LONGEST_PERIOD} was found from {len(states)} starts in x ∈ {search.x}, "
             f"v ∈ {search.v} within {wait} periods; widen the region or raise budget."
         )
-    found = [_described(osc, orbit, points, chosen) for orbit, points in orbits]
+    found = [_described(osc, orbit, points, exact) for orbit, points in orbits]
     found.sort(key=lambda attractor: (attractor.impacts, attractor.period, tuple(attractor.points[0])))
     frame = _frame(osc, found) if region is None else search
     tolerance = settling * float(np.min(np.diff(frame.bounds)))
@@ -137,45 +140,53 @@ def _padded(osc: Oscillator, states: Array) -> Array:
 
 
 def _orbits(
-    osc: Oscillator, states: Array, wait: int, stepper: Stepper, executor: concurrent.futures.Executor | None
+    osc: Oscillator,
+    states: Array,
+    wait: int,
+    steppers: tuple[Stepper, Stepper],
+    executor: concurrent.futures.Executor | None,
 ) -> tuple[list[tuple[Orbit, Array]], int]:
     """Return the distinct stable orbits that the starts come to, and how many starts come to none.
 
-    What has not settled is given more time, for chaotic transients can be long.
+    The first stepper carries the starts, the second refines the orbits. What has not settled is given more time, for
+    chaotic transients can be long.
     """
     orbits: list[tuple[Orbit, Array]] = []
     lost = 0
     for _ in range(_ROUNDS):
-        ended = run_ensemble(osc, Flow.STATE, stepper, states, wait, executor=executor)
+        ended = run_ensemble(osc, Flow.STATE, steppers[0], states, wait, executor=executor)
         lost += int(np.sum(ended.intervals < wait))
-        states = _add_orbits(osc, ended.states[ended.intervals == wait], stepper, orbits)
+        states = _add_orbits(osc, ended.states[ended.intervals == wait], steppers, orbits)
         if not len(states):
             break
     return orbits, lost + len(states)
 
 
-def _add_orbits(osc: Oscillator, states: Array, stepper: Stepper, orbits: list[tuple[Orbit, Array]]) -> Array:
+def _add_orbits(
+    osc: Oscillator, states: Array, steppers: tuple[Stepper, Stepper], orbits: list[tuple[Orbit, Array]]
+) -> Array:
     """Add the new stable orbits that states lie on to `orbits`; return the states that lie on none."""
+    carrier, refiner = steppers
     history = [states]
     for _ in range(_LONGEST_PERIOD):
-        history.append(run_ensemble(osc, Flow.STATE, stepper, history[-1], 1).states)
+        history.append(run_ensemble(osc, Flow.STATE, carrier, history[-1], 1).states)
     path = np.array(history)
     scale = 1.0 + np.abs(path).max(axis=(0, 2))
     close = np.linalg.norm(path[1:] - path[0], axis=2) / scale < _RECURRENCE
     settled = close.any(axis=0)
     for index in np.flatnonzero(settled):
         period = int(np.argmax(close[:, index])) + 1
-        if any(_same(path[0, index], known) for _, known in orbits):
+        if any(_same(path[0, index], known, _NEAR) for _, known in orbits):
             continue
         try:
-            orbit = _least_period(osc, refine_orbit(osc, path[0, index], period, stepper), stepper)
+            orbit = _least_period(osc, refine_orbit(osc, path[0, index], period, refiner), refiner)
         except StructureError:
             settled[index] = False
             continue
-        visited = _visited(osc, orbit, stepper)
-        if np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1 or not _same(path[0, index], visited):
+        visited = _visited(osc, orbit, refiner)
+        if np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1 or not _same(path[0, index], visited, _NEAR):
             settled[index] = False  # passing by a saddle
-        elif not any(_same(orbit.point, known) for _, known in orbits):
+        elif not any(_same(orbit.point, known, _EQUAL) for _, known in orbits):
             orbits.append((orbit, visited))
     return path[0, ~settled]
 
@@ -188,7 +199,7 @@ def _least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
                 shorter = refine_orbit(osc, orbit.point, divisor, stepper)
             except StructureError:
                 continue
-            if _same(orbit.point, shorter.point[None]):
+            if _same(orbit.point, shorter.point[None], _EQUAL):
                 return shorter
     return orbit
 
@@ -200,9 +211,9 @@ def _visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     return np.array(points)
 
 
-def _same(point: Array, known: Array) -> bool:
+def _same(point: Array, known: Array, tolerance: float) -> bool:
     nearest = np.linalg.norm(known - point, axis=1).min()
-    return bool(nearest < 1e-4 * (1.0 + np.abs(known).max()))
+    return bool(nearest < tolerance * (1.0 + np.abs(known).max()))
 
 
 def _described(osc: Oscillator, orbit: Orbit, points: Array, stepper: Stepper) -> Attractor:

@@ -19,6 +19,8 @@ class SceneText:
         How many of the variables are the state q.
     forced : bool
         Whether anything depends on time.
+    jumps : bool
+        Whether derivatives are integrated of a force that jumps at first touch.
     preamble, constants, forcing, derivative, rhs, stops, flight, amplitude, slope : str
         Pieces of the module; empty where the scene has no need of them.
     """
@@ -27,6 +29,7 @@ class SceneText:
     parameters: dict[str, int]
     states: int
     forced: bool
+    jumps: bool
     preamble: str
     constants: str
     forcing: str

@@ -53,6 +53,7 @@ def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
         parameters={name: writer.place(name) for name in writer.parameter_names()},
         states=len(writer.model.state),
         forced=writer.forced,
+        jumps=flow is Flow.STATE_VARIATIONAL and any(contact.jumps for contact in writer.model.contacts),
         preamble=writer.preamble(f"The {flow.value} flow of a scene."),
         constants=writer.constants(),
         forcing=writer.forcing(),
@@ -99,10 +100,11 @@ class _SceneWriter:
             "SIDES": tuple(float(barrier.sign) for barrier in self.model.scene.barriers),
             "CLAMPED": tuple(contact.clamped for contact in contacts),
             "ROOTED": tuple(contact.rooted for contact in contacts),
+            "JUMPS": tuple(contact.jumps for contact in contacts),
             "FORCED": self.forced,
         }
         if not contacts:
-            rows = {name: value for name, value in rows.items() if name not in ("SIDES", "CLAMPED", "ROOTED")}
+            rows = {name: value for name, value in rows.items() if name not in ("SIDES", "CLAMPED", "ROOTED", "JUMPS")}
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import settle
+from vibrokit.kernels.templates.located import cross
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
     EQUATIONS,
@@ -46,7 +46,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
         if BARRIERS > 0:
             if touched >= 0:
                 y[0] = stop(touched, theta)
-                settle(y, memory, pushing, theta, desk[SPARE])
+                cross(y, memory, pushing, theta, desk)
                 return RAN_OUT
     return RAN_OUT
 

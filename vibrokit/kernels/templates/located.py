@@ -9,7 +9,18 @@ from numba import njit
 
 from vibrokit.kernels.cubic import crossing, summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES, law, rhs, stop
+from vibrokit.kernels.templates.scene import (
+    BARRIERS,
+    CLAMPED,
+    EQUATIONS,
+    JUMPS,
+    ROOTED,
+    SIDES,
+    STATES,
+    law,
+    rhs,
+    stop,
+)
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
@@ -40,6 +51,7 @@ from vibrokit.kernels.templates.steps import (
 
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
 SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
+DERIVATIVES_JUMP = BARRIERS > 0 and True in JUMPS and EQUATIONS == STATES + STATES * STATES
 
 
 @njit(**INNER)
@@ -68,6 +80,22 @@ def settle(y, memory, pushing, theta, spare):
                 memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
             pushing[i] = memory[PULLED] == 0.0
             return
+
+
+@njit(**INNER)
+def cross(y, memory, pushing, theta, desk):
+    """Settle at an event. Where the force jumps there, so do the derivatives of the velocity, by its saltation matrix."""
+    if DERIVATIVES_JUMP:
+        rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
+        before = desk[SPARE, 1]
+        settle(y, memory, pushing, theta, desk[SPARE])
+        rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
+        leap = (desk[SPARE, 1] - before) / y[1]
+        if leap != 0.0:
+            for e in range(STATES):
+                y[2 * STATES + e] += leap * y[STATES + e]
+    else:
+        settle(y, memory, pushing, theta, desk[SPARE])
 
 
 @njit(**INNER)
@@ -251,7 +279,7 @@ def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, d
         pushing[i] = not pushing[i]
     elif (course == ROOT_DEPTH and sigma + length == 0.0) or SIDES[i] * (y[0] - wall) <= 0.0:
         y[0] = wall
-        settle(y, memory, pushing, theta, desk[SPARE])
+        cross(y, memory, pushing, theta, desk)
     return RAN_OUT
 
 

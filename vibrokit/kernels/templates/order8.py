@@ -5,7 +5,7 @@ from numba import njit
 
 from vibrokit.kernels.cubic import summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land, settle
+from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, cross, land
 from vibrokit.kernels.templates.scene import BARRIERS, SIDES, stop
 from vibrokit.kernels.templates.steps import (
     CLOCK,
@@ -70,7 +70,7 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
             y[CLOCK] = end
         if BARRIERS > 0 and touched >= 0:
             y[0] = stop(touched, theta)
-            settle(y, memory, pushing, theta, desk[SPARE])
+            cross(y, memory, pushing, theta, desk)
             return RAN_OUT
     return RAN_OUT
 

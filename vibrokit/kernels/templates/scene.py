@@ -17,6 +17,7 @@ BARRIERS = 2
 SIDES = (1.0, -1.0)
 CLAMPED = (False, False)
 ROOTED = (True, True)
+JUMPS = (False, False)
 ORDER = 22
 
 

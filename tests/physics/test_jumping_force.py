@@ -1,0 +1,69 @@
+"""A stop whose force jumps at first touch: derivatives of the motion jump too, and momenta are refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.errors import SceneError, StepperError
+from vibrokit.structure.orbits import section_derivative
+
+LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
+
+
+def kelvin_voigt(adhesive=False, noise=None):
+    law = vk.CustomLaw("k*depth + c*rate", k=200.0, c=3.0)
+    return vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.01,
+        barriers=(vk.Barrier(law, 0.5, "right", adhesive), vk.Barrier(law, -0.5, "left", adhesive)),
+        excitations=(vk.Harmonic(0.18, 0.57), vk.Constant(0.2)),
+        noise=noise,
+    )
+
+
+@pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
+@pytest.mark.parametrize("adhesive", [False, True])
+def test_derivatives_are_those_of_the_map(stepper, adhesive):
+    osc = kelvin_voigt(adhesive)
+    start = np.array([0.3, 0.5])
+    _, derivative = section_derivative(osc, start, 1, stepper)
+    step = 1e-5
+    moved = start + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+    images = osc.section_map(moved, 1, stepper=stepper)
+    differences = np.column_stack([images[0] - images[1], images[2] - images[3]]) / (2 * step)
+    np.testing.assert_allclose(derivative, differences, atol=1e-6 * np.abs(differences).max())
+
+
+@pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
+def test_one_adhesive_bounce_in_closed_form(stepper):
+    """Inside an adhesive Kelvin–Voigt stop at 0 the motion is linear: it leaves after half a damped period."""
+    k, c = 200.0, 3.0
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.0,
+        barriers=(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=k, c=c), 0.0, "right", adhesive=True),),
+    )
+    damped = math.sqrt(1 + k - c**2 / 4)
+    inside = math.pi / damped
+    speed = 0.7 * math.exp(-c / 2 * inside)
+    path = osc.trajectory([0.0, 0.7], duration=inside + math.pi / 2, samples=1, stepper=stepper)
+    np.testing.assert_allclose(path.states[-1], [-speed, 0.0], atol=1e-11)
+
+
+def test_steady_states_are_found():
+    structure = vk.find_structure(kelvin_voigt(), cells=(30, 30))
+    assert all(attractor.residual < 1e-9 for attractor in structure.attractors)
+
+
+def test_fixed_steps_refuse_derivatives():
+    with pytest.raises(StepperError, match="FreeFlight or Order8"):
+        section_derivative(kelvin_voigt(), np.array([0.3, 0.5]), 1, vk.RK4())
+
+
+def test_momenta_are_refused_with_the_reason():
+    osc = kelvin_voigt(noise=vk.WhiteNoise(1e-5))
+    structure = vk.find_structure(osc, cells=(30, 30))
+    with pytest.raises(SceneError, match="jumps at first touch"):
+        vk.ActionPlot(points=10).run(osc, structure)
