@@ -57,9 +57,7 @@ def unexpected_warnings_fail():
 
 
 BROKEN = [
-    pytest.param(
-        "no_such_package:Law", "ModuleNotFoundError: No module named 'no_such_package'", id="missing module"
-    ),
+    pytest.param("no_such_package:Law", "ModuleNotFoundError: No module named 'no_such_package'", id="missing module"),
     pytest.param("NoSuchClass", "AttributeError", id="missing class"),
     pytest.param("NOT_A_CLASS", "no subclass of Law", id="instance"),
     pytest.param("pathlib:Path", "no subclass of Law", id="another kind"),

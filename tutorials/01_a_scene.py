@@ -61,9 +61,11 @@ print("divergence of the drift:", divergence)
 # ---------------------------------------------------------------------------------------------------------------------
 # 3. A trajectory
 #
-# From rest, over 40 periods of the forcing. Time counts from t = 0, where the forcing is at its crest.
+# From rest, over 40 periods of the forcing. Time counts from t = 0, where the forcing is at its crest. `RK4` takes a
+# fixed number of steps a period and compiles in a second or two; `Order8` and `FreeFlight`, which find every contact to
+# ten digits, take longer to compile when they first meet a scene of a new kind.
 
-start = osc.trajectory((0.0, 0.0), periods=40)
+start = osc.trajectory((0.0, 0.0), periods=40, stepper=vk.RK4(steps=256))
 print(f"from rest, x goes from {start.x.min():.3f} to {start.x.max():.3f}; the stops are at -0.5 and 0.5")
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -151,7 +153,7 @@ print(f"exp(-2 zeta omega_n T) = {np.exp(-2 * 0.01 * osc.period):.6f}")
 # hammers. Another seed leaves at another time. Far to the left of where the clear motion turns (x = -0.067) only the
 # hammering one goes, so that tells when it jumped.
 
-shaken = osc.trajectory(clear, periods=80, rng=10)
+shaken = osc.trajectory(clear, periods=80, rng=10, stepper=vk.RK4(steps=256))
 far_left = shaken.x < -0.3
 jump = shaken.t[np.argmax(far_left)] / osc.period if far_left.any() else np.inf
 print(f"shaken at random, it leaves the clear motion within {jump:.1f} periods")

@@ -184,10 +184,10 @@ def _attractor_table(scene: str, structure: Structure) -> str:
 
 def _energy_table(name: str, result: Result) -> str:
     rows = [f"{name}: {result.status}", "", "from → to   ΔU            lower         upper         momentum at exit"]
-    for e in result.energies:
-        rows.append(
-            f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}"
-        )
+    rows += [
+        f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}"
+        for e in result.energies
+    ]
     return "\n".join([*rows, ""])
 
 

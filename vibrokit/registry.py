@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable
 from enum import StrEnum
 from importlib.metadata import EntryPoint
-from typing import NamedTuple, TypeVar, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 from vibrokit.errors import UnknownNameError
 
@@ -85,7 +85,7 @@ def load(group: Group, name: str, kind: type = object) -> type:
     candidates = _candidates(group, name)
     if name not in candidates:
         raise UnknownNameError(_unknown(group, name))
-    loaded = _first_working(group, candidates[name], kind)
+    loaded: type | None = _first_working(group, candidates[name], kind)
     if loaded is not None:
         return loaded
     origins = " and ".join(_origin(entry) for entry in candidates[name])
@@ -164,7 +164,7 @@ def _first_working(group: Group, entries: list[EntryPoint], kind: type[T]) -> ty
     """Import entries until one is sound; warns of each that is not."""
     for entry in entries:
         try:
-            loaded: object = entry.load()
+            loaded: Any = entry.load()
         except (Exception, SystemExit) as error:  # whatever a plug-in does at import, it stops nothing
             flaw = f"importing {entry.value} raised {type(error).__name__}: {error}"
         else:

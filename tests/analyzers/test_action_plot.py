@@ -55,9 +55,7 @@ def test_the_same_bits_on_every_run(paper):
 
 def test_no_noise_is_refused(paper):
     osc, structure = paper
-    quiet = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.01, barriers=osc.barriers, excitations=osc.excitations
-    )
+    quiet = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.01, barriers=osc.barriers, excitations=osc.excitations)
     with pytest.raises(SceneError, match="no noise"):
         vk.ActionPlot().run(quiet, structure)
 

@@ -221,8 +221,7 @@ def generated(pool: futures.Executor) -> Contestant:
     return run
 
 
-REFERENCE = "vibrokit, generated"
-SCALAR = "scalar"
+REFERENCE, SCALAR = "vibrokit, generated", "scalar"
 CONTESTANTS: dict[str, Contestant] = {
     "lane-packed by hand, general": lane_packed(general, (SQUARE, DAMPING, GAP, STIFFNESS, -GAP, STIFFNESS)),
     "lane-packed by hand, folded": lane_packed(folded),

@@ -29,9 +29,7 @@ def test_energy_is_kept(stepper, tolerance, law, power):
 
 @pytest.mark.parametrize("stepper", [vk.Order8(1e-12), vk.FreeFlight(1e-12), vk.RK4(4096)], ids=str)
 def test_friction_takes_what_it_should(stepper):
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(vk.Hertz(50.0), 0.3, "right"),)
-    )
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(vk.Hertz(50.0), 0.3, "right"),))
     path = osc.trajectory([0.0, 0.8], 5, stepper=stepper, samples=4000)
     depth = np.maximum(path.x - 0.3, 0.0)
     values = 0.5 * path.v**2 + 0.5 * path.x**2 + 50.0 * depth**2.5 / 2.5

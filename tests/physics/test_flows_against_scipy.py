@@ -26,22 +26,24 @@ def right_hand_side(t, z, side):
     return [v, force + p2, (1 + 1.5 * STIFFNESS * math.sqrt(depth)) * p2, 0.02 * p2 - p1, 0.5 * p2 * p2]
 
 
+def touch(side):
+    def event(t, z, *_):
+        return side * z[0] - STOP
+
+    event.terminal = True
+    return event
+
+
 def reference(start, periods):
     """Integrate from contact to contact, each located to rounding and restarted from."""
-    events = []
-    for side in (1, -1):
-        event = lambda t, z, *_, side=side: side * z[0] - STOP
-        event.terminal = True
-        events.append(event)
+    events = [touch(side) for side in (1, -1)]
     t, end, z = 0.0, periods * 2 * math.pi / OMEGA, np.array(start)
     side = next((s for s in (1, -1) if s * z[0] > STOP), 0)
     while t < end:
         watched = events if side == 0 else [events[(1 - side) // 2]]
         for event in watched:
             event.direction = 1.0 if side == 0 else -1.0
-        found = solve_ivp(
-            right_hand_side, (t, end), z, "DOP853", args=(side,), rtol=1e-13, atol=1e-15, events=watched
-        )
+        found = solve_ivp(right_hand_side, (t, end), z, "DOP853", args=(side,), rtol=1e-13, atol=1e-15, events=watched)
         t, z = found.t[-1], found.y[:, -1]
         if found.status == 1:
             hit = next(i for i, times in enumerate(found.t_events) if len(times))

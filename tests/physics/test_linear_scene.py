@@ -31,7 +31,12 @@ def steady_state(damping, natural=1.0, amplitude=0.1, frequency=0.57, constant=0
 
 def multipliers(damping, natural=1.0, frequency=0.57):
     root = cmath.sqrt(damping**2 - 1)
-    return sorted((cmath.exp(natural * (-damping + s * root) * 2 * math.pi / frequency) for s in (1, -1)), key=lambda m: (m.real, m.imag))
+    both = (cmath.exp(natural * (-damping + sign * root) * 2 * math.pi / frequency) for sign in (1, -1))
+    return sorted(both, key=in_order)
+
+
+def in_order(number):
+    return number.real, number.imag
 
 
 @pytest.mark.parametrize("stepper", STEPPERS, ids=lambda s: s.name)
@@ -39,14 +44,14 @@ def multipliers(damping, natural=1.0, frequency=0.57):
 def test_steady_state_and_multipliers(stepper, damping):
     osc = linear_scene(damping)
     exact = steady_state(damping)
-    orbit = refine_orbit(osc, exact + [1e-3, -2e-3], 1, stepper)
+    orbit = refine_orbit(osc, exact + np.array([1e-3, -2e-3]), 1, stepper)
     np.testing.assert_allclose(orbit.point, exact, rtol=0, atol=1e-12)
     found = np.linalg.eigvals(orbit.monodromy)
     wanted = multipliers(damping)
     if damping == 1.0:  # a double eigenvalue: its split is the root of the rounding error, its sum is not
         found, wanted = [found.sum(), found.prod()], [sum(wanted), wanted[0] * wanted[1]]
     else:
-        found = sorted(found, key=lambda m: (m.real, m.imag))
+        found = sorted(found, key=in_order)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12)
 
 

@@ -50,9 +50,7 @@ def strong_errors(osc, starts, seed, levels=LEVELS):
 
 
 def linear_scene(**changes):
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.2, excitations=(vk.Harmonic(0.3, 0.8),), **changes
-    )
+    return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.2, excitations=(vk.Harmonic(0.3, 0.8),), **changes)
 
 
 def test_weak_order_two_on_exact_moments():
@@ -103,10 +101,8 @@ def test_strong_order_through_hertz_contacts():
 
 
 def test_ito_not_stratonovich():
-    """For dv = c v √D dW without drift the mean of v stays: in Stratonovich's reading it would grow like exp(c²DT/2)."""
-    osc = vk.Oscillator(
-        natural_frequency=1e-3, damping_ratio=0.0, noise=vk.StateDependentNoise(0.5, "v")
-    )
+    """For dv = v √D dW without drift the mean of v stays; in Stratonovich's reading it would grow like exp(DT/2)."""
+    osc = vk.Oscillator(natural_frequency=1e-3, damping_ratio=0.0, noise=vk.StateDependentNoise(0.5, "v"))
     count = 40_000
     time = 2.0
     interval_share = time / osc.section_interval

@@ -63,7 +63,7 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
     if largest >= 1:
         raise StructureError(
-            f"the orbit at {tuple(orbit.point)} has a multiplier of size {largest:.6g}; only a stable one (all below 1) "
-            "has a quasi-potential round it."
+            f"the orbit at {tuple(orbit.point)} has a multiplier of size {largest:.6g}; only a stable one "
+            "(all below 1) has a quasi-potential round it."
         )
     return LocalPotential(monodromy, gramian, scipy.linalg.solve_discrete_lyapunov(monodromy, gramian))

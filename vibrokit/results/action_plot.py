@@ -25,7 +25,7 @@ class ActionPlotResult(Result):
         return action_plot(self.data, self.energies, ax=ax)
 
     def plot_paths(self, ax: Any = None) -> Any:
-        """Draw the most probable exit paths on the section, over the basins; see `vibrokit.plots.actions.exit_paths`."""
+        """Draw the exit paths on the section, over the basins; see `vibrokit.plots.actions.exit_paths`."""
         from vibrokit.plots.actions import exit_paths
 
         return exit_paths(self.data, self.energies, ax=ax)

@@ -92,9 +92,7 @@ def _read(dataset: xarray.Dataset, header: dict[str, Any]) -> Result:
     for index, method in enumerate(header["methods"]):
         source, target, value, lower, upper, residual = (float(dataset[f"energy_{n}"][index]) for n in _NUMBERS)
         path = _read_path(dataset, _PATH.format(index=index))
-        energies.append(
-            ActivationEnergy(int(source), int(target), value, lower, upper, method, residual, path)
-        )
+        energies.append(ActivationEnergy(int(source), int(target), value, lower, upper, method, residual, path))
     own = [name for name in dataset.variables if str(name).startswith(("energy_", "path"))]
     seed = header["seed"]
     return _KINDS[kind](

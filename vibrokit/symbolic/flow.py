@@ -71,8 +71,8 @@ def _refuse_jumps(model: Model) -> None:
     for barrier, contact in zip(model.scene.barriers, model.contacts, strict=True):
         if contact.jumps:
             raise SceneError(
-                f"the force of {barrier.law} jumps at first touch, and so would the momenta of an exit path, which this "
-                "version does not follow; give a law that begins at zero, such as damping in proportion to the depth."
+                f"the force of {barrier.law} jumps at first touch, and so would the momenta of an exit path, which "
+                "this version does not follow; give a law that begins at zero, such as damping proportional to depth."
             )
 
 

@@ -18,7 +18,7 @@ from vibrokit.kernels.templates.scene import (
     stop,
     taylor,
 )
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER, SPARE
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER
 
 # --- scene above, stepper below ---
 

@@ -84,7 +84,7 @@ def settle(y, memory, pushing, theta, spare):
 
 @njit(**INNER)
 def cross(y, memory, pushing, theta, desk):
-    """Settle at an event. Where the force jumps there, so do the derivatives of the velocity, by its saltation matrix."""
+    """Settle at an event. Where the force jumps, so do the derivatives of the velocity, by its saltation matrix."""
     if DERIVATIVES_JUMP:
         rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
         before = desk[SPARE, 1]

@@ -14,7 +14,6 @@ from vibrokit.kernels.templates.steps import (
     FREE_STEP,
     INNER,
     SPAN,
-    SPARE,
     STAGE,
     TIME,
     TRIAL,
