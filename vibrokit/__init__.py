@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
     from vibrokit.results.files import load_result as load_result
+    from vibrokit.scene_file import bundled_scenes as bundled_scenes
     from vibrokit.scene_file import load_scene as load_scene
     from vibrokit.scene_file import save_scene as save_scene
     from vibrokit.structure.find import find_structure as find_structure
@@ -64,6 +65,7 @@ _HOMES = {
     "LinearSpring": "vibrokit.parts.spring.linear",
     "Spring": "vibrokit.parts.spring.spring",
     "load_result": "vibrokit.results.files",
+    "bundled_scenes": "vibrokit.scene_file",
     "load_scene": "vibrokit.scene_file",
     "save_scene": "vibrokit.scene_file",
     "find_structure": "vibrokit.structure.find",

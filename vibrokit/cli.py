@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from vibrokit.errors import VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.kernels.ensemble import Progress
+    from vibrokit.kernels.stepper import Stepper
     from vibrokit.results.result import Result
     from vibrokit.structure.structure import Structure
 
@@ -25,7 +27,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status: 0, 1 where a check failed, 2 where the input is wrong."""
     options = _parser().parse_args(arguments)
     try:
-        return int(options.command(options) or 0)
+        status = int(options.command(options) or 0)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # the reader of our output has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (VibrokitError, OSError) as error:
         print(f"vibrokit: {error}", file=sys.stderr)
         return 2
@@ -47,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", parents=[scene], help="find steady states and their activation energies")
     run.add_argument("--analyzer", nargs="+", default=["action-plot"], metavar="NAME", help="default: action-plot")
     run.add_argument("--set", action="append", default=[], metavar="FIELD=NUMBER", help="a setting of the analyzer")
+    run.add_argument("--stepper", metavar="NAME[:NUMBER]", help="rk4:STEPS, order8:TOLERANCE or free-flight:TOLERANCE")
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
     run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
     run.add_argument("--json", action="store_true", help="print one JSON object and draw nothing")
@@ -85,10 +93,13 @@ def _run(options: argparse.Namespace) -> None:
     osc = load_scene(options.scene)
     kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
     settings = _settings(options.set)
+    stepper = _stepper(options.stepper)
+    if stepper is not None:
+        settings["stepper"] = stepper
     analyzers = [kind(**_known(kind, settings)) for kind in kinds]
     cells = (_cells(options.cells),) * 2
     with _Bar("basins") as bar:
-        structure = find_structure(osc, cells=cells, rng=options.seed, progress=bar)
+        structure = find_structure(osc, cells=cells, stepper=stepper, rng=options.seed, progress=bar)
     if not options.json:
         print(_attractor_table(options.scene, structure))
     results = {}
@@ -123,6 +134,25 @@ def _settings(words: list[str]) -> dict[str, Any]:
         if not equals:
             raise VibrokitError(f"--set {word}: write FIELD=NUMBER, such as points=40000.")
     return settings
+
+
+def _stepper(text: str | None) -> Stepper | None:
+    """Read a stepper as the command line names it."""
+    if text is None:
+        return None
+    from vibrokit.errors import nearest
+    from vibrokit.kernels.free_flight import FreeFlight
+    from vibrokit.kernels.order8 import Order8
+    from vibrokit.kernels.rk4 import RK4
+
+    kinds: dict[str, Callable[..., Stepper]] = {"rk4": RK4, "order8": Order8, "free-flight": FreeFlight}
+    name, colon, number = text.partition(":")
+    if name not in kinds:
+        raise VibrokitError(f"--stepper {text}: there is no stepper {name!r}{nearest(name, kinds)}")
+    try:
+        return kinds[name](*([int(number) if name == "rk4" else float(number)] if colon else []))
+    except ValueError as error:
+        raise VibrokitError(f"--stepper {text}: {error}") from error
 
 
 def _known(kind: type, settings: dict[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,17 @@ STEPPERS = [vk.FreeFlight(tolerance=1e-12), vk.Order8(tolerance=1e-12)]
 @pytest.mark.parametrize("stiffness", [1.0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
 @pytest.mark.parametrize("excess", [1.0, 1e-2, 1e-4, 1e-6, 1e-8], ids=lambda e: f"excess{e:g}")
 def test_back_after_whole_periods(stepper, law, stiffness, excess):
+    check_periods(stepper, law, stiffness, excess)
+
+
+@pytest.mark.parametrize("law", ["hertz", "linear"])
+@pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e8, 1e12])
+def test_a_visit_of_a_ten_billionth_is_not_missed(law, stiffness):
+    """The visit is far shorter than any step; only a tolerance below its depth can tell what it does."""
+    check_periods(vk.FreeFlight(tolerance=1e-14), law, stiffness, 1e-10)
+
+
+def check_periods(stepper, law, stiffness, excess):
     place = 0.3
     speed = place * (1 + excess)
     make, power = {"hertz": (vk.Hertz, 1.5), "linear": (vk.Linear, 1.0)}[law]

@@ -11,11 +11,25 @@ def energy(x, v, k, b, power):
     return 0.5 * v**2 + 0.5 * x**2 + k * depth ** (power + 1) / (power + 1)
 
 
+# RK4 crosses contacts inside a step. For a linear stop a crossing at speed v changes the energy by at most k v² h²/8
+# (the force is mistaken over a part of the step, to second order), 100 crossings of k = 300 at v = 0.75, h = 2π/4096
+# with random signs by 10 k v² h²/8 = 5e-4, a share of 1.5e-3 of it all; for Hertz the next half order is gained.
+HERTZ, LINEAR = (vk.Hertz(50.0), 1.5), (vk.Linear(300.0), 1.0)
+
+
 @pytest.mark.parametrize(
-    ("stepper", "tolerance"), [(vk.Order8(1e-14), 1e-11), (vk.FreeFlight(1e-14), 1e-11), (vk.RK4(4096), 2e-6)], ids=str
+    ("law", "power", "stepper", "tolerance"),
+    [
+        (*HERTZ, vk.Order8(1e-14), 1e-11),
+        (*HERTZ, vk.FreeFlight(1e-14), 1e-11),
+        (*HERTZ, vk.RK4(4096), 2e-6),
+        (*LINEAR, vk.Order8(1e-14), 1e-11),
+        (*LINEAR, vk.FreeFlight(1e-14), 1e-11),
+        (*LINEAR, vk.RK4(4096), 1.5e-3),
+    ],
+    ids=str,
 )
-@pytest.mark.parametrize(("law", "power"), [(vk.Hertz(50.0), 1.5), (vk.Linear(300.0), 1.0)], ids=["hertz", "linear"])
-def test_energy_is_kept(stepper, tolerance, law, power):
+def test_energy_is_kept(law, power, stepper, tolerance):
     osc = vk.Oscillator(
         natural_frequency=1.0,
         damping_ratio=0.0,

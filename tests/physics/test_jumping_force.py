@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.errors import SceneError, StepperError
+from vibrokit.errors import StepperError
 from vibrokit.structure.orbits import section_derivative
 
 LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
@@ -65,5 +65,5 @@ def test_fixed_steps_refuse_derivatives():
 def test_momenta_are_refused_with_the_reason():
     osc = kelvin_voigt(noise=vk.WhiteNoise(1e-5))
     structure = vk.find_structure(osc, cells=(30, 30))
-    with pytest.raises(SceneError, match="jumps at first touch"):
+    with pytest.raises(StepperError, match="jumps at first touch"):
         vk.ActionPlot(points=10).run(osc, structure)

@@ -100,14 +100,20 @@ class ActionPlot(Analyzer):
         energies, words = [], []
         for number, attractor in enumerate(sources):
             angles = 2 * np.pi * np.arange(self.points) / self.points
-            ring = self._ring(osc, structure, attractor, angles, stepper, _share(progress, number, len(sources)))
+            share = _share(progress, number, len(sources))
+            try:
+                ring = self._ring(osc, structure, attractor, angles, stepper, share)
+                best = ring.exits.best
+                found = None if best is None else self._energy(osc, structure, attractor, ring, best, stepper)
+            except StructureError as error:
+                words.append(f"Attractor {attractor.label} was left out: {error}")
+                continue
             start = f"start_{attractor.label}"
             data[f"angle_{attractor.label}"] = (start, ring.angles)
             data[f"action_{attractor.label}"] = (start, ring.exits.actions)
             data[f"status_{attractor.label}"] = (start, ring.exits.status.astype(np.int32))
             words.append(f"Attractor {attractor.label}: {ring.exits.summary()}")
-            if ring.exits.best is not None:
-                energies.append(self._energy(osc, structure, attractor, ring, ring.exits.best, stepper))
+            energies += [] if found is None else [found]
         return ActionPlotResult(
             energies=tuple(energies),
             data=xarray.Dataset(data, attrs={"region": structure.basins.region.bounds.ravel()}),

@@ -15,6 +15,8 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.orbits import Orbit
 from vibrokit.symbolic.flow_kind import Flow
 
+_PIECES = 16
+
 Array = NDArray[np.float64]
 
 
@@ -46,7 +48,9 @@ class LocalPotential:
 def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPotential:
     """Linearise Hamilton's equations along a stable orbit, where p = 0, and solve for the covariance.
 
-    Over one period the linearised flow is [[M, C M⁻ᵀ], [0, M⁻ᵀ]], which gives both M and the Gramian C.
+    Over a time the linearised flow is [[M, C M⁻ᵀ], [0, M⁻ᵀ]], which gives both M and the Gramian C. The period is cut
+    into pieces, for M⁻ᵀ grows as fast as M decays and would bury C in rounding errors: C = Σ M' C_piece M'ᵀ, M' leading
+    from the end of the piece to the end of the period.
 
     Raises
     ------
@@ -54,14 +58,21 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
         The orbit is not stable, so that it has no stationary covariance.
     """
     size = len(orbit.point)
-    start = np.concatenate([orbit.point, np.zeros(size + 1), np.eye(2 * size).ravel()])
-    ended = run_ensemble(osc, Flow.HAMILTONIAN_VARIATIONAL, stepper, start[None], orbit.period)
-    linear = ended.states[0, 2 * size + 1 :].reshape(2 * size, 2 * size)
-    monodromy, upper = linear[:size, :size], linear[:size, size:]
-    gramian = upper @ monodromy.T
-    gramian = (gramian + gramian.T) / 2
+    interval = osc.section_interval / _PIECES
+    point, monodromy, gramian = orbit.point, np.eye(size), np.zeros((size, size))
+    for piece in range(_PIECES * orbit.period):
+        start = np.concatenate([point, np.zeros(size + 1), np.eye(2 * size).ravel()])
+        begin = (piece % _PIECES) * interval
+        ended = run_ensemble(
+            osc, Flow.HAMILTONIAN_VARIATIONAL, stepper, start[None], 1, start_time=begin, interval=interval
+        )
+        point = ended.states[0, :size]
+        linear = ended.states[0, 2 * size + 1 :].reshape(2 * size, 2 * size)
+        step, upper = linear[:size, :size], linear[:size, size:]
+        gathered = upper @ step.T
+        monodromy, gramian = step @ monodromy, step @ gramian @ step.T + (gathered + gathered.T) / 2
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
-    if largest >= 1:
+    if not largest < 1:
         raise StructureError(
             f"the orbit at {tuple(orbit.point)} has a multiplier of size {largest:.6g}; only a stable one "
             "(all below 1) has a quasi-potential round it."

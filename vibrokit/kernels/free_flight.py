@@ -6,6 +6,7 @@ import dataclasses
 from typing import ClassVar
 
 from vibrokit.kernels.order8 import LocatedStepper
+from vibrokit.kernels.stepper import refuse_jumping_momenta
 from vibrokit.symbolic.scene_text import SceneText
 
 
@@ -29,4 +30,5 @@ class FreeFlight(LocatedStepper):
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, and the series of the flight."""
+        refuse_jumping_momenta(text)
         return [text.constants, text.forcing, text.rhs, text.stops, text.flight]

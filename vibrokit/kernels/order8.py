@@ -6,7 +6,7 @@ import dataclasses
 from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.stepper import Stepper, repeats
+from vibrokit.kernels.stepper import Stepper, refuse_jumping_momenta
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
@@ -36,7 +36,7 @@ class LocatedStepper(Stepper):
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
         """Tolerance, most steps in an interval, and whether the forcing repeats with it."""
-        return float(self.tolerance), _MOST_STEPS, float(repeats(scene, interval))
+        return float(self.tolerance), _MOST_STEPS, float(scene.repeats_after(interval))
 
     def refined(self) -> Self:
         """A hundredth of the tolerance."""
@@ -72,4 +72,5 @@ class Order8(LocatedStepper):
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops."""
+        refuse_jumping_momenta(text)
         return [text.constants, text.forcing, text.rhs, text.stops]

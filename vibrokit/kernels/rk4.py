@@ -7,8 +7,9 @@ from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.lanes import lane_step, tabulation
-from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stepper import Stepper, refuse_jumping_momenta
 from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
 
 _LARGEST = 10**7
@@ -52,7 +53,8 @@ class RK4(Stepper):
         StepperError
             Derivatives of a force that jumps: steps across the jump cannot have them.
         """
-        if text.jumps:
+        refuse_jumping_momenta(text)
+        if text.jumps and text.flow is Flow.STATE_VARIATIONAL:
             raise StepperError(
                 "RK4 steps across contacts, and the derivatives of a motion whose contact force jumps at first touch "
                 "jump too; take FreeFlight or Order8 for them."

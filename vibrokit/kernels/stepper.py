@@ -6,6 +6,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
 
+from vibrokit.errors import StepperError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
@@ -45,9 +46,10 @@ class Stepper(ABC):
         """Raise StepperError if this stepper cannot integrate this flow of this scene."""
 
 
-def repeats(scene: Scene, interval: float) -> bool:
-    """Whether the forcing is the same in each interval of this length."""
-    if scene.autonomous:
-        return True
-    multiple = interval / scene.section_interval
-    return abs(multiple - round(multiple)) < 1e-12 * multiple
+def refuse_jumping_momenta(text: SceneText) -> None:
+    """Raise StepperError if momenta are integrated under a contact force that jumps at first touch."""
+    if text.jumps and text.flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
+        raise StepperError(
+            "a contact force jumps at first touch, and so would the momenta of an exit path, which this version does "
+            "not follow; give a law whose force begins at zero, such as damping proportional to depth."
+        )

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from vibrokit.results.result import Result
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ActionPlotResult(Result):
     """Actions of exits against the angle at which they started, attractor by attractor.
 

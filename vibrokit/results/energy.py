@@ -58,4 +58,4 @@ class ActivationEnergy:
     upper: float
     method: str
     residual: float
-    path: ExitPath | None = None
+    path: ExitPath | None = dataclasses.field(default=None, repr=False)

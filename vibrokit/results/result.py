@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Result(ABC):
     """A record of one analysis. Abstract; each analyzer has its own, which knows how to draw itself.
 
@@ -52,6 +52,10 @@ class Result(ABC):
     seconds: float
     versions: Mapping[str, str]
     seed: int | None = None
+
+    def __repr__(self) -> str:
+        energies = ", ".join(f"{e.source} → {e.target}: {e.value:.6g}" for e in self.energies)
+        return f"<{type(self).__name__}: ΔU {energies or 'none'}. {self.status}>"
 
     @abstractmethod
     def plot(self, ax: Any = None) -> Any:

@@ -10,7 +10,7 @@ from vibrokit.structure.attractor import Attractor
 from vibrokit.structure.basins import Basins
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Structure:
     """Attractors and basins of a scene.
 
@@ -36,6 +36,9 @@ class Structure:
     status: str
     saddles: tuple[Any, ...] = ()
     manifolds: tuple[Any, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Structure: {self.status}>"
 
     def attractor(self, label: int) -> Attractor:
         """Return the attractor of a label.

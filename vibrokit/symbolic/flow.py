@@ -6,7 +6,6 @@ import dataclasses
 
 import sympy
 
-from vibrokit.errors import SceneError
 from vibrokit.symbolic.contact import DEPTH, RATE
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
@@ -33,15 +32,7 @@ class FlowEquations:
 
 
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
-    """Derive the equations of a flow.
-
-    Raises
-    ------
-    SceneError
-        Momenta are asked of a force that jumps at first touch: they jump there too, which is not done yet.
-    """
-    if flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
-        _refuse_jumps(model)
+    """Derive the equations of a flow."""
     opaque = model.opaque_forces
     forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
     drift = model.drift_with(forcing, opaque)
@@ -65,15 +56,6 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
         variables = (*variables, *matrix)
         rates += list(linear * matrix)
     return _with_plain_contacts(model, opaque, variables, rates)
-
-
-def _refuse_jumps(model: Model) -> None:
-    for barrier, contact in zip(model.scene.barriers, model.contacts, strict=True):
-        if contact.jumps:
-            raise SceneError(
-                f"the force of {barrier.law} jumps at first touch, and so would the momenta of an exit path, which "
-                "this version does not follow; give a law that begins at zero, such as damping proportional to depth."
-            )
 
 
 def _with_plain_contacts(

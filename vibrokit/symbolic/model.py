@@ -203,6 +203,9 @@ class Model:
     def _repr_latex_(self) -> str:
         return rf"$\displaystyle {self.latex}$"
 
+    def __repr__(self) -> str:
+        return str(self)
+
     def __str__(self) -> str:
         lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]
         if self.momenta:

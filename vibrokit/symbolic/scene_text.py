@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+from vibrokit.symbolic.flow_kind import Flow
+
 
 @dataclasses.dataclass(frozen=True)
 class SceneText:
@@ -11,6 +13,7 @@ class SceneText:
 
     Attributes
     ----------
+    flow : Flow
     variables : tuple of str
         Names of the numbers that are integrated.
     parameters : dict of str to int
@@ -20,11 +23,12 @@ class SceneText:
     forced : bool
         Whether anything depends on time.
     jumps : bool
-        Whether derivatives are integrated of a force that jumps at first touch.
+        Whether a contact force jumps at first touch.
     preamble, constants, forcing, derivative, rhs, stops, flight, amplitude, slope : str
         Pieces of the module; empty where the scene has no need of them.
     """
 
+    flow: Flow
     variables: tuple[str, ...]
     parameters: dict[str, int]
     states: int

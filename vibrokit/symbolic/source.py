@@ -49,11 +49,12 @@ def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
     writer = _SceneWriter(Model(scene), flow)
     amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
     return SceneText(
+        flow=flow,
         variables=tuple(writer.variables),
         parameters={name: writer.place(name) for name in writer.parameter_names()},
         states=len(writer.model.state),
         forced=writer.forced,
-        jumps=flow is Flow.STATE_VARIATIONAL and any(contact.jumps for contact in writer.model.contacts),
+        jumps=any(contact.jumps for contact in writer.model.contacts),
         preamble=writer.preamble(f"The {flow.value} flow of a scene."),
         constants=writer.constants(),
         forcing=writer.forcing(),

@@ -53,7 +53,7 @@ def slope(course, sigma, reach, i, pushing, theta, desk, row):
                 x = wall + side * sigma * sigma
                 desk[STAGE, 0] = x
             depth, rate = side * (x - wall), side * desk[STAGE, 1]
-            weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * np.sqrt(depth) / rate
+            weight = 2.0 * sigma if course == ROOT_TIME else 2.0 * sigma / rate
             along = rate if course == ROOT_TIME else 1.0  # depth = along sigma² near the stop
             least = 64.0 * EPSILON * abs(wall) + 1e-16 * reach * reach * abs(along)
             if depth < least:
