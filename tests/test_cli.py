@@ -32,6 +32,19 @@ def test_json_is_one_object_of_the_promised_shape(tmp_path, monkeypatch, capsys)
     assert not list(tmp_path.iterdir())
 
 
+def test_one_attractor_is_a_finding_and_a_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one.toml").write_text(
+        'natural_frequency = 1.0\ndamping_ratio = 0.1\nnoise = { name = "white", intensity = 1e-3 }\n'
+    )
+    assert main(["run", "one.toml", *QUICK, "--json"]) == 0
+    out, err = capsys.readouterr()
+    record = json.loads(out)
+    assert len(record["attractors"]) == 1
+    assert record["energies"] == []
+    assert "one attractor only" in err
+
+
 def test_equations(capsys):
     assert main(["equations", "hertz-0.570"]) == 0
     assert "p_2" in capsys.readouterr().out
@@ -54,7 +67,7 @@ def test_list(capsys):
         (["run", "double-well", "--set", "points"], "FIELD=NUMBER"),
         (["run", "double-well", "--cells", "1"], "--cells"),
         (["run", "double-well", "--stepper", "rk5:3"], "rk4"),
-        (["run", "double-well", "--stepper", "rk4:few"], "--stepper"),
+        (["run", "double-well", "--stepper", "rk4:few"], "rk4:few"),
         (["run", "double-well", "--stepper", "order8:7"], "tolerance"),
         (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
         (["plot", "nothing.nc"], "nothing.nc"),

@@ -7,16 +7,15 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vibrokit import __version__
-from vibrokit.errors import VibrokitError
+from vibrokit.errors import StructureError, VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.kernels.ensemble import Progress
-    from vibrokit.kernels.stepper import Stepper
     from vibrokit.results.result import Result
     from vibrokit.structure.structure import Structure
 
@@ -85,6 +84,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> None:
     from vibrokit.analyzers.analyzer import Analyzer
+    from vibrokit.kernels.named import named_stepper
     from vibrokit.registry import Group, load
     from vibrokit.scene_file import load_scene
     from vibrokit.structure.find import find_structure
@@ -93,7 +93,7 @@ def _run(options: argparse.Namespace) -> None:
     osc = load_scene(options.scene)
     kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
     settings = _settings(options.set)
-    stepper = _stepper(options.stepper)
+    stepper = None if options.stepper is None else named_stepper(options.stepper)
     if stepper is not None:
         settings["stepper"] = stepper
     analyzers = [kind(**_known(kind, settings)) for kind in kinds]
@@ -104,8 +104,11 @@ def _run(options: argparse.Namespace) -> None:
         print(_attractor_table(options.scene, structure))
     results = {}
     for name, analyzer in zip(options.analyzer, analyzers, strict=True):
-        with _Bar(name) as bar:
-            results[name] = analyzer.run(osc, structure, progress=bar)
+        try:
+            with _Bar(name) as bar:
+                results[name] = analyzer.run(osc, structure, progress=bar)
+        except StructureError as error:  # what was found so far is worth its table
+            print(f"vibrokit: {name}: {error}", file=sys.stderr)
     seconds = time.perf_counter() - began
     if options.output is not None:
         for name, result in results.items():
@@ -134,25 +137,6 @@ def _settings(words: list[str]) -> dict[str, Any]:
         if not equals:
             raise VibrokitError(f"--set {word}: write FIELD=NUMBER, such as points=40000.")
     return settings
-
-
-def _stepper(text: str | None) -> Stepper | None:
-    """Read a stepper as the command line names it."""
-    if text is None:
-        return None
-    from vibrokit.errors import nearest
-    from vibrokit.kernels.free_flight import FreeFlight
-    from vibrokit.kernels.order8 import Order8
-    from vibrokit.kernels.rk4 import RK4
-
-    kinds: dict[str, Callable[..., Stepper]] = {"rk4": RK4, "order8": Order8, "free-flight": FreeFlight}
-    name, colon, number = text.partition(":")
-    if name not in kinds:
-        raise VibrokitError(f"--stepper {text}: there is no stepper {name!r}{nearest(name, kinds)}")
-    try:
-        return kinds[name](*([int(number) if name == "rk4" else float(number)] if colon else []))
-    except ValueError as error:
-        raise VibrokitError(f"--stepper {text}: {error}") from error
 
 
 def _known(kind: type, settings: dict[str, Any]) -> dict[str, Any]:
@@ -230,6 +214,8 @@ def _save_figure(result: Result, path: Path) -> None:
 def _record(
     options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float
 ) -> dict[str, Any]:
+    from vibrokit.analyzers.analyzer import versions
+
     energies = ("source", "target", "method", "value", "lower", "upper", "residual")
     return {
         "scene": options.scene,
@@ -249,7 +235,7 @@ def _record(
             for s in structure.saddles
         ],
         "energies": [{key: getattr(e, key) for key in energies} for r in results.values() for e in r.energies],
-        "versions": next(iter(results.values())).versions if results else {},
+        "versions": versions(),
         "seed": options.seed,
         "seconds": seconds,
     }

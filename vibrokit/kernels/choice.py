@@ -2,10 +2,31 @@
 
 from __future__ import annotations
 
+import math
+import sys
+import warnings
+from pathlib import Path
+from types import FrameType
+
+from vibrokit.errors import StepperError
+from vibrokit.kernels.contact_time import contact_times
+from vibrokit.kernels.free_flight import FreeFlight
+from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.excitation.constant import Constant
+from vibrokit.parts.excitation.harmonic import Harmonic
+from vibrokit.parts.noise.white import WhiteNoise
 from vibrokit.parts.scene import Scene
+from vibrokit.parts.spring.linear import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
+
+_STEPS = 256
+_MOST_STEPS, _MOST_NOISY_STEPS = 4096, 65536  # in an interval of one free oscillation or less
+_PER_TURN = 64  # steps in one free oscillation
+_TOO_FEW = 8  # steps in one contact, below which RK4 was seen to invent steady states
+_TOLERANCE = 1e-10
+_PACKAGE = str(Path(__file__).parents[1])
 
 
 class CoarseStepsWarning(UserWarning):
@@ -13,8 +34,101 @@ class CoarseStepsWarning(UserWarning):
 
 
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
-    return RK4()
+    """Choose the stepper for many trajectories: RK4 where its steps resolve every contact, else as for single ones.
+
+    Parameters
+    ----------
+    scene : Scene
+    flow : Flow
+
+    Returns
+    -------
+    Stepper
+    """
+    try:
+        steps = _power_of_two(_steps_needed(scene, flow))
+    except StepperError:  # not a flow that fixed steps can follow
+        return single_stepper(scene, flow)
+    turns = max(1.0, _turns(scene))
+    if flow is Flow.NOISY:  # where these are too few, running it warns
+        return RK4(min(steps, int(_MOST_NOISY_STEPS * turns)))
+    return RK4(steps) if steps <= _MOST_STEPS * turns else single_stepper(scene, flow)
 
 
 def single_stepper(scene: Scene, flow: Flow) -> Stepper:
-    return RK4()
+    """Choose the stepper for one trajectory: FreeFlight where it applies, else Order8; RK4 under noise.
+
+    Parameters
+    ----------
+    scene : Scene
+    flow : Flow
+
+    Returns
+    -------
+    Stepper
+    """
+    if flow is Flow.NOISY:
+        return ensemble_stepper(scene, flow)
+    return FreeFlight(_TOLERANCE) if _flies(scene, flow) else Order8(_TOLERANCE)
+
+
+def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
+    """Warn, at the line that called into this package, if RK4 takes too few steps in a contact to follow it."""
+    if not isinstance(stepper, RK4):
+        return
+    shortest = min((contact.duration for contact in contact_times(scene, flow)), default=math.inf)
+    taken = stepper.steps * shortest / scene.time_unit
+    if taken >= _TOO_FEW:
+        return
+    steps = _power_of_two(_steps_needed(scene, flow))
+    advice = f"take RK4(steps={steps})" if steps <= _MOST_NOISY_STEPS else f"it needs some {steps} steps"
+    if flow is not Flow.NOISY:
+        advice += f", or {type(single_stepper(scene, flow)).__name__}, which locates contacts"
+    warnings.warn(
+        f"RK4(steps={stepper.steps}) takes about {taken:.2g} steps in a contact with a stop, too few to follow it; "
+        f"{advice}.",
+        CoarseStepsWarning,
+        stacklevel=_frames_inside(sys._getframe()),
+    )
+
+
+def _steps_needed(scene: Scene, flow: Flow) -> float:
+    unit = scene.time_unit
+    needed = _PER_TURN * _turns(scene)
+    for contact in contact_times(scene, flow):
+        needed = max(needed, _steps_per_contact(contact.exponent) * unit / contact.duration)
+    return needed
+
+
+def _turns(scene: Scene) -> float:
+    """Free oscillations in the interval that steps are counted in."""
+    return scene.time_unit * scene.natural_frequency / (2 * math.pi)
+
+
+def _steps_per_contact(exponent: float) -> int:
+    """The sharper the touch, the lower the order of steps across it, and the more of them."""
+    if exponent > 1.25:
+        return 16
+    return 32 if exponent > 0.75 else 64
+
+
+def _power_of_two(needed: float) -> int:
+    return max(_STEPS, 2 ** math.ceil(math.log2(needed)))
+
+
+def _flies(scene: Scene, flow: Flow) -> bool:
+    """Whether all parts are of those built in that FreeFlight is known to take; asks no formula, for speed."""
+    linear = scene.spring is None or type(scene.spring) is LinearSpring
+    sinusoids = all(type(part) in (Harmonic, Constant) for part in scene.excitations)
+    if scene.noise is None or type(scene.noise) is WhiteNoise:
+        return linear and sinusoids
+    momenta = flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL)
+    return linear and sinusoids and not momenta and not scene.noise.extra_states
+
+
+def _frames_inside(frame: FrameType | None) -> int:
+    """How many frames up the first is that is not of this package; 1 is the frame given."""
+    count = 1
+    while frame is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, count = frame.f_back, count + 1
+    return count

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
@@ -111,6 +112,7 @@ def run_ensemble(
     Ensemble
     """
     kernel = kernel_for(scene, flow, stepper)
+    warn_of_coarse_steps(scene, flow, stepper)
     starts = np.ascontiguousarray(states, dtype=float)
     budgets = np.broadcast_to(budget, len(starts))
     span = scene.section_interval if interval is None else interval

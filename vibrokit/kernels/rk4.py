@@ -46,7 +46,7 @@ class RK4(Stepper):
         return float(steps), float(scene.repeats_after(interval)), unit / self.steps
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The lane-packed step, and what it calls.
+        """The lane-packed step, and what it calls; and the laws of the stops.
 
         Raises
         ------
@@ -60,7 +60,8 @@ class RK4(Stepper):
                 "jump too; take FreeFlight or Order8 for them."
             )
         noise = [text.amplitude, text.slope]
-        return [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]
+        pieces = [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]
+        return [*pieces, text.stops]  # the laws by themselves, compiled only where contact times are asked for
 
     def refined(self) -> Self:
         """Twice the steps."""

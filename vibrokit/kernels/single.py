@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
@@ -47,6 +48,7 @@ def record(
         Shorter if the numbers ran out of range.
     """
     module = kernel_for(scene, flow, stepper).module
+    warn_of_coarse_steps(scene, flow, stepper)
     settings = np.array(stepper.settings(scene, scene.time_unit))
     out = np.empty((count + 1, len(state)))
     noise: tuple[Any, ...] = ()

@@ -10,8 +10,8 @@ from typing import Any
 
 import sympy
 
-from vibrokit.parts.formula import LARGEST_EXPONENT, OPERATIONS, bottom_up, no_arithmetic, operands
 from vibrokit.parts.formula_text import FormulaError, refusal
+from vibrokit.parts.formula_tree import LARGEST_EXPONENT, OPERATIONS, bottom_up, no_arithmetic, operands
 
 LARGEST_EXACT_DENOMINATOR = 64
 LONGEST_EXACT_CONSTANT = 20  # nodes of a SymPy tree

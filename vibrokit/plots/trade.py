@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 
 from vibrokit.plots.axes import axes_or_new, colour
 
+_FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axis
+
 
 class WorkPrecision(Protocol):
     """What is drawn of one setting of a stepper."""
@@ -42,34 +44,31 @@ def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> 
     -------
     list of artists
     """
-    axes = axes_or_new(ax)
+    axes = axes_or_new(ax, 6.4, 4.8)
     artists: list[Any] = []
     for label, name in enumerate(dict.fromkeys(row.name for row in rows)):
         own = [row for row in rows if row.name == name]
-        errors = [row.error_median for row in own]
+        errors = [max(row.error_median, _FLOOR) for row in own]
         times = [1e6 * row.seconds for row in own]
         artists += axes.plot(times, errors, "o-", color=colour(label), markersize=4, label=f"{name}, ensemble")
         artists.append(
             axes.fill_between(
-                times, errors, [row.error_90 for row in own], color=colour(label), alpha=0.12, linewidth=0
+                times, errors, [max(row.error_90, _FLOOR) for row in own], color=colour(label), alpha=0.12, linewidth=0
             )
         )
         artists += axes.plot(
             [1e6 * row.seconds_alone for row in own], errors, "o:", color=colour(label), markersize=3,
             markerfacecolor="white", label=f"{name}, alone",
         )  # fmt: skip
-        for row in own:
-            if row.default:
-                artists.append(
-                    axes.annotate(
-                        f"default: {row.stepper}", (1e6 * row.seconds, row.error_median), fontsize=8,
-                        xytext=(6, 6), textcoords="offset points", color=colour(label),
-                    )
-                )  # fmt: skip
+        for row in (row for row in own if row.default):
+            artists += axes.plot(
+                1e6 * row.seconds, max(row.error_median, _FLOOR), "o", color=colour(label), markersize=10,
+                markerfacecolor="none", label=f"default: {row.stepper}",
+            )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel(r"time per trajectory and period (µs)")
-    axes.set_ylabel(r"distance in $(x, v)$ to the reference (m, m s$^{-1}$)")
+    axes.set_ylabel(r"error: distance in $(x, v)$ (m, m s$^{-1}$)")
     axes.grid(which="major", color="0.9", linewidth=0.6)
-    axes.legend(fontsize=8, title="line: median, shade: to 90 %", title_fontsize=8)
+    axes.legend(fontsize=7, title="line: median, shade: to 90 %", title_fontsize=7)
     return artists

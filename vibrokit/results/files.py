@@ -1,4 +1,4 @@
-"""Results on disk: netCDF 3 through SciPy, opened as data and never unpickled."""
+"""Opens saved results: netCDF 3 through SciPy, read as data and never unpickled."""
 
 from __future__ import annotations
 
@@ -14,53 +14,15 @@ import xarray
 
 from vibrokit.errors import UnknownNameError, VibrokitError, nearest
 from vibrokit.results.action_plot import ActionPlotResult
-from vibrokit.results.atomic import write_atomically
 from vibrokit.results.energy import ActivationEnergy, ExitPath
 from vibrokit.results.result import Result
+from vibrokit.results.writing import NUMBERS, PATH
 
 _KINDS: Mapping[str, type[Result]] = {kind.kind: kind for kind in (ActionPlotResult,)}
-_FORMAT = 1
-_NUMBERS = ("source", "target", "value", "lower", "upper", "residual")
-_PATH = "path{index}_"
 
 
 class ResultFileError(VibrokitError, ValueError):
     """A file that is not a saved result."""
-
-
-def save_result(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a result to a netCDF file, whole or not at all."""
-    arrays: dict[str, Any] = {}
-    for name in _NUMBERS:
-        arrays[f"energy_{name}"] = ("energy", np.array([getattr(energy, name) for energy in result.energies]))
-    for index, energy in enumerate(result.energies):
-        if energy.path is not None:
-            arrays |= _path_arrays(_PATH.format(index=index), energy.path)
-    header = {
-        "format": _FORMAT,
-        "kind": result.kind,
-        "methods": [energy.method for energy in result.energies],
-        "scene": dict(result.scene),
-        "settings": dict(result.settings),
-        "status": result.status,
-        "seconds": result.seconds,
-        "versions": dict(result.versions),
-        "seed": None if result.seed is None else str(result.seed),
-    }
-    dataset = result.data.assign(arrays).assign_attrs(vibrokit=json.dumps(header))
-    content = dataset.to_netcdf(path=None, engine="scipy")
-    write_atomically(Path(path), bytes(content))
-
-
-def _path_arrays(prefix: str, path: ExitPath) -> dict[str, Any]:
-    sample, state, section = f"{prefix}sample", f"{prefix}state", f"{prefix}section"
-    return {
-        f"{prefix}t": (sample, path.t),
-        f"{prefix}q": ((sample, state), path.q),
-        f"{prefix}p": ((sample, state), path.p),
-        f"{prefix}action": (sample, path.action),
-        f"{prefix}on_section": (section, path.section),
-    }
 
 
 def load_result(path: str | os.PathLike[str]) -> Result:
@@ -90,8 +52,8 @@ def _read(dataset: xarray.Dataset, header: dict[str, Any]) -> Result:
         raise UnknownNameError(f"result of unknown kind {kind!r}{nearest(kind, _KINDS)}")
     energies = []
     for index, method in enumerate(header["methods"]):
-        source, target, value, lower, upper, residual = (float(dataset[f"energy_{n}"][index]) for n in _NUMBERS)
-        path = _read_path(dataset, _PATH.format(index=index))
+        source, target, value, lower, upper, residual = (float(dataset[f"energy_{n}"][index]) for n in NUMBERS)
+        path = _read_path(dataset, PATH.format(index=index))
         energies.append(ActivationEnergy(int(source), int(target), value, lower, upper, method, residual, path))
     own = [name for name in dataset.variables if str(name).startswith(("energy_", "path"))]
     seed = header["seed"]

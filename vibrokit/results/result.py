@@ -63,6 +63,6 @@ class Result(ABC):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
-        from vibrokit.results.files import save_result
+        from vibrokit.results.writing import save_result
 
         save_result(self, path)

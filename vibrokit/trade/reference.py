@@ -18,6 +18,7 @@ from vibrokit.kernels.order8 import Order8
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
+TIGHTEST = 2.3e-14  # relative tolerance, the least that SciPy's DOP853 takes
 _LOOKS = 16  # places at which each step is searched for a change of contact
 _FEWEST_STEPS = 32  # in an interval, so that the looks lie close
 _TURNS = 1_000_000  # changes of contact in one interval before it is given up
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 def reference_map(
-    scene: Scene, states: Array, periods: int = 1, *, flow: Flow = Flow.STATE, tolerance: float = 1e-13
+    scene: Scene, states: Array, periods: int = 1, *, flow: Flow = Flow.STATE, tolerance: float = TIGHTEST
 ) -> Array:
     """Map states from section to section, slowly and independently of every stepper.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import statistics
 import time
@@ -23,7 +24,7 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.trade.reference import reference_map
+from vibrokit.trade.reference import TIGHTEST, reference_map
 from vibrokit.trade.table import FirstCall, Trade, TradeRow, fitted_order
 
 STEPS = tuple(2**k for k in range(5, 13))
@@ -33,8 +34,11 @@ LADDERS: tuple[tuple[Stepper, ...], ...] = (
     tuple(Order8(tolerance) for tolerance in TOLERANCES),
     tuple(FreeFlight(tolerance) for tolerance in TOLERANCES),
 )
-_BLOCK = 64  # trajectories that one thread is given at least
+_FINEST = 1e-14
+_CHECKED = 16  # starts on which the references themselves are checked
 _MOST = 8192
+_FEW = 256
+_REMEMBERED = 1024  # trajectories whose arrays are counted
 _LEAST_REPEATS = 5
 _ALONE = 8  # trajectories that are timed one by one
 
@@ -45,7 +49,7 @@ def measure_steppers(
     osc: Oscillator,
     *,
     ladders: tuple[tuple[Stepper, ...], ...] = LADDERS,
-    starts: int = 48,
+    starts: int = 64,
     periods: int = 2,
     seconds: float = 0.6,
     rng: int | np.random.Generator = 0,
@@ -53,8 +57,10 @@ def measure_steppers(
 ) -> Trade:
     """Measure error, time and memory of every stepper that can integrate a scene, coarse to fine.
 
-    The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to an independent
-    reference: SciPy's DOP853 at relative tolerance 1e-13, restarted at every change of contact.
+    The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to a finer reference
+    that flies by another method: FreeFlight at 1e-14 for RK4 and Order8, Order8 at 1e-14 for FreeFlight. What these
+    two have in common, the steps in contact, is checked by SciPy's DOP853, restarted at every change of contact;
+    where FreeFlight refuses the scene, DOP853 is the reference of Order8.
 
     Parameters
     ----------
@@ -70,7 +76,7 @@ def measure_steppers(
     rng : int or numpy.random.Generator
         Chooses the starts.
     progress : callable, optional
-        Called with (settings done, settings in all); the reference counts as one.
+        Called with (settings done, settings in all); the references count as one.
 
     Returns
     -------
@@ -80,31 +86,75 @@ def measure_steppers(
     ------
     NoSectionError
         The excitations have no common period.
+    IntegrationError
+        A reference ran out of range.
     """
     states = starts_between_stops(osc, starts, np.random.default_rng(rng))
-    total = 1 + sum(len(ladder) for ladder in ladders)
+    calls, refused = _first_calls(osc, ladders, states[:1])
+    taken = [stepper for ladder in ladders for stepper in ladder if type(stepper).__name__ in calls]
+    report = progress or (lambda done, total: None)
+    report(0, 1 + len(taken))
+    references = References(osc, states, periods)
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
-    reference = reference_map(osc, states, periods)
-    done = 1
-    rows, calls, refused = [], [], {}
+    rows = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are what is measured here
-        for ladder in ladders:
-            try:
-                calls.append(_first_call(osc, ladder[0], states, periods))
-            except StepperError as error:
-                refused[type(ladder[0]).__name__] = str(error)
-                done += len(ladder)
-                continue
-            for stepper in ladder:
-                if progress is not None:
-                    progress(done, total)
-                rows.append(_row(osc, stepper, states, periods, reference, seconds, repr(stepper) in defaults))
-                done += 1
-    if progress is not None:
-        progress(total, total)
-    orders = {call.name: fitted_order([row for row in rows if row.name == call.name], rows) for call in calls}
-    return Trade(tuple(rows), tuple(calls), orders, refused, starts, periods, os.cpu_count() or 1)
+        for stepper in taken:
+            report(1 + len(rows), 1 + len(taken))
+            row = _row(osc, stepper, states, periods, references.ends_for(type(stepper).__name__), seconds)
+            rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
+    report(1 + len(taken), 1 + len(taken))
+    return Trade(
+        rows=tuple(rows),
+        first_calls=tuple(calls.values()),
+        references={name: references.title_for(name) for name in calls},
+        orders={name: fitted_order([row for row in rows if row.name == name], rows) for name in calls},
+        refused=refused,
+        checked=references.check(_CHECKED),
+        starts=starts,
+        periods=periods,
+        threads=os.cpu_count() or 1,
+    )
+
+
+class References:
+    """Where the starts end, by the finest steppers, each found by another method than what it is compared with.
+
+    Parameters
+    ----------
+    osc : Oscillator
+    states : array (count, n)
+    periods : int
+    """
+
+    def __init__(self, osc: Oscillator, states: Array, periods: int) -> None:
+        self.osc, self.states, self.periods = osc, states, periods
+        order8 = osc.section_map(states, periods, stepper=Order8(_FINEST))
+        self.ends = {"Order8": order8}
+        try:
+            self.ends["FreeFlight"] = osc.section_map(states, periods, stepper=FreeFlight(_FINEST))
+        except StepperError:
+            self.ends["DOP853"] = reference_map(osc, states, periods, tolerance=TIGHTEST)
+
+    def _source(self, name: str) -> str:
+        flown = "FreeFlight" in self.ends
+        if name == "Order8":
+            return "FreeFlight" if flown else "DOP853"
+        return "FreeFlight" if flown and name != "FreeFlight" else "Order8"
+
+    def title_for(self, name: str) -> str:
+        """What a stepper is compared with."""
+        source = self._source(name)
+        return f"{source} at {TIGHTEST if source == 'DOP853' else _FINEST:g}"
+
+    def ends_for(self, name: str) -> Array:
+        """Ends that a stepper is compared with."""
+        return self.ends[self._source(name)]
+
+    def check(self, count: int) -> float:
+        """Median distance of the finest steppers to DOP853."""
+        own = reference_map(self.osc, self.states[:count], self.periods, tolerance=TIGHTEST)
+        return float(np.median(np.linalg.norm(self.ends_for("RK4")[:count] - own, axis=1)))
 
 
 def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) -> Array:
@@ -119,51 +169,60 @@ def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) 
     return np.pad(states, ((0, 0), (0, len(osc.noise.extra_states) if osc.noise else 0)))
 
 
-def _first_call(osc: Oscillator, stepper: Stepper, states: Array, periods: int) -> FirstCall:
-    began = time.perf_counter()
-    osc.section_map(states, periods, stepper=stepper)
-    elapsed = time.perf_counter() - began
-    compiled = kernel_for(osc, Flow.STATE, stepper).module.advance.stats.cache_misses
-    return FirstCall(type(stepper).__name__, elapsed, bool(compiled))
+def _first_calls(
+    osc: Oscillator, ladders: tuple[tuple[Stepper, ...], ...], states: Array
+) -> tuple[dict[str, FirstCall], dict[str, str]]:
+    """Call each stepper once, before anything else does; with the reasons of those that refuse."""
+    calls, refused = {}, {}
+    for stepper in (ladder[-1] for ladder in ladders):  # the finest, of which nobody is warned
+        name = type(stepper).__name__
+        began = time.perf_counter()
+        try:
+            osc.section_map(states, 1, stepper=stepper)
+        except StepperError as error:
+            refused[name] = str(error)
+        else:
+            elapsed = time.perf_counter() - began
+            compiled = kernel_for(osc, Flow.STATE, stepper).module.advance.stats.cache_misses
+            calls[name] = FirstCall(name, elapsed, bool(compiled))
+    return calls, refused
 
 
-def _row(
-    osc: Oscillator, stepper: Stepper, states: Array, periods: int, reference: Array, seconds: float, default: bool
-) -> TradeRow:
-    began = time.perf_counter()
-    ended = osc.section_map(states, periods, stepper=stepper)
-    rough = (time.perf_counter() - began) / len(states)
-    errors = np.linalg.norm(ended - reference, axis=1)
-    many = _ensemble_size(seconds, rough)
-    crowd = np.resize(states, (many, states.shape[1]))
-    together = _median_time(lambda: osc.section_map(crowd, periods, stepper=stepper), 0.7 * seconds)
-    interval, length = osc.section_interval, max(periods, 8)
-    few = states[:_ALONE]
+def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, reference: Array, seconds: float) -> TradeRow:
+    errors = np.linalg.norm((osc.section_map(states, periods, stepper=stepper) - reference)[:, :2], axis=1)
+    crowd = _crowd(osc, stepper, states, seconds / (2 * _LEAST_REPEATS))
+    together = _median_time(lambda: osc.section_map(crowd, 1, stepper=stepper), 0.7 * seconds)
+    few, length = states[:_ALONE], 8
 
     def one_by_one() -> None:
         for state in few:
-            record(osc, Flow.STATE, stepper, state, 0.0, interval, length)
+            record(osc, Flow.STATE, stepper, state, 0.0, osc.section_interval, length)
 
     one_by_one()
     alone = _median_time(one_by_one, 0.3 * seconds)
+    counted = np.resize(states, (_REMEMBERED, states.shape[1]))
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
         cost=float(stepper.steps if isinstance(stepper, RK4) else 1 / getattr(stepper, "tolerance", np.nan)),
         error_median=float(np.median(errors)),
         error_90=float(np.quantile(errors, 0.9)),
-        seconds=together / (many * periods),
+        seconds=together / len(crowd),
         seconds_alone=alone / (len(few) * length),
-        memory=_peak_of_arrays(lambda: osc.section_map(crowd, periods, stepper=stepper)) / many,
-        default=default,
+        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / _REMEMBERED,
     )
 
 
-def _ensemble_size(seconds: float, rough: float) -> int:
-    """As many trajectories as fit in the time a few times over, at least one block for each thread."""
-    least = _BLOCK * (os.cpu_count() or 1)
-    fitting = seconds / (2 * _LEAST_REPEATS * max(rough, 1e-9))
-    return int(min(_MOST, max(least, _BLOCK * (fitting // _BLOCK))))
+def _crowd(osc: Oscillator, stepper: Stepper, states: Array, seconds: float) -> Array:
+    """As many trajectories as a period of them can be integrated in the time."""
+    count = _FEW
+    while True:
+        crowd = np.resize(states, (count, states.shape[1]))
+        began = time.perf_counter()
+        osc.section_map(crowd, 1, stepper=stepper)
+        if count >= _MOST or time.perf_counter() - began > 0.5 * seconds:
+            return crowd
+        count *= 2
 
 
 def _median_time(work: Callable[[], object], seconds: float) -> float:

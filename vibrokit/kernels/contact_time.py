@@ -1,0 +1,113 @@
+"""How long contacts last, so that fixed steps can be chosen short enough for them."""
+
+from __future__ import annotations
+
+import functools
+import math
+import types
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.rk4 import RK4
+from vibrokit.parts.excitation.constant import Constant
+from vibrokit.parts.scene import Scene
+from vibrokit.parts.spring.linear import LinearSpring
+from vibrokit.symbolic.flow_kind import Flow
+
+_LOOKS = 128  # at the forcing, over one interval
+_DEPTHS = np.geomspace(1e-14, 10.0, 451)  # as parts of the reach of the motion
+_DECADE = 30  # places in a decade of them
+_LONGEST_REACH = 10.0  # stops limit a resonance to about this many times their distance
+
+
+class ContactTime(NamedTuple):
+    """Duration of a typical contact, and how sharply it begins.
+
+    Attributes
+    ----------
+    duration : float
+        From touch to release (s).
+    exponent : float
+        Power of the depth that the force follows near touch: 3/2 for Hertz, 1 for linear stops, 0 for a jump.
+    """
+
+    duration: float
+    exponent: float
+
+
+@functools.lru_cache(maxsize=64)
+def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
+    """Estimate the contact with each stop at a typical impact speed; stops that hardly push are left out.
+
+    The greatest depth follows from the energy, ½v² = ∫ F dδ, and the duration is close to π·depth/v for every power.
+    The law is that of the kernel for lanes, which an ensemble needs anyway.
+
+    Raises
+    ------
+    StepperError
+        RK4 cannot integrate this flow of this scene.
+    """
+    if not scene.barriers:
+        return ()
+    module, theta = kernel_for(scene, flow, RK4()).module, theta_of(scene)
+    reach, speed = _typical_motion(scene, module, theta)
+    found = (_contact(module, theta, stop, reach, speed) for stop in range(len(scene.barriers)))
+    return tuple(contact for contact in found if contact is not None)
+
+
+def _contact(
+    module: types.ModuleType, theta: NDArray[np.float64], stop: int, reach: float, speed: float
+) -> ContactTime | None:
+    depths = reach * _DEPTHS
+    shortest = None
+    for rate in (0.0, speed):  # a law that damps is stiffer on the way in
+        force = np.array([module.law(stop, depth, rate, theta) for depth in depths])
+        force = np.clip(np.nan_to_num(force), 0.0, 1e100)
+        per_fold = force * depths  # dδ = δ d(ln δ) on this grid
+        work = np.cumsum(0.5 * (per_fold[1:] + per_fold[:-1]) * np.diff(np.log(depths)))
+        deepest = max(_DECADE, int(np.searchsorted(work, 0.5 * speed**2)))
+        if deepest == len(work):  # never stopped: too soft to be a contact
+            continue
+        before = deepest - _DECADE
+        exponent = 0.0
+        if force[before] > 0.0 and not module.JUMPS[stop]:
+            exponent = math.log(force[deepest] / force[before]) / math.log(depths[deepest] / depths[before])
+        found = ContactTime(math.pi * float(depths[deepest]) / speed, exponent)
+        shortest = found if shortest is None else min(shortest, found)
+    return shortest
+
+
+def _typical_motion(scene: Scene, module: types.ModuleType, theta: NDArray[np.float64]) -> tuple[float, float]:
+    """How far the mass goes and how fast: as the linear response to the forcing, or as needed to reach a stop."""
+    own = scene.natural_frequency
+    stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else own**2
+    rates, sizes = _harmonics(scene, module, theta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        response = np.abs(sizes / (stiffness - rates**2 + 2j * scene.damping_ratio * own * rates))
+    response[sizes == 0.0] = 0.0
+    constant = sum(part.magnitude for part in scene.excitations if isinstance(part, Constant))
+    reach, speed = float(response.sum()) + abs(constant) / own**2, float((rates * response).sum())
+    gap = max(abs(barrier.position) for barrier in scene.barriers)
+    if gap > 0.0:
+        limit = _LONGEST_REACH * gap
+        reach, speed = max(gap, min(reach, limit)), max(own * gap, min(speed, own * limit))
+    elif not 0.0 < reach < math.inf or not 0.0 < speed < math.inf:
+        reach, speed = 1.0, own
+    return reach, speed
+
+
+def _harmonics(
+    scene: Scene, module: types.ModuleType, theta: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Angular frequencies of the forcing over one interval, and their amplitudes."""
+    if not module.FORCED:
+        return np.zeros(0), np.zeros(0)
+    unit = scene.time_unit
+    values = np.array([module.forcing(unit * look / _LOOKS, theta) for look in range(_LOOKS)])
+    sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / _LOOKS), dtype=np.float64)
+    sizes[0] /= 2.0
+    sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would make much of
+    return 2.0 * math.pi / unit * np.arange(len(sizes), dtype=np.float64), sizes

@@ -1,0 +1,33 @@
+"""Steppers by name, as the command line has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from vibrokit.errors import StepperError, nearest
+from vibrokit.kernels.free_flight import FreeFlight
+from vibrokit.kernels.order8 import Order8
+from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.stepper import Stepper
+
+_KINDS: Mapping[str, tuple[Callable[..., Stepper], Callable[[str], float]]] = {
+    kind.name.replace("_", "-"): (kind, number) for kind, number in ((RK4, int), (Order8, float), (FreeFlight, float))
+}
+
+
+def named_stepper(text: str) -> Stepper:
+    """Read a stepper from its name and its number: ``rk4:512``, ``order8:1e-10``, ``free-flight``.
+
+    Raises
+    ------
+    StepperError
+        An unknown name, or a number that the stepper does not take.
+    """
+    name, colon, number = text.partition(":")
+    if name not in _KINDS:
+        raise StepperError(f"stepper {text!r}: there is no {name!r}{nearest(name, _KINDS)}")
+    kind, read = _KINDS[name]
+    try:
+        return kind(read(number)) if colon else kind()
+    except ValueError as error:
+        raise StepperError(f"stepper {text!r}: {error}") from error
