@@ -96,7 +96,7 @@ def measure_steppers(
     report(0, 1 + len(taken))
     references = References(osc, states, periods)
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
-    rows = []
+    rows: list[TradeRow] = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are what is measured here
         for stepper in taken:

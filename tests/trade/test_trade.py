@@ -1,0 +1,109 @@
+"""What `vibrokit trade` measures: known orders come out, refusals are told, table and figure are complete."""
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.cli import main
+from vibrokit.plots.trade import work_precision
+from vibrokit.scene_file import load_scene
+from vibrokit.trade.reference import reference_map
+from vibrokit.trade.steppers import measure_steppers, starts_between_stops
+
+SETTINGS = {"starts": 8, "periods": 1, "seconds": 0.01}
+LADDERS = (
+    tuple(vk.RK4(steps) for steps in (32, 64, 128, 256)),
+    tuple(vk.Order8(10.0**-k) for k in (5, 7, 9)),
+    tuple(vk.FreeFlight(10.0**-k) for k in (5, 7, 9)),
+)
+
+
+@pytest.fixture(scope="module")
+def linear():
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.2, 0.8),))
+    return measure_steppers(osc, ladders=LADDERS, **SETTINGS)
+
+
+def test_rk4_has_order_4_without_contact(linear):
+    assert linear.orders["RK4"] == pytest.approx(4, abs=0.3)
+
+
+def test_errors_fall_from_coarse_to_fine(linear):
+    for name in ("RK4", "Order8"):
+        errors = [row.error_median for row in linear.rows if row.name == name]
+        assert errors == sorted(errors, reverse=True)
+        assert len(set(errors)) == len(errors)
+
+
+def test_free_flight_without_contact_is_exact_at_any_tolerance(linear):
+    assert max(row.error_90 for row in linear.rows if row.name == "FreeFlight") < 1e-13
+    assert linear.checked < 1e-12
+
+
+def test_numbers_are_complete(linear):
+    assert [row.stepper for row in linear.rows] == [repr(stepper) for ladder in LADDERS for stepper in ladder]
+    for row in linear.rows:
+        assert row.error_median <= row.error_90
+        assert min(row.seconds, row.seconds_alone, row.memory) > 0
+    assert [row.stepper for row in linear.rows if row.default] == ["RK4(steps=256)"]
+    assert set(linear.references) == {"RK4", "Order8", "FreeFlight"}
+    assert linear.references["FreeFlight"].startswith("Order8")
+
+
+def test_table(linear):
+    text = str(linear)
+    for row in linear.rows:
+        assert row.stepper in text
+    assert text.count("← default") == 1
+    assert "against FreeFlight" in text
+    assert "DOP853" in text
+
+
+def test_figure(linear):
+    artists = work_precision(linear.rows)
+    axes = artists[0].axes
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    labels = axes.get_legend_handles_labels()[1]
+    assert {"RK4, ensemble", "RK4, alone", "default: RK4(steps=256)"} <= set(labels)
+
+
+def test_refusal_is_told():
+    trade = measure_steppers(load_scene("duffing"), ladders=LADDERS, **SETTINGS)
+    assert list(trade.refused) == ["FreeFlight"]
+    assert "FreeFlight: refused. FreeFlight needs linear motion" in str(trade)
+    assert trade.references == {"RK4": "Order8 at 1e-14", "Order8": "DOP853 at 2.3e-14"}
+
+
+def test_progress_reaches_its_total():
+    calls = []
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
+    measure_steppers(osc, ladders=((vk.RK4(64), vk.RK4(128)),), progress=lambda *c: calls.append(c), **SETTINGS)
+    assert calls[0] == (0, 3)
+    assert calls[-1] == (3, 3)
+
+
+@pytest.mark.parametrize("places", [(), (0.5,), (-0.5,), (0.0,)])
+def test_starts(places):
+    stops = [vk.Barrier(vk.Hertz(50.0), place, "right") for place in places]
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, barriers=stops, noise=vk.WhiteNoise(1e-3))
+    states = starts_between_stops(osc, 50, np.random.default_rng(0))
+    assert states.shape == (50, 2)
+    assert all((states[:, 0] <= place).all() for place in places)
+
+
+def test_reference_crosses_contacts():
+    """No damping: half turns of length π/3 in the stop and π left of it, in turns, until time 2π."""
+    stop = vk.Barrier(vk.Linear(8.0), 0.0, "right")
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, barriers=(stop,))
+    (end,) = reference_map(osc, np.array([[0.0, 1.0]]))
+    np.testing.assert_allclose(end, [-np.sin(np.pi / 3), -np.cos(np.pi / 3)], atol=1e-11)
+
+
+def test_command(tmp_path, monkeypatch, capsys):
+    small = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
+    trade = measure_steppers(small, ladders=LADDERS[:1], **SETTINGS)
+    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc, progress: trade)
+    picture = tmp_path / "trade.png"
+    assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
+    assert str(trade) in capsys.readouterr().out
+    assert picture.read_bytes().startswith(b"\x89PNG")
