@@ -36,6 +36,10 @@ class CoarseStepsWarning(UserWarning):
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     """Choose the stepper for many trajectories: RK4 where its steps resolve every contact, else as for single ones.
 
+    Measured on ``hertz-0.570``, two periods, two threads, as ``vibrokit trade hertz-0.570`` prints it: RK4(256) has a
+    median error of 9e-5 at 1.2 µs per trajectory and period; twice the steps, 2e-5 at 1.8 µs. The cheapest located
+    setting, FreeFlight(1e-4), has 1e-4 at 18 µs. So RK4 is given as long as it needs no more steps than that ratio.
+
     Parameters
     ----------
     scene : Scene

@@ -87,7 +87,7 @@ def find_structure(
     exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
     search = _search_region(osc) if region is None else Region.of(region)
     states = _starts(osc, search, starts, np.random.default_rng(rng))
-    orbits, unsettled = _orbits(osc, states, wait, (chosen, exact), executor)
+    orbits, unsettled = _orbits(osc, states, wait, (chosen, exact), executor, progress)
     if not orbits:
         raise StructureError(
             f"no steady state of period up to {_LONGEST_PERIOD} was found from {len(states)} starts in x ∈ {search.x}, "
@@ -145,6 +145,7 @@ def _orbits(
     wait: int,
     steppers: tuple[Stepper, Stepper],
     executor: concurrent.futures.Executor | None,
+    progress: Progress | None,
 ) -> tuple[list[tuple[Orbit, Array]], int]:
     """Return the distinct stable orbits that the starts come to, and how many starts come to none.
 
@@ -154,7 +155,7 @@ def _orbits(
     orbits: list[tuple[Orbit, Array]] = []
     lost = 0
     for _ in range(_ROUNDS):
-        ended = run_ensemble(osc, Flow.STATE, steppers[0], states, wait, executor=executor)
+        ended = run_ensemble(osc, Flow.STATE, steppers[0], states, wait, executor=executor, progress=progress)
         lost += int(np.sum(ended.intervals < wait))
         states = _add_orbits(osc, ended.states[ended.intervals == wait], steppers, orbits)
         if not len(states):

@@ -192,6 +192,11 @@ class Model:
         """∂b/∂q, n × n."""
         return self.drift.jacobian(list(self.state))
 
+    @cached_property
+    def hessian(self) -> sympy.Matrix:
+        """Second derivatives of H in (q, p), 2n × 2n: the variational equations of a path are Jᵀ times this."""
+        return sympy.hessian(self.hamiltonian, (*self.state, *self.momenta))
+
     @property
     def latex(self) -> str:
         """The equations as an ``aligned`` block of LaTeX."""
