@@ -34,7 +34,7 @@ def outcome(work: Callable[[], float]) -> str:
 def row(name: str, work: Callable[[object], float]) -> None:
     """Print one line: the case, and the outcome with each stepper."""
     cells = [outcome(lambda stepper=stepper: work(stepper)) for stepper in STEPPERS]
-    print(f"{name:<44}" + "".join(f"{cell:<26}" for cell in cells), flush=True)
+    print(f"{name:<48}" + "".join(f"{cell:<26}" for cell in cells), flush=True)
 
 
 def stop_scene(law: object, place: float = 0.3) -> vk.Oscillator:
@@ -100,7 +100,7 @@ def noise(intensity: float) -> Callable[[object], float]:
 
 
 def main() -> None:
-    print(f"{'error and time with':<44}" + "".join(f"{stepper!s:<26}" for stepper in STEPPERS))
+    print(f"{'error and time with':<48}" + "".join(f"{stepper!s:<26}" for stepper in STEPPERS))
     for name, make, power in (("Hertz", vk.Hertz, 1.5), ("linear", vk.Linear, 1.0)):
         for exponent in range(0, 13, 2):
             row(f"{name}, k = 1e{exponent}, {CYCLES} hits", back(make(10.0**exponent), power, 1.0))
