@@ -8,12 +8,6 @@ from vibrokit.errors import SceneError, StructureError
 from vibrokit.structure.orbits import refine_orbit
 
 
-@pytest.fixture(scope="module")
-def paper():
-    osc = vk.load_scene("hertz-0.570")
-    return osc, vk.find_structure(osc, cells=(100, 100))
-
-
 def test_clear_state_is_near_what_the_paper_has_and_far_easier_to_leave(paper):
     osc, structure = paper
     result = vk.ActionPlot(points=3000).run(osc, structure)

@@ -7,12 +7,6 @@ from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.region import Region
 
 
-@pytest.fixture(scope="module")
-def paper():
-    osc = vk.load_scene("hertz-0.570")
-    return osc, vk.find_structure(osc, cells=(100, 100))
-
-
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
     _, structure = paper
     clear, hammering = structure.attractors

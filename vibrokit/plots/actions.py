@@ -17,6 +17,11 @@ def _labels(data: xarray.Dataset, prefix: str) -> list[int]:
     return sorted(int(str(name).removeprefix(prefix)) for name in data.variables if str(name).startswith(prefix))
 
 
+def _scientific(value: float) -> str:
+    mantissa, exponent = f"{value:.3e}".split("e")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}"
+
+
 def action_plot(data: xarray.Dataset, energies: Sequence[Any], *, ax: Axes | None = None) -> list[Any]:
     """Draw the action of each exit against the angle of its start, on a logarithmic scale.
 
@@ -44,7 +49,7 @@ def action_plot(data: xarray.Dataset, energies: Sequence[Any], *, ax: Axes | Non
         artists.append(axes.axhline(energy.value, color=colour(energy.source), linewidth=0.8))
         artists.append(
             axes.annotate(
-                rf"$\Delta U = {energy.value:.4g}$", (360, energy.value), ha="right", va="top", fontsize=8,
+                rf"$\Delta U = {_scientific(energy.value)}$", (360, energy.value), ha="right", va="top", fontsize=8,
                 xytext=(0, -2), textcoords="offset points", color=colour(energy.source),
             )
         )  # fmt: skip

@@ -1,0 +1,10 @@
+import pytest
+
+import vibrokit as vk
+
+
+@pytest.fixture(scope="session")
+def paper():
+    """The paper's scene at ω = 0.570 and its structure."""
+    osc = vk.load_scene("hertz-0.570")
+    return osc, vk.find_structure(osc, cells=(100, 100))
