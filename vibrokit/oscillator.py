@@ -197,7 +197,7 @@ class Oscillator(Scene):
         size = 2 + len(self.noise.extra_states if self.noise else ())
         try:
             checked = np.atleast_2d(np.asarray(states, dtype=float))
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ParameterError(
                 f"states are not numbers ({error}); give (x, v), or an array of shape (count, {size})."
             ) from error
@@ -233,4 +233,18 @@ class Oscillator(Scene):
 
 def seed_from(rng: int | np.random.Generator) -> int:
     """Return the seed of a family of random streams, one for each trajectory (SPEC 7's `rng`)."""
-    return int(np.random.default_rng(rng).integers(2**63))
+    return int(generator_from(rng).integers(2**63))
+
+
+def generator_from(rng: int | np.random.Generator) -> np.random.Generator:
+    """Return the generator of a seed, or the given one.
+
+    Raises
+    ------
+    ParameterError
+        Neither a generator nor a whole number, 0 or more.
+    """
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"rng is {rng!r}; give a whole number, 0 or more, or a numpy.random.Generator.") from error

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.errors import NoSectionError, StructureError
+from vibrokit.errors import NoSectionError, ParameterError, StructureError
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.region import Region
 
@@ -90,3 +90,35 @@ def test_bad_budgets(budget):
 def test_a_budget_too_small_is_said():
     with pytest.raises(StructureError, match="raise budget"):
         vk.find_structure(vk.load_scene("hertz-0.570"), budget=1, starts=(4, 4), cells=(4, 4))
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"cells": 200}, {"cells": (0, 2)}, {"cells": (2.5, 3)}, {"cells": (10**6, 10**6)}, {"starts": None},
+        {"starts": (0, 0)}, {"settling": 0}, {"settling": -1.0}, {"settling": "a"}, {"budget": 10**30},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_bad_counts(bad):
+    with pytest.raises(StructureError, match=next(iter(bad))):
+        vk.find_structure(vk.load_scene("hertz-0.570"), **bad)
+
+
+@pytest.mark.parametrize("rng", [-1, "x", 1.5])
+def test_bad_seeds(rng):
+    with pytest.raises(ParameterError, match="rng"):
+        vk.find_structure(vk.load_scene("hertz-0.570"), rng=rng)
+    with pytest.raises(ParameterError, match="rng"):
+        vk.load_scene("hertz-0.570").trajectory([0, 0], 1, rng=rng)
+
+
+def test_a_scene_whose_noise_depends_on_the_state():
+    well = vk.load_scene("double-well")
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.05,
+        spring=well.spring,
+        noise=vk.StateDependentNoise(0.01, "1 + c*x**2", c=0.5),
+    )
+    assert len(vk.find_structure(osc, cells=(20, 20), starts=(8, 8)).attractors) == 2

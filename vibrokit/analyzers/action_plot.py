@@ -31,6 +31,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _SAMPLES = 128
 _NEIGHBOURS = 64
 _SHARES = 4
+_MOST_POINTS = 10**8
 
 Array = NDArray[np.float64]
 
@@ -69,8 +70,10 @@ class ActionPlot(Analyzer):
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise StructureError(f"ActionPlot: radius is {self.radius!r}; give a positive, finite one.")
-        if isinstance(self.points, bool) or not isinstance(self.points, int) or self.points < 4:
-            raise StructureError(f"ActionPlot: points is {self.points!r}; give a whole number, 4 or more.")
+        if isinstance(self.points, bool) or not isinstance(self.points, int) or not 4 <= self.points <= _MOST_POINTS:
+            raise StructureError(
+                f"ActionPlot: points is {self.points!r}; give a whole number from 4 to {_MOST_POINTS}."
+            )
 
     def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> ActionPlotResult:
         """Run the ring for each attractor.

@@ -15,7 +15,7 @@ from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import Progress, run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator
+from vibrokit.oscillator import Oscillator, generator_from
 from vibrokit.structure.attractor import Attractor
 from vibrokit.structure.basins import UNSETTLED, Basins, settle
 from vibrokit.structure.orbits import Orbit, refine_orbit
@@ -32,6 +32,8 @@ _RECURRENCE = 1e-5
 _NEAR = 1e-3  # what a coarse stepper may make of an orbit
 _EQUAL = 1e-6
 _ROUNDS = 4
+_STRENGTHS = ("amplitude", "force")
+_MOST_CELLS = 10**9
 
 Array = NDArray[np.float64]
 
@@ -83,10 +85,13 @@ def find_structure(
         The excitations have no common period.
     """
     wait = _wait(osc) if budget is None else _checked_budget(budget)
+    cells, starts = _checked_counts("cells", cells), _checked_counts("starts", starts)
+    if isinstance(settling, bool) or not isinstance(settling, int | float) or not 0 < settling <= 0.5:
+        raise StructureError(f"settling is {settling!r}; give a share of the region's size, above 0 and at most 0.5.")
     chosen = stepper or ensemble_stepper(osc, Flow.STATE)
     exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
     search = _search_region(osc) if region is None else Region.of(region)
-    states = _starts(osc, search, starts, np.random.default_rng(rng))
+    states = _starts(osc, search, starts, generator_from(rng))
     orbits, unsettled = _orbits(osc, states, wait, (chosen, exact), executor, progress)
     if not orbits:
         raise StructureError(
@@ -116,14 +121,25 @@ def _wait(osc: Oscillator) -> int:
 
 
 def _checked_budget(budget: Any) -> int:
-    if isinstance(budget, bool) or not isinstance(budget, int) or budget < 1:
+    if isinstance(budget, bool) or not isinstance(budget, int) or not 1 <= budget <= _MOST_CELLS:
         raise StructureError(f"budget is {budget!r}; give a whole number of periods, 1 or more.")
     return budget
 
 
+def _checked_counts(name: str, counts: Any) -> tuple[int, int]:
+    pair = tuple(counts) if isinstance(counts, tuple | list) else ()
+    whole = len(pair) == 2 and all(isinstance(n, int) and not isinstance(n, bool) and n >= 1 for n in pair)
+    if not whole or pair[0] * pair[1] > _MOST_CELLS:
+        raise StructureError(
+            f"{name} is {counts!r}; give two whole numbers, 1 or more, whose product is at most {_MOST_CELLS}."
+        )
+    return pair[0], pair[1]
+
+
 def _search_region(osc: Oscillator) -> Region:
     """A region wide enough for starts: the stops, and the reach of a linear oscillator under the same forces."""
-    push = float(sum(abs(value) for name, value in osc.parameters.items() if name.endswith(("amplitude", "force"))))
+    numbers = [value for part in osc.excitations for name, value in part.parameters.items() if name in _STRENGTHS]
+    push = float(sum(abs(number) for number in numbers))
     reach = max([1.0, push / osc.natural_frequency**2, *(2 * abs(barrier.position) for barrier in osc.barriers)])
     return Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
 
