@@ -72,6 +72,7 @@ def test_list(capsys):
         (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
         (["plot", "nothing.nc"], "nothing.nc"),
         (["check", "herz"], "hertz"),
+        (["run", "double-well", "-o", "nowhere/r.nc"], "nowhere"),
     ],
 )
 def test_mistakes_are_one_sentence_and_status_two(arguments, words, tmp_path, monkeypatch, capsys):

@@ -90,6 +90,9 @@ def _run(options: argparse.Namespace) -> None:
     from vibrokit.structure.find import find_structure
 
     began = time.perf_counter()
+    for target in (options.output, options.figure):
+        if target is not None and not target.parent.is_dir():
+            raise VibrokitError(f"{target} would be in {target.parent}, which is no folder; make it first.")
     osc = load_scene(options.scene)
     kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
     settings = _settings(options.set)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.errors import StepperError
+from vibrokit.errors import DerivationError, StepperError
 from vibrokit.structure.orbits import section_derivative
 
 LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
@@ -60,6 +60,15 @@ def test_steady_states_are_found():
 def test_fixed_steps_refuse_derivatives():
     with pytest.raises(StepperError, match="FreeFlight or Order8"):
         section_derivative(kelvin_voigt(), np.array([0.3, 0.5]), 1, vk.RK4())
+
+
+@pytest.mark.parametrize("formula", ["1/depth", "-log(depth)"])
+def test_a_force_without_bound_is_refused(formula):
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.01, barriers=(vk.Barrier(vk.CustomLaw(formula), 0.0, "right"),)
+    )
+    with pytest.raises(DerivationError, match="no bound at first touch"):
+        osc.trajectory((0.0, 0.5), duration=1.0)
 
 
 def test_momenta_are_refused_with_the_reason():

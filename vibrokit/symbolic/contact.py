@@ -6,6 +6,7 @@ import dataclasses
 
 import sympy
 
+from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.formulas import ask
 
@@ -98,6 +99,11 @@ def _jumps(law: sympy.Expr) -> bool:
             at_touch = sympy.limit(law, DEPTH, 0, "+")
     except (NotImplementedError, ValueError):
         return True
+    if at_touch.has(sympy.oo, -sympy.oo, sympy.zoo):
+        raise DerivationError(
+            f"the contact force {law} has no bound at first touch, and no motion can be followed through it; give a "
+            "law that is finite at depth 0."
+        )
     return sympy.simplify(at_touch) != 0
 
 
