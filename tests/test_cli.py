@@ -100,6 +100,6 @@ def test_interrupting_leaves_nothing_half_written(tmp_path, monkeypatch, capsys)
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("vibrokit.structure.find.run_ensemble", interrupt)
+    monkeypatch.setattr("vibrokit.structure.search.run_ensemble", interrupt)
     assert main(["run", "double-well", *QUICK, "-o", "r.nc"]) == 130
     assert not list(Path(tmp_path).iterdir())

@@ -31,11 +31,14 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
     from vibrokit.results.files import load_result as load_result
+    from vibrokit.results.structure import Structure as Structure
     from vibrokit.scene_file import bundled_scenes as bundled_scenes
     from vibrokit.scene_file import load_scene as load_scene
     from vibrokit.scene_file import save_scene as save_scene
+    from vibrokit.structure.continuation import continuation as continuation
     from vibrokit.structure.find import find_structure as find_structure
-    from vibrokit.structure.structure import Structure as Structure
+    from vibrokit.structure.shocks import shape_stability as shape_stability
+    from vibrokit.structure.unstable_orbits import unstable_orbits as unstable_orbits
 
 __version__ = "0.1.0"
 
@@ -68,8 +71,11 @@ _HOMES = {
     "bundled_scenes": "vibrokit.scene_file",
     "load_scene": "vibrokit.scene_file",
     "save_scene": "vibrokit.scene_file",
+    "continuation": "vibrokit.structure.continuation",
     "find_structure": "vibrokit.structure.find",
-    "Structure": "vibrokit.structure.structure",
+    "shape_stability": "vibrokit.structure.shocks",
+    "unstable_orbits": "vibrokit.structure.unstable_orbits",
+    "Structure": "vibrokit.results.structure",
 }
 
 __all__ = list(_HOMES)

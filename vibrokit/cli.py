@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibrokit import __version__
+from vibrokit import __version__, report
 from vibrokit.errors import StructureError, VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.kernels.ensemble import Progress
+    from vibrokit.results.continuation import Continuation
     from vibrokit.results.result import Result
-    from vibrokit.structure.structure import Structure
+    from vibrokit.results.structure import Structure
 
 _PATIENCE = 2.0  # seconds after which progress is shown
 
@@ -51,7 +52,13 @@ def _parser() -> argparse.ArgumentParser:
     scene.add_argument("scene", help="a bundled scene, such as hertz-0.570, or a TOML file")
 
     run = commands.add_parser("run", parents=[scene], help="find steady states and their activation energies")
-    run.add_argument("--analyzer", nargs="+", default=["action-plot"], metavar="NAME", help="default: action-plot")
+    run.add_argument(
+        "--analyzer",
+        nargs="*",
+        default=["action-plot"],
+        metavar="NAME",
+        help="default: action-plot; none: structure only",
+    )
     run.add_argument("--set", action="append", default=[], metavar="FIELD=NUMBER", help="a setting of the analyzer")
     run.add_argument("--stepper", metavar="NAME[:NUMBER]", help="rk4:STEPS, order8:TOLERANCE or free-flight:TOLERANCE")
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
@@ -104,7 +111,10 @@ def _run(options: argparse.Namespace) -> None:
     with _Bar("basins") as bar:
         structure = find_structure(osc, cells=cells, stepper=stepper, rng=options.seed, progress=bar)
     if not options.json:
-        print(_attractor_table(options.scene, structure))
+        print(report.attractor_table(options.scene, structure))
+        print(report.saddle_table(structure), end="")
+    if not structure.complete:
+        raise KeyboardInterrupt
     results = {}
     for name, analyzer in zip(options.analyzer, analyzers, strict=True):
         try:
@@ -112,18 +122,24 @@ def _run(options: argparse.Namespace) -> None:
                 results[name] = analyzer.run(osc, structure, progress=bar)
         except StructureError as error:  # what was found so far is worth its table
             print(f"vibrokit: {name}: {error}", file=sys.stderr)
-    seconds = time.perf_counter() - began
+    _keep(options, structure, results, time.perf_counter() - began)
+
+
+def _keep(options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float) -> None:
+    """Save and draw the results; the structure itself where no analyzer was asked for."""
+    records: dict[str, Any] = results if options.analyzer else {"structure": structure}
     if options.output is not None:
-        for name, result in results.items():
-            result.save(_numbered(options.output, name, len(results)))
+        for name, found in records.items():
+            found.save(_numbered(options.output, name, len(records)))
     if options.json:
-        print(json.dumps(_record(options, structure, results, seconds), allow_nan=False))
+        print(json.dumps(report.record(options.scene, options.seed, structure, results, seconds), allow_nan=False))
         return
-    for name, result in results.items():
-        print(_energy_table(name, result))
+    for name, found in records.items():
+        if name in results:
+            print(report.energy_table(name, found))
         figure = options.figure or Path(f"{_stem(options.scene)}.png")
-        figure = _numbered(figure, name, len(results) if options.figure else 2)
-        _save_figure(result, figure)
+        figure = _numbered(figure, name, len(records) if options.figure else 2)
+        _save_figure(found, figure)
         print(f"figure: {figure}")
     print(f"{seconds:.1f} s")
 
@@ -190,58 +206,10 @@ class _Bar:
         self.bar.close()
 
 
-def _attractor_table(scene: str, structure: Structure) -> str:
-    rows = [f"{scene}: {structure.status}", "", "state  kind         period  stop hits  basin            at (x, v)"]
-    for a in structure.attractors:
-        basin = f"{100 * a.basin_fraction:.2f} ± {100 * a.basin_fraction_error:.2f} %"
-        place = f"({a.points[0, 0]:+.6f}, {a.points[0, 1]:+.6f})"
-        rows.append(f"{a.label:<5}  {a.kind:<11}  {a.period:<6}  {a.impacts:<9}  {basin:<15}  {place}")
-    return "\n".join([*rows, ""])
-
-
-def _energy_table(name: str, result: Result) -> str:
-    rows = [f"{name}: {result.status}", "", "from → to   ΔU            lower         upper         momentum at exit"]
-    rows += [
-        f"{e.source} → {e.target}       {e.value:<12.6g}  {e.lower:<12.6g}  {e.upper:<12.6g}  {e.residual:.2g}"
-        for e in result.energies
-    ]
-    return "\n".join([*rows, ""])
-
-
-def _save_figure(result: Result, path: Path) -> None:
+def _save_figure(result: Result | Structure | Continuation, path: Path) -> None:
     from vibrokit.results.pictures import save_figure
 
     save_figure(result.plot(), path)
-
-
-def _record(
-    options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float
-) -> dict[str, Any]:
-    from vibrokit.analyzers.analyzer import versions
-
-    energies = ("source", "target", "method", "value", "lower", "upper", "residual")
-    return {
-        "scene": options.scene,
-        "attractors": [
-            {
-                "label": a.label,
-                "kind": a.kind,
-                "period": a.period,
-                "impacts": a.impacts,
-                "points": a.points.tolist(),
-                "basin_fraction": a.basin_fraction,
-            }
-            for a in structure.attractors
-        ],
-        "saddles": [
-            {"period": s.period, "points": s.points.tolist(), "multipliers": [[m.real, m.imag] for m in s.multipliers]}
-            for s in structure.saddles
-        ],
-        "energies": [{key: getattr(e, key) for key in energies} for r in results.values() for e in r.energies],
-        "versions": versions(),
-        "seed": options.seed,
-        "seconds": seconds,
-    }
 
 
 def _equations(options: argparse.Namespace) -> None:

@@ -1,8 +1,12 @@
+import dataclasses
+import io
+import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+import xarray
 
 import vibrokit as vk
 from vibrokit.errors import VibrokitError
@@ -70,3 +74,50 @@ def test_a_failed_save_leaves_the_old_file(result, tmp_path, monkeypatch):
         result.save(target)
     assert target.read_bytes() == before
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_result_without_energies_comes_back(result, tmp_path):
+    dataclasses.replace(result, energies=(), seed=2**70).save(tmp_path / "r.nc")
+    again = vk.load_result(tmp_path / "r.nc")
+    assert (again.energies, again.seed) == ((), 2**70)
+    np.testing.assert_array_equal(again.data["action_0"], result.data["action_0"])
+
+
+def without(name):
+    return lambda data, header: data.drop_vars(name)
+
+
+def with_array(name, dimensions, values):
+    return lambda data, header: data.assign({name: (dimensions, np.array(values))})
+
+
+def with_entry(key, value):
+    return lambda data, header: header.update({key: value}) or data
+
+
+@pytest.mark.parametrize(
+    ("lie", "words"),
+    [
+        (without("energy_value"), "no array 'energy_value'"),
+        (with_array("energy_value", "few", [1.0]), "'energy_value' has shape"),
+        (with_array("energy_source", "energy", [np.nan, 0.0]), "'energy_source' holds NaN"),
+        (with_array("energy_value", "energy", ["a", "b"]), "'energy_value' is of kind"),
+        (without("path0_p"), "no array 'path0_p'"),
+        (with_array("path0_q", ("one", "path0_state"), [[0.0, 0.0]]), "'path0_q' has shape"),
+        (with_array("path0_on_section", "path0_section_", [10**9]), "'path0_on_section' goes from"),
+        (with_entry("methods", [1, 2]), "no list of texts"),
+        (with_entry("methods", ["ring"] * 9), "'energy_source' has shape"),
+        (with_entry("settings", 3), "settings = 3"),
+        (with_entry("seconds", None), "seconds = None"),
+        (with_entry("kind", "acton_plot"), "the nearest is 'action_plot'"),
+    ],
+)
+def test_lies_are_refused_in_a_sentence(lie, words, result, tmp_path):
+    result.save(tmp_path / "r.nc")
+    data = xarray.load_dataset(io.BytesIO((tmp_path / "r.nc").read_bytes()), engine="scipy", decode_cf=False)
+    header = json.loads(data.attrs["vibrokit"])
+    data = lie(data, header)
+    data.attrs["vibrokit"] = json.dumps(header)
+    data.to_netcdf(tmp_path / "lie.nc", engine="scipy")
+    with pytest.raises(ResultFileError, match=rf"no result that vibrokit saved: .*{words}"):
+        vk.load_result(tmp_path / "lie.nc")

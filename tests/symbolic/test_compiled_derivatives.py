@@ -194,6 +194,8 @@ def expected(case, flow, x, v):
     drift, hamiltonian, action_rate = by_hand(case)
     if flow in (Flow.STATE, Flow.NOISY):
         return [v, drift(x, v)]
+    if flow is Flow.STATE_REVERSED:  # v is −dx/dt here, and the acceleration is the same
+        return [v, drift(x, -v)]
     if flow is Flow.STATE_VARIATIONAL:
         return [v, drift(x, v), mpf(0), mpf(1), *gradient(drift, (x, v))]
     point = (x, v, *map(mpf, MOMENTA))
@@ -220,7 +222,7 @@ def compiled(name, flow):
 
 def start(flow, x, v):
     """The variables of a flow at a point, its matrix the identity."""
-    if flow in (Flow.STATE, Flow.NOISY):
+    if flow in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY):
         return [x, v]
     if flow is Flow.STATE_VARIATIONAL:
         return [x, v, *np.eye(2).ravel()]

@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.analyzer import Analyzer, plain_settings, versions
+from vibrokit.analyzers.analyzer import Analyzer, plain_settings
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.quasi_potential import local_potential
 from vibrokit.analyzers.ring import Exits, confirmed_exits, default_budget, ring_starts
@@ -21,11 +21,12 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.action_plot import ActionPlotResult
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, ExitPath
+from vibrokit.results.structure import Structure
+from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.structure import Structure
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128
@@ -136,6 +137,8 @@ class ActionPlot(Analyzer):
         stepper: Stepper,
         progress: Progress | None = None,
     ) -> _Ring:
+        if attractor.kind not in ("periodic", "equilibrium"):
+            raise StructureError(f"it is {attractor.kind}; a ring goes round a point of an orbit or an equilibrium.")
         orbit = refine_orbit(osc, attractor.points[0], attractor.period, stepper)
         starts = ring_starts(orbit.point, local_potential(osc, orbit, stepper), self.radius, angles)
         budget = self.budget or default_budget(attractor.multipliers, attractor.period, self.radius)

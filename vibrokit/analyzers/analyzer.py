@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.metadata
-import platform
 from abc import ABC, abstractmethod
 from typing import Any
 
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.result import Result
-from vibrokit.structure.structure import Structure
-
-_STANDING_ON = ("vibrokit", "numpy", "scipy", "sympy", "numba")
+from vibrokit.results.structure import Structure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,11 +33,6 @@ class Analyzer(ABC):
         progress : callable, optional
             Called with (work done, work in all).
         """
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of the toolkit and of what it stands on."""
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _STANDING_ON}
 
 
 def plain_settings(analyzer: Any) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 
 from vibrokit.kernels.ensemble import Stop
-from vibrokit.structure.structure import Structure
+from vibrokit.results.structure import Structure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,4 +24,5 @@ class LeaveBasin(Exit):
 
     def stop(self, structure: Structure, home: int) -> Stop:
         """Return the test by the basin grid."""
-        return structure.basins.stop(home)
+        basins = structure.basins
+        return Stop(region=basins.region.bounds, labels=basins.labels, home=home)

@@ -13,8 +13,8 @@ from vibrokit.kernels.ensemble import Ensemble, Progress, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION, NOT_FINITE, RAN_OUT
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.basins import settle
-from vibrokit.structure.structure import Structure
+from vibrokit.results.structure import Structure
+from vibrokit.structure.settle import Settler
 from vibrokit.symbolic.flow_kind import Flow
 
 _BATCH = 256
@@ -126,9 +126,8 @@ def confirmed_exits(
 
 
 def _settled(osc: Oscillator, structure: Structure, states: Array, stepper: Stepper) -> NDArray[np.int64]:
-    points = [attractor.points for attractor in structure.attractors]
-    size = structure.attractors[0].points.shape[1]
-    return settle(osc, states[:, :size], points, tolerance=structure.settling, budget=structure.budget, stepper=stepper)
+    settler = Settler(osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper)
+    return settler.labels(states[:, : structure.attractors[0].points.shape[1]])
 
 
 def _carried_on(

@@ -63,7 +63,7 @@ def _contact(
 ) -> ContactTime | None:
     depths = reach * _DEPTHS
     shortest = None
-    for rate in (0.0, speed):  # a law that damps is stiffer on the way in
+    for rate in (0.0, speed, -speed):  # a law that damps is stiffer on the way in, backwards in time on the way out
         force = np.array([module.law(stop, depth, rate, theta) for depth in depths])
         force = np.clip(np.nan_to_num(force), 0.0, 1e100)
         per_fold = force * depths  # dδ = δ d(ln δ) on this grid

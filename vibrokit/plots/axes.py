@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
 
-COLOURS = ("#3b6ea8", "#c8553d", "#588b5b", "#8e6bb0", "#c9a227", "#5f6b73", "#a8487a", "#4aa3a2")
+COLOURS = (
+    "#3b6ea8", "#c8553d", "#588b5b", "#8e6bb0", "#c9a227", "#7a4b2a", "#d679a8", "#4aa3a2", "#1f3a5f", "#e08e45",
+    "#9bbf3b", "#5b2a6e", "#6fb1e0", "#8c1c2f", "#0f6b4f", "#b58bd6", "#d9c56b", "#a66a52", "#e8a0a0", "#2b8fb3",
+)  # fmt: skip
+WALL = "0.45"
+_LEAST_SAMPLE = 4.0  # points
+_ROUNDING = 1e-9
 
 
 def axes_or_new(ax: Axes | None, width: float = 6.0, height: float = 4.2) -> Axes:
@@ -26,3 +36,70 @@ def colour(label: int) -> str:
 def draw_stops(ax: Axes, stops: Any) -> list[Any]:
     """Draw the stops as vertical lines."""
     return [ax.axvline(place, color="0.55", linewidth=1.0, linestyle=(0, (4, 2)), zorder=0) for place in stops]
+
+
+def draw_walls(ax: Axes, stops: Iterable[tuple[float, str]], reach: tuple[float, float]) -> list[Any]:
+    """Draw the stops as hatched walls.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    stops : iterable of (float, str)
+        Place of each (m) and the side that it is on, ``"left"`` or ``"right"``.
+    reach : (float, float)
+        Least and largest x up to which the walls are drawn (m).
+
+    Returns
+    -------
+    list of artists
+        Face and wall of each stop.
+    """
+    artists: list[Any] = []
+    for place, side in stops:
+        ends = (place, max(place, reach[1])) if side == "right" else (min(place, reach[0]), place)
+        artists.append(ax.axvline(place, color=WALL, linewidth=1.2, zorder=0.6))
+        artists.append(ax.axvspan(*ends, facecolor="0.96", edgecolor="0.78", hatch="////", linewidth=0, zorder=0.5))
+    return artists
+
+
+def rows(points: ArrayLike) -> NDArray[np.float64]:
+    """Return points as an array (count, n), with two columns if there are none."""
+    array = np.asarray(points, dtype=float)
+    return array.reshape(len(array), -1) if array.size else np.empty((0, 2))
+
+
+def phase_plane(ax: Axes) -> None:
+    """Label the axes with displacement and velocity."""
+    ax.set_xlabel(r"displacement $x$ (m)")
+    ax.set_ylabel(r"velocity $v$ (m s$^{-1}$)")
+
+
+def add_legend(ax: Axes, given: Axes | None, handles: Sequence[Any]) -> None:
+    """Add a legend: beside the axes of a figure of our own, inside axes that were given, where there is most room."""
+    if not handles:
+        return
+    if given is None:
+        legend = ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
+    else:
+        legend = ax.legend(handles=handles, loc="best", fontsize=7, framealpha=0.85)
+    for sample in legend.legend_handles:
+        if isinstance(sample, Line2D):  # a dot too small to show its colour is drawn larger here
+            sample.set_markersize(max(_LEAST_SAMPLE, sample.get_markersize()))
+            sample.set_linewidth(max(1.0, sample.get_linewidth()))
+
+
+def named(artists: Iterable[Any]) -> list[Any]:
+    """Return the artists that have a name for the legend."""
+    return [artist for artist in artists if artist.get_label() and not str(artist.get_label()).startswith("_")]
+
+
+def span(values: Sequence[Any]) -> tuple[float, float]:
+    """Return the least and the largest finite number of some arrays, with a little room around; (−1, 1) if none."""
+    flat = np.concatenate([np.ravel(np.asarray(value, dtype=float)) for value in values] or [np.empty(0)])
+    finite = flat[np.isfinite(flat)]
+    if finite.size == 0:
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    resting = high - low <= _ROUNDING * max(1.0, abs(high))  # what is left of it is rounding
+    room = 0.1 * max(1.0, abs(high)) if resting else 0.06 * (high - low)
+    return low - room, high + room

@@ -1,55 +1,185 @@
-"""Basins of attraction on the section."""
+"""Basins of attraction on the section, and what lies on their boundaries."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.patches import Patch, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
-from vibrokit.plots.axes import axes_or_new, colour
+from vibrokit.plots.axes import add_legend, axes_or_new, colour, named, phase_plane, rows
+from vibrokit.plots.clipping import clipped
+
+Style = Mapping[str, Any]
+
+# Labels of cells that lead to no attractor, as `vibrokit.results.basins` has them, and how they look.
+UNSETTLED, LEFT, NOT_FOLLOWED = -1, -2, -3
+_GREY, _DARK, _CLEAR = (0.8, 0.8, 0.8, 1.0), (0.42, 0.42, 0.42, 1.0), (1.0, 1.0, 1.0, 0.0)
+_HATCH: Style = {"facecolor": "white", "edgecolor": "0.72", "hatch": "////", "linewidth": 0}
+_PALE = 0.35
+_DENSE = 20_000  # points of a curve above which it is drawn as pixels
+_FEW = 4  # points of an orbit that are drawn large
+
+STABLE, UNSTABLE = "#101010", "#c4007a"
+_DOTS: Style = {"marker": "o", "markersize": 2.2, "markeredgewidth": 0}
+_MARKERS: Mapping[str, Style] = {
+    "periodic": {"marker": "o", "markersize": 6},
+    "limit cycle": {"marker": "D", "markersize": 6},
+    "equilibrium": {"marker": "s", "markersize": 6},
+    "quasiperiodic": _DOTS,
+    "chaotic": _DOTS,
+}
+_SADDLE_MARKERS: Mapping[str, Style] = {
+    "saddle": {"marker": "X", "markersize": 7},
+    "flip saddle": {"marker": "P", "markersize": 7},
+    "repeller": {"marker": "^", "markersize": 7},
+    "chaotic": _DOTS,
+}
 
 
 def basin_map(
-    labels: NDArray[Any], bounds: ArrayLike, points: Sequence[ArrayLike], *, ax: Axes | None = None
+    labels: NDArray[Any],
+    bounds: ArrayLike,
+    points: Sequence[ArrayLike],
+    *,
+    kinds: Sequence[str] = (),
+    ax: Axes | None = None,
 ) -> list[Any]:
-    """Draw basins as pale colours and attractors as dots; cells that settled nowhere are grey.
+    """Draw basins as pale colours and attractors as markers.
+
+    Cells that settled on nothing are grey, those whose motion left the region are hatched, and those that were not
+    followed are dark.
 
     Parameters
     ----------
     labels : int array (nx, nv)
+        Label of the attractor that each cell leads to; −1 settled on nothing, −2 left, −3 not followed.
     bounds : array_like (2, 2)
         Bounds of x and v.
-    points : sequence of array_like (period, n)
-        Points of each attractor.
+    points : sequence of array_like (count, n)
+        Points of each attractor, x and v first.
+    kinds : sequence of str, optional
+        Kind of each attractor, which chooses its marker: ``"periodic"`` (circle), ``"equilibrium"`` (square),
+        ``"limit cycle"`` (diamond), ``"chaotic"`` or ``"quasiperiodic"`` (dots). All periodic by default.
     ax : matplotlib Axes, optional
 
     Returns
     -------
     list of artists
+        The image of the basins, the hatching if there is any, the markers of each attractor.
     """
     axes = axes_or_new(ax, 5.4, 4.6)
-    (x_low, x_high), (v_low, v_high) = np.asarray(bounds)
-    pale = [(0.82, 0.82, 0.82), *(tuple(0.35 * np.array(to_rgb(colour(k))) + 0.65) for k in range(len(points)))]
+    cells = np.asarray(labels)
+    (x_low, x_high), (v_low, v_high) = np.asarray(bounds, dtype=float)
+    pale = [(*(_PALE * np.array(to_rgb(colour(k))) + 1 - _PALE), 1.0) for k in range(len(points))]
     image = axes.imshow(
-        labels.T,
+        cells.T,
         origin="lower",
         extent=(x_low, x_high, v_low, v_high),
-        cmap=ListedColormap(pale),
-        vmin=-1.5,
+        cmap=ListedColormap([_DARK, _CLEAR, _GREY, *pale]),
+        vmin=NOT_FOLLOWED - 0.5,
         vmax=len(points) - 0.5,
         aspect="auto",
         interpolation="nearest",
     )
     artists: list[Any] = [image]
+    if (cells == LEFT).any():  # seen through the image where that is clear
+        under = Rectangle((x_low, v_low), x_high - x_low, v_high - v_low, zorder=-1, **_HATCH)
+        artists.append(axes.add_patch(under))
     for label, visits in enumerate(points):
-        place = np.asarray(visits)
+        place = rows(visits)
+        name = f"attractor {label}" + (f", {kinds[label]}" if kinds else "")
+        style: Style = {"markeredgecolor": "white", **_style_of(_MARKERS, kinds, label)}
         artists += axes.plot(
-            place[:, 0], place[:, 1], "o", color=colour(label), markeredgecolor="white", label=f"attractor {label}"
-        )
-    axes.set_xlabel(r"displacement $x$ (m)")
-    axes.set_ylabel(r"velocity $v$ (m s$^{-1}$)")
+            place[:, 0], place[:, 1], linestyle="none", color=colour(label), label=name, zorder=7, **style
+        )  # fmt: skip
+    phase_plane(axes)
     return artists
+
+
+def section_portrait(
+    labels: NDArray[Any],
+    bounds: ArrayLike,
+    points: Sequence[ArrayLike],
+    *,
+    kinds: Sequence[str] = (),
+    saddles: Sequence[ArrayLike] = (),
+    saddle_kinds: Sequence[str] = (),
+    stable: Sequence[ArrayLike] = (),
+    unstable: Sequence[ArrayLike] = (),
+    ax: Axes | None = None,
+) -> list[Any]:
+    """Draw attractors, saddles and their manifolds over the basins: the global structure on the section.
+
+    Parameters
+    ----------
+    labels, bounds, points, kinds
+        As in `basin_map`.
+    saddles : sequence of array_like (count, n)
+        Points of each saddle.
+    saddle_kinds : sequence of str, optional
+        Kind of each, which chooses its marker: ``"saddle"`` (cross), ``"flip saddle"`` (plus), ``"repeller"``
+        (triangle), ``"chaotic"`` (dots). All saddles by default.
+    stable, unstable : sequence of array_like (count, 2)
+        Branches of the manifolds as curves; what lies outside the bounds is cut off.
+    ax : matplotlib Axes, optional
+        A legend is put beside the picture, or inside axes that are given.
+
+    Returns
+    -------
+    list of artists
+        Those of `basin_map`, a line for each branch (stable ones first), the markers of each saddle.
+    """
+    axes = axes_or_new(ax, 7.0, 4.8)
+    box = np.asarray(bounds, dtype=float)
+    artists = basin_map(labels, box, points, kinds=kinds, ax=axes)
+    for curves, ink, name in ((stable, STABLE, "stable manifold"), (unstable, UNSTABLE, "unstable manifold")):
+        for index, curve in enumerate(curves):
+            inside = clipped(curve, box)
+            artists += axes.plot(
+                inside[:, 0], inside[:, 1], color=ink, linewidth=0.8, zorder=3, rasterized=len(inside) > _DENSE,
+                label=name if index == 0 else "_more",
+            )  # fmt: skip
+    artists += _draw_saddles(axes, saddles, saddle_kinds)
+    axes.set_xlim(*box[0])
+    axes.set_ylim(*box[1])
+    add_legend(axes, ax, [*named(artists), *_cell_samples(np.asarray(labels))])
+    return artists
+
+
+def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]) -> list[Any]:
+    artists: list[Any] = []
+    seen: set[str] = set()
+    for index, visits in enumerate(saddles):
+        kind = kinds[index] if kinds else "saddle"
+        place = rows(visits)
+        name = "chaotic saddle" if kind == "chaotic" else kind
+        style = {"markeredgecolor": "white", **_style_of(_SADDLE_MARKERS, kinds, index)}
+        if len(place) > _FEW and kind != "chaotic":  # so that many points do not hide what they lie on
+            style |= {"markersize": 4, "markeredgewidth": 0.4}
+        artists += axes.plot(
+            place[:, 0], place[:, 1], linestyle="none", color="black", zorder=6,
+            label="_more" if kind in seen else name, **style,
+        )  # fmt: skip
+        seen.add(kind)
+    return artists
+
+
+def _style_of(markers: Mapping[str, Style], kinds: Sequence[str], index: int) -> Style:
+    """Marker of a kind; that of the first kind where none is said or it is unknown."""
+    usual = next(iter(markers))
+    return markers.get(kinds[index] if kinds else usual, markers[usual])
+
+
+def _cell_samples(cells: NDArray[Any]) -> list[Patch]:
+    """Entries of the legend for cells that lead to no attractor, where there are any."""
+    samples = (
+        (UNSETTLED, {"facecolor": _GREY}, "not settled"),
+        (LEFT, _HATCH, "leaves the region"),
+        (NOT_FOLLOWED, {"facecolor": _DARK}, "not followed"),
+    )
+    return [Patch(**{"linewidth": 0, **style}, label=name) for label, style, name in samples if (cells == label).any()]

@@ -14,6 +14,8 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 
 _ITERATIONS = 30
+EQUAL = 1e-6
+"""Distance, relative to the size of an orbit, below which two points are one."""
 
 Array = NDArray[np.float64]
 
@@ -38,17 +40,26 @@ class Orbit:
     residual: float
 
 
-def section_derivative(osc: Oscillator, point: Array, periods: int, stepper: Stepper) -> tuple[Array, Array]:
-    """Return the image of a point of the section after some periods, and the derivative of that map."""
+def section_derivative(
+    osc: Oscillator, point: Array, periods: int, stepper: Stepper, *, interval: float | None = None
+) -> tuple[Array, Array]:
+    """Return the image of a point of the section after some periods, and the derivative of that map.
+
+    In an autonomous scene the time from section to section may be chosen by `interval`.
+    """
     size = len(point)
     start = np.concatenate([point, np.eye(size).ravel()])
-    ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], periods)
+    ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], periods, interval=interval)
     image = ended.states[0]
     return image[:size], image[size:].reshape(size, size)
 
 
-def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
+def refine_orbit(
+    osc: Oscillator, guess: Array, period: int, stepper: Stepper, *, interval: float | None = None
+) -> Orbit:
     """Refine a periodic point by Newton's method until the residual no longer falls.
+
+    A short `interval` finds equilibria of autonomous scenes, however fast deviations from them grow.
 
     Raises
     ------
@@ -58,7 +69,7 @@ def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -
     best: Orbit | None = None
     point = np.array(guess, dtype=float)
     for _ in range(_ITERATIONS):
-        image, monodromy = section_derivative(osc, point, period, stepper)
+        image, monodromy = section_derivative(osc, point, period, stepper, interval=interval)
         residual = float(np.linalg.norm(image - point))
         if not np.isfinite(residual) or (best is not None and residual >= best.residual):
             break
@@ -75,3 +86,30 @@ def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -
             "is too far off, or the orbit is not hyperbolic; wait longer or take a finer stepper."
         )
     return best
+
+
+def least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
+    """Return the orbit with its least period: recurrences close to a bifurcation can show a multiple of it."""
+    for divisor in range(1, orbit.period):
+        if orbit.period % divisor == 0:
+            try:
+                shorter = refine_orbit(osc, orbit.point, divisor, stepper)
+            except StructureError:
+                continue
+            if same_point(orbit.point, shorter.point[None], EQUAL):
+                return shorter
+    return orbit
+
+
+def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
+    """Return the points of an orbit on the section, in the order of visits, shape (period, n)."""
+    points = [orbit.point]
+    for _ in range(orbit.period - 1):
+        points.append(run_ensemble(osc, Flow.STATE, stepper, points[-1][None], 1).states[0])
+    return np.array(points)
+
+
+def same_point(point: Array, known: Array, tolerance: float) -> bool:
+    """Whether a point is one of some known points (count, n), to a tolerance relative to their size."""
+    nearest = np.linalg.norm(known - point, axis=1).min()
+    return bool(nearest < tolerance * (1.0 + np.abs(known).max()))

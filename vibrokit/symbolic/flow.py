@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 
 import sympy
 
-from vibrokit.symbolic.contact import DEPTH, RATE
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
 
@@ -31,8 +33,49 @@ class FlowEquations:
     contacts: dict[sympy.Symbol, tuple[int, int, int]]
 
 
+class ReversedModel(Model):
+    """The motion of a scene backwards in time, as a model of its own.
+
+    In s = −t and w = −v the motion is again x′ = w, w′ = f(x, −w, −s): the acceleration does not change its sign, so
+    that steppers follow it, and locate its contacts, as that of any scene. What is called v and t here is w and s.
+    A law is asked with the rate of the motion forwards, which decides where it would pull. Forces that jump at first
+    touch jump at release instead; the state crosses both, for x′ is continuous there, so the way back is unique.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    @cached_property
+    def contacts(self) -> tuple[DerivedContact, ...]:
+        """What was derived from the law of each stop, with the rate reversed in the law."""
+        return tuple(dataclasses.replace(c, law=c.law.xreplace({RATE: -RATE})) for c in super().contacts)
+
+    @cached_property
+    def smooth_force(self) -> sympy.Expr:
+        """Acceleration without stops and without what depends on time."""
+        return self._reversed(super().smooth_force)
+
+    @cached_property
+    def forcing(self) -> sympy.Expr:
+        """Sum of the excitations that depend on time."""
+        return self._reversed(super().forcing)
+
+    @cached_property
+    def _extra_drift(self) -> tuple[sympy.Expr, ...]:
+        return tuple(-self._reversed(rate) for rate in super()._extra_drift)
+
+    def _reversed(self, expression: sympy.Expr) -> sympy.Expr:
+        return sympy.sympify(expression).xreplace({self.state[1]: -self.state[1], self.time: -self.time})
+
+
+def model_for(scene: Scene, flow: Flow) -> Model:
+    """Return the model whose equations a flow integrates: that of the scene, or of the scene backwards in time."""
+    return ReversedModel(scene) if flow is Flow.STATE_REVERSED else Model(scene)
+
+
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
-    """Derive the equations of a flow."""
+    """Derive the equations of a flow from the model that `model_for` gives for it."""
     opaque = model.opaque_forces
     forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
     drift = model.drift_with(forcing, opaque)

@@ -13,6 +13,8 @@ class Flow(enum.Enum):
     """q"""
     STATE_VARIATIONAL = "state_variational"
     """q, then ∂q/∂q₀ row by row"""
+    STATE_REVERSED = "state_reversed"
+    """q backwards in time, with −v in place of v; time t₀ is started from as −t₀"""
     HAMILTONIAN = "hamiltonian"
     """q, p, S"""
     HAMILTONIAN_VARIATIONAL = "hamiltonian_variational"

@@ -193,6 +193,15 @@ class Model:
         return self.drift.jacobian(list(self.state))
 
     @cached_property
+    def undamped(self) -> bool:
+        """Whether nothing takes energy out, at the scene's parameters: no friction, and stops that give all back."""
+        values = self.scene.parameters
+        numbers = {symbol: values[path] for path, symbol in self.symbols.items()}
+        friction = sympy.diff(self.smooth_force, self.state[1]).subs(numbers)
+        laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
+        return friction == 0 and all(law == 0 for law in laws)
+
+    @cached_property
     def hessian(self) -> sympy.Matrix:
         """Second derivatives of H in (q, p), 2n × 2n: the variational equations of a path are Jᵀ times this."""
         return sympy.hessian(self.hamiltonian, (*self.state, *self.momenta))

@@ -14,7 +14,7 @@ import sympy
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact_source import ContactWriter
 from vibrokit.symbolic.flight import FlightWriter
-from vibrokit.symbolic.flow import FlowEquations, derive_flow
+from vibrokit.symbolic.flow import FlowEquations, derive_flow, model_for
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import assignments
@@ -46,7 +46,7 @@ def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
     StepperError
         The free flight was asked for and is not linear.
     """
-    writer = _SceneWriter(Model(scene), flow)
+    writer = _SceneWriter(model_for(scene, flow), flow)
     amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
     return SceneText(
         flow=flow,

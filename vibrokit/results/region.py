@@ -60,6 +60,11 @@ class Region:
         """Array (2, 2): bounds of x, bounds of v."""
         return np.array([self.x, self.v])
 
+    @property
+    def size(self) -> float:
+        """Width in x or in v, the smaller one."""
+        return float(np.min(np.diff(self.bounds)))
+
     def cell_centres(self, cells: Sequence[int]) -> NDArray[np.float64]:
         """Return the centres of a grid of cells, shape (nx · nv, 2), v running fastest."""
         axes = [

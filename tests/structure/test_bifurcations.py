@@ -1,0 +1,204 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
+
+import vibrokit as vk
+from vibrokit.kernels.choice import single_stepper
+from vibrokit.structure.cycles import find_cycle
+from vibrokit.structure.describe import describe_cycle, describe_orbit
+from vibrokit.structure.following import family_of, follow
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
+
+FREQUENCY, AMPLITUDE = "excitations.0.frequency", "excitations.0.amplitude"
+CLEAR, HAMMERING = (0.4666, 0.0026), (0.0236, -0.0491)  # of hertz-0.570
+
+
+def passed(osc, path, state, target, *, size=(2.0, 2.0), cycle=False):
+    """What a motion meets from where the scene stands to the target, and whether it arrives there stable."""
+    stepper, start = single_stepper(osc, Flow.STATE_VARIATIONAL), osc.parameters[path]
+    if cycle:
+        attractor = describe_cycle(osc, find_cycle(osc, np.array(state), stepper, longest=50.0), stepper)
+    else:
+        attractor = describe_orbit(osc, refine_orbit(osc, np.array(state), 1, stepper), stepper)
+    family = family_of(osc, path, attractor, start, target, np.array(size), stepper)
+    return follow(family, attractor, start, target)
+
+
+def only(followed, kind):
+    """The one bifurcation of a kind, located and not only bracketed."""
+    (found,) = [one for one in followed.bifurcations if one.kind == kind]
+    assert not found.bracketed
+    assert found.error < 1e-9
+    return found
+
+
+def rayleigh(*, spring="x + v*(v**2 - m)", m=0.2, excitations=(), barriers=()):
+    """x″ + x + v³ + (0.1 − m) v: damped at rest for m < 0.1."""
+    return vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(spring, m=m), excitations=excitations,
+        barriers=barriers,
+    )  # fmt: skip
+
+
+def test_grazing_of_the_clear_state_is_where_the_linear_response_reaches_the_stop():
+    osc = vk.load_scene("hertz-0.570")
+
+    def reach(frequency, amplitude):
+        return 0.2 + amplitude / math.hypot(1 - frequency**2, 0.02 * frequency)
+
+    in_frequency = brentq(lambda frequency: reach(frequency, 0.18) - 0.5, 0.57, 0.7, xtol=1e-15)
+    in_amplitude = 0.3 * math.hypot(1 - 0.57**2, 0.02 * 0.57)
+    found = only(passed(osc, FREQUENCY, CLEAR, 0.66), "grazing")
+    assert found.value == pytest.approx(in_frequency, abs=1e-8)
+    assert found.side == "right"
+    assert only(passed(osc, AMPLITUDE, CLEAR, 0.203), "grazing").value == pytest.approx(in_amplitude, abs=1e-8)
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e9])
+def test_grazing_that_ends_the_clear_state_at_a_stiff_stop(stiffness):
+    stiff = {"barriers.0.law.stiffness": stiffness, "barriers.1.law.stiffness": stiffness}
+    followed = passed(vk.load_scene("hertz-0.570").replace(stiff), AMPLITUDE, CLEAR, 0.25)
+    exact = 0.3 * math.hypot(1 - 0.57**2, 0.02 * 0.57)
+    assert only(followed, "grazing").value == pytest.approx(exact, abs=1e-8)
+    assert followed.end is None
+
+
+def test_an_equilibrium_grazes_where_the_spring_balances_the_force_at_the_stop():
+    stop = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
+    osc = vk.Oscillator(
+        natural_frequency=2.0, damping_ratio=0.05, excitations=(vk.Constant(0.2),), barriers=(stop,)
+    )  # fmt: skip
+    followed = passed(osc, "excitations.0.force", (0.05, 0.0), 3.0)
+    assert only(followed, "grazing").value == pytest.approx(2.0, abs=1e-10)  # ω_n² · 0.5
+    assert followed.stable
+
+
+def hertz_map(state, frequency):
+    """Image and derivative over one period of the scene hertz-0.570 at another frequency, by SciPy."""
+
+    def rates(t, y):
+        right, left = max(y[0] - 0.5, 0.0), max(-0.5 - y[0], 0.0)
+        stiffness = 1 + 75 * (math.sqrt(right) + math.sqrt(left))
+        push = 0.18 * math.cos(frequency * t) + 0.2 - 50 * (right**1.5 - left**1.5)
+        derivative = y[2:].reshape(2, 2)
+        turned = np.array([derivative[1], -stiffness * derivative[0] - 0.02 * derivative[1]])
+        return [y[1], push - 0.02 * y[1] - y[0], *turned.ravel()]
+
+    start = np.concatenate([state, np.eye(2).ravel()])
+    ended = solve_ivp(rates, (0, 2 * math.pi / frequency), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    return ended[:2], ended[2:].reshape(2, 2)
+
+
+def test_at_a_period_doubling_a_multiplier_is_minus_one():
+    found = only(passed(vk.load_scene("hertz-0.570"), FREQUENCY, HAMMERING, 0.53), "period doubling")
+    state = found.point
+    for _ in range(3):
+        image, derivative = hertz_map(state, found.value)
+        state = state - np.linalg.solve(derivative - np.eye(2), image - state)
+    np.testing.assert_allclose(state, found.point, atol=1e-8)
+    multipliers = np.linalg.eigvals(hertz_map(state, found.value)[1])
+    assert multipliers.real.min() == pytest.approx(-1.0, abs=1e-6)
+    assert np.prod(multipliers) == pytest.approx(math.exp(-0.02 * 2 * math.pi / found.value), rel=1e-7)
+
+
+def duffing_fold(frequency, sines):
+    """Fold of x″ + 0.1x′ + x + 0.3x³ = 0.4 cos ωt, by collocation on a Fourier series instead of integration in time.
+
+    The orbit, the null vector of its equations and ω are unknown at once; the start is one cosine and sine.
+    """
+    count = 48
+    angle = 2 * math.pi * np.arange(count) / count
+    waves = np.fft.fftfreq(count, 1 / count)
+    spectrum = np.fft.fft(np.eye(count), axis=0)
+    first = np.fft.ifft(1j * np.where(np.abs(waves) == count / 2, 0, waves)[:, None] * spectrum, axis=0).real
+    second = np.fft.ifft(-(waves**2)[:, None] * spectrum, axis=0).real
+
+    def linearised(x, omega):
+        return omega**2 * second + 0.1 * omega * first + np.diag(1 + 0.9 * x**2)
+
+    def equations(unknowns):
+        x, null, omega = unknowns[:count], unknowns[count:-1], unknowns[-1]
+        motion = (omega**2 * second + 0.1 * omega * first) @ x + x + 0.3 * x**3 - 0.4 * np.cos(angle)
+        return np.concatenate([motion, linearised(x, omega) @ null, [null @ null - 1]])
+
+    start = sines[0] * np.cos(angle) + sines[1] * np.sin(angle)
+    null = np.linalg.svd(linearised(start, frequency))[2][-1]
+    solved = root(equations, np.concatenate([start, null, [frequency]]), tol=1e-12)
+    assert np.abs(solved.fun).max() < 1e-9
+    return solved.x[-1]
+
+
+def test_duffing_folds_where_collocation_says():
+    osc = vk.load_scene("duffing")
+    for state, target in (((-0.426, 0.0916), 1.1), ((1.3586, 2.4173), 1.8)):
+        found = only(passed(osc, FREQUENCY, state, target, size=(6.0, 6.0)), "fold")
+        sines = (found.point[0], found.point[1] / found.value)
+        assert found.value == pytest.approx(duffing_fold(found.value, sines), abs=1e-8)
+        assert abs(found.value - target) > 0.1  # it turned back on the way
+
+
+def test_equilibria_of_a_double_well():
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Constant(0.0),)
+    )  # fmt: skip
+    tilted = passed(osc, "excitations.0.force", (-1.0, 0.0), 0.8, size=(4.0, 4.0))
+    assert tilted.end is None
+    assert only(tilted, "fold").value == pytest.approx(2 / math.sqrt(27), abs=1e-10)  # max of x − x³
+    single = osc.replace({"spring.linear": 0.5})
+    crossed = passed(single, "spring.linear", (0.0, 0.0), -0.7, size=(4.0, 4.0))
+    assert only(crossed, "pitchfork or transcritical").value == pytest.approx(0.0, abs=1e-10)
+    assert not crossed.stable
+
+
+def test_hopf_where_the_damping_at_rest_vanishes():
+    followed = passed(rayleigh(m=-0.3), "spring.m", (0.0, 0.0), 0.4)
+    assert only(followed, "Hopf").value == pytest.approx(0.1, abs=1e-10)
+    assert not followed.stable
+
+
+def test_a_limit_cycle_grazes_where_it_reaches_the_stop():
+    stop = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
+    followed = passed(rayleigh(barriers=(stop,)), "spring.m", (0.36, 0.0), 0.4, cycle=True)
+    found = only(followed, "grazing")
+
+    def rates(t, y):
+        return [y[1], -y[0] - (0.1 - found.value) * y[1] - y[1] ** 3]
+
+    def turns(t, y):
+        return y[1]
+
+    turns.direction = -1
+    settled = solve_ivp(rates, (0, 600), [0.5, 0.0], method="DOP853", rtol=1e-12, atol=1e-13, events=turns)
+    assert settled.y_events[0][-1][0] == pytest.approx(0.5, abs=1e-9)
+    assert followed.stable
+
+
+def test_at_a_torus_bifurcation_a_pair_of_multipliers_is_on_the_unit_circle():
+    osc = rayleigh(m=0.3, excitations=(vk.Harmonic(0.2, 1.0),))
+    followed = passed(osc, FREQUENCY, (-0.0605, 0.7755), 1.4, size=(4.0, 4.0))
+    found = only(followed, "Neimark–Sacker")
+
+    def rates(t, y):
+        derivative = y[2:].reshape(2, 2)
+        turned = np.array([derivative[1], -derivative[0] - (3 * y[1] ** 2 - 0.2) * derivative[1]])
+        return [y[1], 0.2 * math.cos(found.value * t) - y[0] - y[1] * (y[1] ** 2 - 0.2), *turned.ravel()]
+
+    start = np.concatenate([found.point, np.eye(2).ravel()])
+    ended = solve_ivp(rates, (0, 2 * math.pi / found.value), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(ended[:2], found.point, atol=1e-9)
+    multipliers = np.linalg.eigvals(ended[2:].reshape(2, 2))
+    np.testing.assert_allclose(np.abs(multipliers), 1.0, atol=1e-8)
+    assert np.abs(multipliers.imag).min() > 0.1
+    assert not followed.stable
+
+
+def test_nothing_is_said_of_motion_that_stays_unstable():
+    osc = vk.load_scene("double-well").replace({"damping_ratio": 0.05})
+    followed = passed(osc, "spring.linear", (0.0, 0.0), -0.2)
+    assert followed.bifurcations == ()
+    assert followed.end is not None
+    assert not followed.stable

@@ -1,0 +1,235 @@
+import concurrent.futures
+import dataclasses
+import multiprocessing
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import vibrokit as vk
+from vibrokit.errors import ParameterError, StructureError
+from vibrokit.kernels.choice import single_stepper
+from vibrokit.results.content import open_content
+from vibrokit.results.continuation_file import read_continuation
+from vibrokit.structure import continuation as module
+from vibrokit.structure.branches import Tracing
+from vibrokit.structure.continuation import continuation
+from vibrokit.structure.describe import describe_orbit
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
+
+FREQUENCY = "excitations.0.frequency"
+QUICK = {"cells": (30, 30), "starts": (10, 10)}
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return continuation(vk.load_scene("hertz-0.570"), FREQUENCY, [0.61, 0.565, 0.58, 0.595], **QUICK)
+
+
+@pytest.fixture(scope="module")
+def duffing():
+    return continuation(vk.load_scene("duffing"), FREQUENCY, [1.2, 1.3, 1.4, 1.5, 1.6], **QUICK)
+
+
+def same(first, second):
+    """Compare records to the last bit, but for the time that they took."""
+    if dataclasses.is_dataclass(first):
+        names = [field.name for field in dataclasses.fields(first) if field.name != "seconds"]
+        return type(first) is type(second) and all(same(getattr(first, n), getattr(second, n)) for n in names)
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    if isinstance(first, np.ndarray | float):
+        kind = np.asarray(first).dtype.kind
+        return np.array_equal(first, second, equal_nan=kind in "fc")
+    return bool(first == second)
+
+
+def test_branches_keep_their_identity(paper):
+    np.testing.assert_array_equal(paper.values, [0.565, 0.58, 0.595, 0.61])
+    assert paper.complete
+    clear, hammering = (
+        next(
+            branch
+            for attractor, branch in zip(paper.states[0].attractors, paper.states[0].branches, strict=True)
+            if attractor.period == 1 and (attractor.impacts > 0) is hits
+        )
+        for hits in (False, True)
+    )
+    assert len(paper.branch(clear)) == len(paper.branch(hammering)) == 4
+    for value, attractor in paper.branch(clear):
+        # Closed form of the linear response, displaced by the constant force.
+        response = 0.18 / (1 - value**2 + 2j * 0.01 * value)
+        np.testing.assert_allclose(attractor.points[0], [response.real + 0.2, (1j * value * response).real], atol=1e-9)
+    assert all(attractor.period == 1 and attractor.hits["right"] > 0 for _, attractor in paper.branch(hammering))
+
+
+def test_basin_fractions_are_shares_of_one_region(paper):
+    shares, errors = paper.fractions()
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=0.02)  # but for cells on a boundary that did not settle
+    np.testing.assert_allclose(errors, np.sqrt(shares * (1 - shares) / 900), atol=1e-12)
+    assert paper.region is not None
+    for at in paper.states:
+        for attractor in at.attractors:
+            (x_low, x_high), (v_low, v_high) = paper.region.bounds
+            assert np.all((x_low < attractor.points[:, 0]) & (attractor.points[:, 0] < x_high))
+            assert np.all((v_low < attractor.points[:, 1]) & (attractor.points[:, 1] < v_high))
+
+
+def test_duffing_has_two_branches_that_overlap_between_two_folds(duffing):
+    first, last = (found.value for found in duffing.bifurcations)
+    assert [found.kind for found in duffing.bifurcations] == ["fold", "fold"]
+    assert 1.2 < first < 1.3
+    assert 1.5 < last < 1.6
+    small, large = sorted(duffing.branches, key=lambda number: np.abs(duffing.branch(number)[0][1].orbit).max())
+    assert [value for value, _ in duffing.branch(small)] == [1.3, 1.4, 1.5, 1.6]
+    assert [value for value, _ in duffing.branch(large)] == [1.2, 1.3, 1.4, 1.5]
+    assert not np.isnan(duffing.fractions()[0]).any()
+
+
+def test_an_attractor_that_the_search_missed_is_found_from_its_neighbour(monkeypatch):
+    found, osc, at_middle = module.find_structure, vk.load_scene("duffing"), []
+
+    def forgetful(scene, **settings):
+        structure = found(scene, **settings)
+        if scene.parameters[FREQUENCY] != 1.4:
+            return structure
+        at_middle.extend(structure.attractors)
+        return dataclasses.replace(structure, attractors=structure.attractors[1:])
+
+    monkeypatch.setattr(module, "find_structure", forgetful)
+    region = ((-3, 3), (-3, 3))
+    result = continuation(osc, FREQUENCY, [1.35, 1.4, 1.45], region=region, **QUICK)
+    assert len(at_middle) == 2
+    kept, added = result.states[1].attractors
+    np.testing.assert_allclose(added.points, at_middle[0].points, atol=1e-9)
+    assert "1 attractor was found from a neighbouring value" in result.status
+    # Both codes that the basin fractions of this case are known from say 0.571 and 0.429 on this region.
+    assert sorted([kept.basin_fraction, added.basin_fraction]) == pytest.approx([0.429, 0.571], abs=0.02)
+
+
+def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
+    osc = vk.load_scene("hertz-0.570")
+    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    found = []
+    for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
+        there = osc.replace({FREQUENCY: frequency})
+        found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
+    tracing = Tracing(osc, FREQUENCY, [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
+    tracing.run()
+    assert tracing.numbered() == [[0], [0]]
+    doublings = {one.period: one for _, one in tracing.located if one.kind == "period doubling"}
+    assert set(doublings) == {1, 2}
+    assert 0.525 < doublings[2].value < doublings[1].value < 0.57
+
+    def rates(t, y):
+        depth, push = max(y[0] - 0.5, 0.0), 0.18 * np.cos(doublings[2].value * t) + 0.2
+        turned = [y[4], y[5], *(-(1 + 75 * depth**0.5) * y[2:4] - 0.02 * y[4:6])]
+        return [y[1], push - 50 * depth**1.5 - 0.02 * y[1] - y[0], *turned]
+
+    start, end = np.concatenate([doublings[2].point, np.eye(2).ravel()]), 4 * np.pi / doublings[2].value
+    path = solve_ivp(rates, (0, end), start, method="DOP853", rtol=1e-11, atol=1e-13)
+    assert path.y[0].min() > -0.5  # clear of the left stop, which `rates` leaves out
+    multipliers = np.linalg.eigvals(path.y[2:, -1].reshape(2, 2))
+    assert multipliers.real.min() == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_wells_meet_in_a_pitchfork():
+    result = continuation(
+        vk.load_scene("double-well"), "spring.linear", [-0.3, -0.1, 0.1], cells=(20, 20), starts=(6, 6)
+    )
+    (pitchfork,) = result.bifurcations
+    assert pitchfork.kind == "pitchfork or transcritical"
+    assert pitchfork.value == pytest.approx(0.0, abs=1e-10)
+    assert pitchfork.branch == result.states[2].branches[0]
+    assert [len(at.attractors) for at in result.states] == [2, 2, 1]
+
+
+def test_processes_give_the_same_to_the_last_bit():
+    osc, values = vk.load_scene("double-well"), [-1.0, -0.6]
+    seen = []
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        parallel = continuation(
+            osc, "spring.linear", values, cells=(20, 20), starts=(6, 6), executor=pool,
+            progress=lambda done, tasks: seen.append((done, tasks)),
+        )  # fmt: skip
+    serial = continuation(osc, "spring.linear", values, cells=(20, 20), starts=(6, 6))
+    assert same(serial, parallel)
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert len(serial.branches) == 2
+    for value, attractor in serial.branch(0):
+        assert abs(attractor.points[0, 0]) == pytest.approx(np.sqrt(-value), abs=1e-9)
+
+
+def test_saved_and_opened(paper, tmp_path):
+    paper.save(tmp_path / "sweep.nc")
+    assert same(read_continuation(open_content(tmp_path / "sweep.nc")), paper)
+
+
+def test_pictures(paper):
+    axes = paper.plot()[0].axes
+    assert "omega" in axes.get_xlabel()
+    assert len(paper.plot_fractions()) >= len(paper.branches)
+
+
+def test_values_that_the_scene_refuses_stand_with_the_reason():
+    result = continuation(vk.load_scene("duffing"), "damping_ratio", [-0.1, 0.0, 0.05], cells=(8, 8), starts=(6, 6))
+    refused, undamped, damped = result.states
+    assert "at least 0" in refused.status
+    assert "no attractors" in undamped.status
+    assert damped.attractors
+    assert result.complete
+    assert np.isnan(result.fractions()[0][:2]).all()
+    with pytest.raises(StructureError, match="no branch 7"):
+        result.branch(7)
+
+
+def test_what_was_found_before_an_interrupt_stays(monkeypatch, tmp_path):
+    found = module.find_structure
+
+    def interrupted(scene, **settings):
+        if scene.parameters[FREQUENCY] > 1.45:
+            raise KeyboardInterrupt
+        return found(scene, **settings)
+
+    monkeypatch.setattr(module, "find_structure", interrupted)
+    result = continuation(
+        vk.load_scene("duffing"), FREQUENCY, [1.35, 1.4, 1.5, 1.6], region=((-3, 3), (-3, 3)), **QUICK
+    )
+    assert not result.complete
+    assert result.status.startswith("The work was stopped after 2 of 4 values.")
+    np.testing.assert_array_equal(result.values, [1.35, 1.4])
+    assert [len(result.branch(number)) for number in result.branches] == [2, 2]
+    result.save(tmp_path / "part.nc")
+    assert same(read_continuation(open_content(tmp_path / "part.nc")), result)
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "words"),
+    [
+        ("excitations.0.frequenc", [1.0], "nearest is 'excitations.0.frequency'"),
+        (3, [1.0], "no parameter 3"),
+        (FREQUENCY, [], "one or more"),
+        (FREQUENCY, 1.0, "sequence of numbers"),
+        (FREQUENCY, "12", "sequence of numbers"),
+        (FREQUENCY, [1.0, float("nan")], "finite numbers"),
+        (FREQUENCY, [1.0, True], "finite numbers"),
+        (FREQUENCY, [1.0, "2"], "finite numbers"),
+        (FREQUENCY, [1.0, 2.0, 1.0], "1 more than once"),
+    ],
+)
+def test_bad_paths_and_values(path, values, words):
+    with pytest.raises(ParameterError, match=words):
+        continuation(vk.load_scene("duffing"), path, values)
+
+
+def test_what_shapes_the_equations_is_refused():
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring("x + e*x**5", e=0.2))
+    with pytest.raises(ParameterError, match="shapes the equations"):
+        continuation(osc, "spring.formula", ["x", "x**3"])
+
+
+@pytest.mark.parametrize("bad", [{"cells": (0, 3)}, {"starts": 5}, {"region": ((1, 0), (0, 1))}])
+def test_bad_counts(bad):
+    with pytest.raises(StructureError, match=next(iter(bad))):
+        continuation(vk.load_scene("duffing"), FREQUENCY, [1.3, 1.4], **bad)

@@ -1,0 +1,186 @@
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import vibrokit as vk
+from vibrokit.errors import StructureError
+from vibrokit.structure.cycles import equilibrium_exponents, find_cycle, refine_cycle
+
+VAN_DER_POL = vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=1.0)
+# Of the Van der Pol oscillator at μ = 1 (Amore, Boyd & Fernández, Appl. Math. Comput. 305, 2017, and others).
+DURATION, AMPLITUDE = 6.6632868593231301896996820305, 2.00861986087484313650940188
+
+DAMPING = 0.52  # where Genesio and Tesi's cycle has doubled its period once
+
+
+def van_der_pol(**parts):
+    return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=VAN_DER_POL, **parts)
+
+
+class Jerk(vk.NoiseModel):
+    """A third state that makes Genesio and Tesi's oscillator, x‴ + a x″ + 1.1 x′ + x = x²."""
+
+    extra_states: ClassVar = ("y",)
+
+    damping: float = vk.parameter("a", "s^-1", above=0)
+
+    def amplitude(self, x, v):
+        return 1
+
+    def force(self, y):
+        return y
+
+    def drift(self, x, v, y):
+        return (-self.damping * y - 1.1 * v - x + x**2,)
+
+
+@pytest.mark.parametrize(
+    ("stepper", "tolerance"), [(vk.RK4(256), 1e-6), (vk.RK4(1024), 4e-9), (vk.Order8(1e-12), 1e-11)]
+)
+def test_the_van_der_pol_cycle(stepper, tolerance):
+    cycle = find_cycle(van_der_pol(), np.array([0.5, 0.0]), stepper, longest=20.0)
+    assert cycle.duration == pytest.approx(DURATION, abs=tolerance)
+    np.testing.assert_allclose(cycle.point, [AMPLITUDE, 0.0], rtol=0, atol=tolerance)
+    assert cycle.residual < 1e-12
+
+
+def test_multipliers_are_those_of_an_independent_integration():
+    def rates(_, z):
+        x, v = z[:2]
+        linear = np.array([[0.0, 1.0], [-1.0 - 2.0 * x * v, 1.0 - x * x]])
+        return np.concatenate([[v, (1.0 - x * x) * v - x], (linear @ z[2:].reshape(2, 2)).ravel()])
+
+    start = np.array([AMPLITUDE, 0.0, 1.0, 0.0, 0.0, 1.0])
+    end = solve_ivp(rates, (0.0, DURATION), start, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    expected = np.sort(np.linalg.eigvals(end[2:].reshape(2, 2)))
+    assert expected[1] == pytest.approx(1.0, abs=1e-10)
+    cycle = refine_cycle(van_der_pol(), np.array([2.0, 0.3]), 6.6, vk.Order8(1e-12))
+    np.testing.assert_allclose(np.sort(np.linalg.eigvals(cycle.monodromy)), expected, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(cycle.monodromy, end[2:].reshape(2, 2), rtol=0, atol=1e-9)
+
+
+def test_a_weakly_nonlinear_cycle_has_the_multiplier_of_averaging():
+    # x″ + μ(x² − 1)x′ + x = 0 for small μ: amplitude 2, and deviations from it decay like exp(−μt), up to O(μ²).
+    osc = van_der_pol().replace({"spring.mu": 0.01})
+    cycle = find_cycle(osc, np.array([2.1, 0.0]), vk.RK4(512), longest=10.0)
+    assert cycle.point[0] == pytest.approx(2.0, abs=1e-4)
+    least = np.abs(np.linalg.eigvals(cycle.monodromy)).min()
+    assert least == pytest.approx(np.exp(-0.01 * 2 * np.pi), abs=1e-4)
+
+
+def test_a_cycle_that_hits_a_stop():
+    stop = vk.Barrier(vk.Hertz(stiffness=50.0), position=1.2, side="right")
+    cycle = find_cycle(van_der_pol(barriers=(stop,)), np.array([0.5, 0.0]), vk.Order8(1e-12), longest=20.0)
+
+    def rates(_, z):
+        return [z[1], (1.0 - z[0] ** 2) * z[1] - z[0] - 50.0 * max(z[0] - 1.2, 0.0) ** 1.5]
+
+    def turn(_, z):
+        return z[1]
+
+    turn.direction = -1
+    path = solve_ivp(
+        rates, (0.0, 60.0), [0.5, 0.1], method="DOP853", rtol=1e-11, atol=1e-12, max_step=0.01, events=turn
+    )
+    times, places = path.t_events[0], path.y_events[0]
+    assert cycle.duration == pytest.approx(times[-1] - times[-2], abs=1e-8)
+    assert cycle.point[0] == pytest.approx(places[-1, 0], abs=1e-8)
+    assert cycle.point[0] > 1.2
+
+
+def test_a_cycle_of_three_states_with_two_turns():
+    still = vk.CustomSpring("0*x")
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=DAMPING)
+    )
+    cycle = find_cycle(osc, np.array([0.1, 0.0, 0.0]), vk.Order8(1e-11), longest=150.0)
+
+    def rates(_, z):
+        return [z[1], z[2], -DAMPING * z[2] - 1.1 * z[1] - z[0] + z[0] ** 2]
+
+    def turn(_, z):
+        return z[1]
+
+    turn.direction = -1
+    path = solve_ivp(rates, (0.0, 1500.0), [0.1, 0.0, 0.0], method="DOP853", rtol=1e-11, atol=1e-12, events=turn)
+    times, places = path.t_events[0], path.y_events[0][:, 0]
+    assert abs(places[-1] - places[-2]) > 0.01  # the two turns differ
+    assert cycle.duration == pytest.approx(times[-1] - times[-3], abs=1e-6)
+    assert cycle.point[0] == pytest.approx(max(places[-2:]), abs=1e-7)
+    multipliers = np.linalg.eigvals(cycle.monodromy)
+    assert np.abs(multipliers - 1.0).min() < 1e-7
+    # Liouville: the divergence is −a everywhere.
+    assert np.prod(multipliers).real == pytest.approx(np.exp(-DAMPING * cycle.duration), abs=1e-10)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.01, 0.3, 2.0, 100.0])
+@pytest.mark.parametrize("frequency", [1.0, 300.0])
+@pytest.mark.parametrize("stepper", [vk.RK4(256), vk.FreeFlight(1e-10)])
+def test_exponents_of_the_linear_oscillator(damping_ratio, frequency, stepper):
+    osc = vk.Oscillator(natural_frequency=frequency, damping_ratio=damping_ratio)
+    root = np.sqrt(complex(damping_ratio**2 - 1))
+    expected = frequency * np.array([-damping_ratio + root, -damping_ratio - root])
+    found = equilibrium_exponents(osc, np.zeros(2), stepper)
+    if found[0].imag < 0:
+        found = found[::-1]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+def test_exponents_at_critical_damping():
+    # A double eigenvalue is known to the root of the rounding error; sum and product of both as well as ever.
+    osc = vk.Oscillator(natural_frequency=2.0, damping_ratio=1.0)
+    found = equilibrium_exponents(osc, np.zeros(2), vk.FreeFlight(1e-10))
+    np.testing.assert_allclose(found, [-2.0, -2.0], atol=1e-5)
+    assert found.sum() == pytest.approx(-4.0, rel=1e-11)
+    assert found.prod() == pytest.approx(4.0, rel=1e-11)
+
+
+def test_exponents_at_the_saddle_and_the_wells():
+    osc = vk.load_scene("double-well")
+    zeta = osc.damping_ratio
+    saddle = equilibrium_exponents(osc, np.zeros(2), vk.RK4(256))
+    np.testing.assert_allclose(saddle, [-zeta + np.hypot(zeta, 1.0), -zeta - np.hypot(zeta, 1.0)], atol=1e-11)
+    well = equilibrium_exponents(osc, np.array([1.0, 0.0]), vk.RK4(256))
+    np.testing.assert_allclose(well.real, -zeta, atol=1e-11)
+    np.testing.assert_allclose(np.sort(well.imag), np.sqrt(2 - zeta**2) * np.array([-1.0, 1.0]), atol=1e-11)
+
+
+def test_exponents_at_rest_on_a_very_stiff_stop():
+    stiffness = 1e12
+    stop = vk.Barrier(vk.Linear(stiffness=stiffness), position=0.0, side="right")
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.01, barriers=(stop,), excitations=(vk.Constant(force=0.5),)
+    )
+    found = equilibrium_exponents(osc, np.array([0.5 / (1.0 + stiffness), 0.0]), vk.FreeFlight(1e-10))
+    expected = -0.01 + 1j * np.sqrt(1.0 + stiffness - 1e-4) * np.array([1.0, -1.0])
+    np.testing.assert_allclose(found[np.argsort(-found.imag)], expected, rtol=0, atol=1e-12 * 1e6)
+
+
+def test_the_noise_state_decays_at_its_own_rate():
+    still = vk.CustomSpring("0*x")
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=0.5))
+    found = equilibrium_exponents(osc, np.zeros(3), vk.RK4(256))
+    expected = np.roots([1.0, 0.5, 1.1, 1.0])
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), atol=1e-11)
+
+
+def test_what_is_no_cycle_is_refused():
+    spiral = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.001)
+    with pytest.raises(StructureError, match="does not repeat within 30 s"):
+        find_cycle(spiral, np.array([1.0, 0.0]), vk.RK4(256), longest=30.0)
+    with pytest.raises(StructureError, match="equilibrium"):
+        refine_cycle(spiral, np.array([1.0, 0.0]), 6.3, vk.RK4(256))
+    with pytest.raises(StructureError, match="does not repeat"):
+        find_cycle(van_der_pol(), np.array([0.5, 0.0]), vk.RK4(256), longest=3.0)
+    with pytest.raises(StructureError, match="no equilibrium"):
+        equilibrium_exponents(van_der_pol(), np.array([0.5, 0.0]), vk.RK4(256))
+
+
+def test_forced_scenes_are_refused():
+    osc = vk.load_scene("duffing")
+    with pytest.raises(StructureError, match="periodic excitation"):
+        find_cycle(osc, np.zeros(2), vk.RK4(256), longest=10.0)
+    with pytest.raises(StructureError, match="periodic excitation"):
+        equilibrium_exponents(osc, np.zeros(2), vk.RK4(256))

@@ -1,0 +1,280 @@
+"""Saddles on basin boundaries against closed forms, SciPy's DOP853, Liouville's law and averaging."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import vibrokit as vk
+from vibrokit.kernels.choice import ensemble_stepper, single_stepper
+from vibrokit.results.basins import LEFT, Basins
+from vibrokit.results.region import Region
+from vibrokit.structure.cycles import find_cycle
+from vibrokit.structure.describe import describe_cycle, describe_orbit
+from vibrokit.structure.edges import edge_states, meeting_cells, spread
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.saddles import find_saddles
+from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.symbolic.flow_kind import Flow
+
+
+def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
+    """Return a settler to which a grid of basins answers, and the grid."""
+    region = Region.of(bounds)
+    carrier = stepper or ensemble_stepper(osc, Flow.STATE)
+    settler = Settler(osc, attractors, region, 1e-3 * region.size, budget, carrier)
+    basins = settle_grid(settler, cells)
+    return settler.sharing(basins, 2), basins
+
+
+def orbits(osc, *starts, period=1):
+    """Describe the stable orbits that some starts come to."""
+    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    ends = osc.section_map(starts, 300, stepper=stepper)
+    return tuple(describe_orbit(osc, refine_orbit(osc, end, period, stepper), stepper) for end in ends)
+
+
+def saddles_of(osc, attractors, bounds, rng=0, **options):
+    settler, basins = settled(osc, attractors, bounds, **options)
+    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    generator = np.random.default_rng(rng)
+    return find_saddles(osc, settler, basins, attractors, carrier=settler.stepper, exact=exact, rng=generator)
+
+
+def double_well(stiffening=1.0, **parts):
+    return vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(linear=-1.0, cubic=stiffening), **parts
+    )
+
+
+WELLS = ((-2, 2), (-2, 2))
+
+
+def hilltop(damping, slope):
+    """Rates at a hilltop where the force grows as slope · x: λ² + 2ζλ − slope = 0."""
+    return -damping + np.array([1, -1]) * np.sqrt(damping**2 + slope)
+
+
+def test_the_double_well_has_one_saddle_at_its_top():
+    osc = double_well()
+    (saddle,), words = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS)
+    rates = hilltop(0.05, 1.0)
+    np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
+    np.testing.assert_allclose(saddle.exponents, rates, rtol=1e-9)
+    np.testing.assert_allclose(saddle.multipliers, np.exp(2 * np.pi * rates), rtol=1e-9)
+    assert (saddle.kind, saddle.period, saddle.duration) == ("saddle", 1, 0.0)
+    assert saddle.leads_to == (0, 1)  # the well at −1, then that at 1
+    assert saddle.residual <= 1e-10
+    assert saddle.error <= 1e-8
+    assert words.startswith("1 unstable orbit found")
+
+
+def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
+    # Deviations grow by exp(2π · 4.5) = 2e12 in 2π/ω_n: what is 1e-10 apart is wells apart after it.
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.5, spring=vk.CubicSpring(linear=-25.0, cubic=25.0))
+    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), ((-2, 2), (-10, 10)), cells=(40, 40))
+    np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-10)
+    np.testing.assert_allclose(saddle.exponents, hilltop(0.5, 25.0), rtol=1e-9)
+    assert saddle.leads_to == (0, 1)
+
+
+def test_a_saddle_that_presses_on_a_stop():
+    # A softening spring, x − x³, whose hilltop at x = 1 a weak stop at 0.9 moves outwards; beyond it the mass escapes.
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.1,
+        spring=vk.CubicSpring(linear=1.0, cubic=-1.0),
+        barriers=(vk.Barrier(vk.Hertz(stiffness=1.0), position=0.9, side="right"),),
+    )
+    found, words = saddles_of(osc, orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
+    top = brentq(lambda x: x - x**3 + (x - 0.9) ** 1.5, 1.0, 1.3, xtol=1e-15)
+    slope = 3 * top**2 - 1 - 1.5 * np.sqrt(top - 0.9)
+    assert len(found) == 2, words
+    for saddle, x, grows, ends in zip(found, (-1.0, top), (2.0, slope), ((LEFT, 0), (0, LEFT)), strict=True):
+        np.testing.assert_allclose(saddle.points, [[x, 0]], atol=1e-10)
+        np.testing.assert_allclose(saddle.exponents, hilltop(0.1, grows), rtol=1e-8)
+        assert saddle.leads_to == ends
+
+
+def test_stops_whose_force_jumps():
+    # Its variational equations are not RK4's: the branches are entered from the exact saddle.
+    law = vk.CustomLaw("stiffness*depth + loss*rate", stiffness=20.0, loss=0.5)
+    stops = tuple(vk.Barrier(law, position=side * 1.2, side=name) for side, name in ((-1, "left"), (1, "right")))
+    osc = double_well(barriers=stops)
+    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS, cells=(40, 40))
+    np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
+    assert saddle.leads_to == (0, 1)
+
+
+class Slow(vk.NoiseModel):
+    """Coloured noise with a state of its own."""
+
+    extra_states: ClassVar = ("y",)
+
+    rate: float = vk.parameter("r", "s^-1", above=0)
+
+    def amplitude(self, x, v):
+        return self.rate
+
+    def force(self, y):
+        return y
+
+    def drift(self, x, v, y):
+        return (-self.rate * y,)
+
+
+def test_a_third_state_of_the_noise():
+    osc = double_well(noise=Slow(intensity=0.01, rate=0.3))
+    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
+    np.testing.assert_allclose(saddle.points, [[0, 0, 0]], atol=1e-12)
+    grows, falls = hilltop(0.05, 1.0)
+    np.testing.assert_allclose(saddle.exponents, [grows, -0.3, falls], rtol=1e-9)
+    assert (saddle.kind, saddle.leads_to) == ("saddle", (0, 1))
+
+
+def mapped_by_scipy(force, state, duration, stop=None):
+    """Carry a state by DOP853, restarted at each contact: x″ = force(t, x, v), and push beyond ±stop."""
+    end, t, z, side = duration, 0.0, np.asarray(state, dtype=float), 0
+
+    def rates(t, z, side):
+        push = -side * 50.0 * max(side * z[0] - stop, 0.0) ** 1.5 if side else 0.0
+        return [z[1], force(t, *z) + push]
+
+    def touch(side, direction):
+        def event(t, z, _):
+            return side * z[0] - stop
+
+        event.terminal, event.direction = True, direction
+        return event
+
+    if stop is not None:
+        side = next((s for s in (1, -1) if s * z[0] > stop), 0)
+    while t < end:
+        watched = [] if stop is None else [touch(side, -1.0)] if side else [touch(1, 1.0), touch(-1, 1.0)]
+        run = solve_ivp(rates, (t, end), z, "DOP853", args=(side,), rtol=1e-12, atol=1e-14, events=watched or None)
+        t, z = run.t[-1], run.y[:, -1]
+        if run.status == 1:
+            side = 0 if side else (1, -1)[next(n for n, times in enumerate(run.t_events) if len(times))]
+    return z
+
+
+def derivative_by_scipy(force, state, duration, stop=None, step=1e-6):
+    """Derivative of the map by central differences."""
+    columns = [
+        mapped_by_scipy(force, state + move, duration, stop) - mapped_by_scipy(force, state - move, duration, stop)
+        for move in step * np.eye(2)
+    ]
+    return np.stack(columns, axis=1) / (2 * step)
+
+
+def check_against_scipy(osc, saddle, force, stop=None):
+    duration = osc.section_interval
+    point = saddle.points[0]
+    np.testing.assert_allclose(mapped_by_scipy(force, point, duration, stop), point, atol=1e-9)
+    multipliers = np.linalg.eigvals(derivative_by_scipy(force, point, duration, stop))
+    np.testing.assert_allclose(sorted(saddle.multipliers.real), sorted(multipliers), rtol=1e-5)
+    # Liouville: both multipliers together are what friction leaves of an area.
+    left = np.exp(-2 * osc.damping_ratio * osc.natural_frequency * duration)
+    assert np.prod(saddle.multipliers).real == pytest.approx(left, rel=1e-8)
+    np.testing.assert_allclose(np.exp(saddle.exponents * duration), saddle.multipliers)
+    assert saddle.residual <= 1e-10
+    assert saddle.error <= 1e-8
+
+
+def test_the_duffing_oscillator_has_one_boundary_saddle():
+    osc = vk.load_scene("duffing")
+    found, words = saddles_of(osc, orbits(osc, (0, 0), (2, 1)), ((-3, 3), (-3, 3)))
+    assert len(found) == 1, words
+    assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
+    check_against_scipy(osc, found[0], lambda t, x, v: 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3)
+
+
+def paper_force(t, x, v):
+    return 0.18 * np.cos(0.57 * t) + 0.2 - 0.02 * v - x
+
+
+@pytest.fixture(scope="module")
+def stops():
+    """hertz-0.570, its two attractors, and the boundary between them."""
+    osc = vk.load_scene("hertz-0.570")
+    attractors = orbits(osc, (0.466551, 0.002566), (0.023582, -0.049071))
+    return osc, attractors, *settled(osc, attractors, ((-0.7, 0.8), (-1.0, 1.0)), cells=(120, 120))
+
+
+def test_the_paper_scene_has_one_boundary_saddle(stops):
+    osc, attractors, settler, basins = stops
+    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    points = []
+    for seed, carrier in ((0, settler.stepper), (1, vk.RK4(512)), (2, exact)):
+        few = {"trackers": 3, "sections": 40} if carrier is exact else {}
+        found, words = find_saddles(
+            osc, settler, basins, attractors, carrier=carrier, exact=exact, rng=np.random.default_rng(seed), **few
+        )
+        assert len(found) == 1, words
+        points.append(found[0].points[0])
+        assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
+    np.testing.assert_allclose(points, points[:1] * 3, rtol=0, atol=1e-10)  # whatever carried the boundary
+    check_against_scipy(osc, found[0], paper_force, stop=0.5)
+
+
+def test_edge_tracks_are_trajectories_on_the_boundary(stops):
+    osc, _, settler, basins = stops
+    tracks = edge_states(settler, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
+    again = edge_states(settler, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
+    assert len(tracks) >= 2
+    for track, same in zip(tracks, again, strict=True):
+        assert track.labels == (0, 1)
+        np.testing.assert_array_equal(track.points, same.points)
+        # From point to point they follow the map, to what two sides may be apart.
+        images = osc.section_map(track.points[:-1], stepper=settler.stepper)
+        assert np.linalg.norm(images - track.points[1:], axis=1).max() < 1e-7
+        # Once at the saddle, the two sides part as the derivative of that map says, here by differences.
+        around = track.points[-1] + 1e-6 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        ends = osc.section_map(around, stepper=settler.stepper)
+        derivative = np.stack([ends[0] - ends[1], ends[2] - ends[3]], axis=1) / 2e-6
+        unstable = np.abs(np.linalg.eigvals(derivative)).max()
+        np.testing.assert_allclose(track.stretches[-5:], np.log(unstable), rtol=1e-3)
+
+
+def test_an_unstable_limit_cycle_parts_rest_from_motion():
+    # x″ + v (2ζ − a x² + b x⁴) + x = 0 averages to 2ζ/2 − a A²/8 + b A⁴/16 = 0 on its cycles (first order in these).
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.005,
+        spring=vk.CustomSpring("x + v*(-a*x**2 + b*x**4)", a=0.08, b=0.04),
+    )  # fmt: skip
+    inner, outer = np.sort(np.sqrt(np.roots([0.04 / 16, -0.08 / 8, 0.005])))
+    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    cycle = find_cycle(osc, osc.section_map([[outer, 0.0]], 200)[0], exact, longest=20.0)
+    attractors = (*orbits(osc, (0.0, 0.0)), describe_cycle(osc, cycle, exact))
+    (saddle,), words = saddles_of(osc, attractors, ((-2.5, 2.5), (-2.5, 2.5)), cells=(40, 40))
+    assert (saddle.kind, saddle.period, saddle.leads_to) == ("repeller", 1, (0, 1)), words
+    assert np.abs(saddle.points[0, 0]) == pytest.approx(inner, rel=1e-3)  # averaging is right to second order
+    assert saddle.duration == pytest.approx(2 * np.pi, rel=1e-3)
+    # d/dA of the averaged drift −A (2ζ/2 − a A²/8 + b A⁴/16) is the rate at which neighbours leave.
+    assert saddle.exponents[0].real == pytest.approx(0.08 * inner**2 / 4 - 0.04 * inner**4 / 4, rel=1e-2)
+    assert saddle.multipliers[1] == pytest.approx(1.0, abs=1e-8)
+
+
+def test_cells_that_did_not_settle_are_passed_over():
+    region = Region((0, 5), (0, 1))
+    far = meeting_cells(Basins(region, np.array([[0], [-1], [-1], [1], [-1]], dtype=np.int16)))
+    assert {pair: cells.tolist() for pair, cells in far.items()} == {(0, 1): [[0, 3]]}
+    near = meeting_cells(Basins(region, np.array([[1], [0], [-1], [1], [-2]], dtype=np.int16)))
+    assert {pair: cells.tolist() for pair, cells in near.items()} == {(-2, 1): [[4, 3]], (0, 1): [[1, 0]]}
+    assert meeting_cells(Basins(region, np.zeros((5, 1), dtype=np.int16))) == {}
+
+
+def test_starts_are_spread():
+    lines = np.repeat(np.linspace(0, 1, 101), 4).reshape(-1, 2, 2)
+    picked = np.sort(spread(lines, 3, np.random.default_rng(0))[:, 0, 0])
+    assert np.diff(picked).min() >= 0.25  # of three points in [0, 1] at best 0.5; picked one by one, half of that
+    assert len(spread(lines[:2], 16, np.random.default_rng(0))) == 2
+
+
+def test_one_basin_has_no_boundary():
+    osc = double_well()
+    found, words = saddles_of(osc, orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
+    assert found == ()
+    assert "no boundary" in words

@@ -1,0 +1,54 @@
+"""Saddle: an unstable orbit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Saddle:
+    """An unstable orbit; on the boundary of two basins, where its branches lead to different attractors.
+
+    Attributes
+    ----------
+    kind : str
+        ``"saddle"``, ``"flip saddle"`` (its unstable multiplier is negative), ``"repeller"`` (no stable direction), or
+        ``"chaotic"`` for a set on the boundary that has no orbit of its own to name.
+    period : int
+        In forcing periods; 0 for a chaotic set, 1 for an equilibrium or a limit cycle.
+    duration : float
+        Time after which it repeats (s); 0 for an equilibrium, NaN for a chaotic set.
+    points : array (count, n)
+        Its points on the section, in the order in which they are visited; a sample of a chaotic set.
+    multipliers : complex array (n,)
+        Eigenvalues of the map over one period of the orbit, the largest first; of the flow over 2π/ω_n for an
+        equilibrium; empty for a chaotic set.
+    exponents : complex array
+        Rates (s⁻¹): eigenvalues at an equilibrium, log(multipliers)/duration for an orbit, the largest Lyapunov
+        exponent for a chaotic set.
+    leads_to : tuple of int
+        Labels of what the two branches of the unstable direction come to; for a chaotic set, of the two basins between
+        which it was found. Negative as in `Basins.labels` where a branch settles on nothing.
+    residual : float
+        Distance between the first point and its image after one period of the orbit; NaN for a chaotic set.
+    error : float
+        How far the first point moves when the integration is tightened; NaN for a chaotic set.
+    """
+
+    kind: str
+    period: int
+    duration: float
+    points: NDArray[np.float64]
+    multipliers: NDArray[np.complex128]
+    exponents: NDArray[np.complex128]
+    leads_to: tuple[int, ...]
+    residual: float
+    error: float
+
+    @property
+    def on_boundary(self) -> bool:
+        """Whether its branches lead to different attractors."""
+        return len(set(self.leads_to)) > 1

@@ -1,0 +1,289 @@
+"""Bifurcations: what changes between two neighbouring members of a family, and where."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from vibrokit.errors import VibrokitError
+from vibrokit.kernels.single import record
+from vibrokit.parts.barrier import Barrier
+from vibrokit.structure.families import Family, Member
+from vibrokit.symbolic.flow_kind import Flow
+
+FOLD, CROSSING = "fold", "pitchfork or transcritical"
+DOUBLING, TORUS, HOPF, GRAZING = "period doubling", "Neimark–Sacker", "Hopf", "grazing"
+
+_SAMPLES = 256  # in a forcing period or 2π/ω_n, whichever is shorter
+_FINER = 64  # samples that the stretch round a turn next to a stop is looked at with again
+_NEXT_TO = 1e-2  # depth, relative to the size of x, within which a turn counts as next to a stop
+_TOUCHES = 1e-6  # the same, within which an orbit at a supposed grazing must touch
+_BACK = 1e-3  # in units of the span: how far back an extrapolation begins
+_JUST_AHEAD = 1e-3  # the same: how far ahead it may end
+_CLOSER = 0.9  # share of what is left to grazing that is taken in one go
+_APPROACHES = 8
+_SLOPE = 1e-4  # share of a step over which a test's slope is taken, for the error
+_SHARP = 1e-13  # share of a step that roots are found to
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stage:
+    """A member of a family on the way along it.
+
+    Attributes
+    ----------
+    member : Member
+    slope : array (n,)
+        Derivative of its defect in the parameter.
+    tangent : array (n + 1,)
+        Of the family, in the direction of travel.
+    tests : dict of str to float
+        Functions that change their sign at the bifurcation they are named after.
+    depths : tuple of array
+        For each stop: how deep the orbit is at its turns towards it, the deepest first; negative short of it.
+    stable : bool
+    """
+
+    member: Member
+    slope: Array
+    tangent: Array
+    tests: dict[str, float]
+    depths: tuple[Array, ...]
+    stable: bool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Located:
+    """A bifurcation of a family.
+
+    Attributes
+    ----------
+    kind : str
+    value : float
+        Of the parameter.
+    error : float
+        How far it moves when the integration is tightened; where it is only known to lie between two members, half
+        their distance; where it can be approached from one side only, how far the nearest member is.
+    period : int
+        Of the orbit, in forcing periods; for a period doubling, of the orbit that doubles.
+    point : array (n,)
+        Of the orbit, on the section.
+    side : str
+        For grazing, of the stop.
+    bracketed : bool
+        Whether it is only known to lie between two members.
+    """
+
+    kind: str
+    value: float
+    error: float
+    period: int
+    point: Array
+    side: str = ""
+    bracketed: bool = False
+
+
+def stage(family: Family, member: Member, ahead: Array) -> Stage:
+    """Look at a member; `ahead` is the direction of travel."""
+    slope = family.slope(member)
+    rates = _rates(family, member)
+    stable = bool((rates.real < 0).all() if family.kind == "equilibrium" else (np.abs(rates) < 1).all())
+    depths = tuple(turning_depths(family, member, barrier) for barrier in family.at(member.value).barriers)
+    return Stage(
+        member, slope, family.tangent(member, slope, ahead), _tests(family, member, rates), depths, stable
+    )  # fmt: skip
+
+
+def bifurcations_between(family: Family, before: Stage, after: Stage) -> list[Located]:
+    """Locate what happens to a family of attractors between two members; nothing is said of unstable motion."""
+    if not (before.stable or after.stable):
+        return []
+    found = []
+    for name, value in before.tests.items():
+        if value * after.tests[name] < 0:
+            found.append(_located(name, family, before, after, _test(name)))
+    barriers = family.at(before.member.value).barriers
+    for stop, (left, right) in enumerate(zip(before.depths, after.depths, strict=True)):
+        counts = sorted((int(np.sum(left > 0)), int(np.sum(right > 0))))
+        side = barriers[stop].side
+        found += [_located(GRAZING, family, before, after, _depth(stop, turn), side) for turn in range(*counts)]
+    return [bifurcation for bifurcation in found if bifurcation is not None]
+
+
+def grazing_ahead(family: Family, here: Stage) -> list[Located]:
+    """Locate grazing just beyond the last stage that a family could be followed to.
+
+    Beyond grazing with a stiff stop an orbit may be gone, or turn back too soon to be followed; short of it, all is
+    smooth. So the depth is extrapolated to 0, and ever closer from short of it.
+    """
+    found = []
+    if not here.stable:
+        return []
+    for stop, barrier in enumerate(family.at(here.member.value).barriers):
+        turn = int(np.sum(here.depths[stop] > 0))
+        if turn < len(here.depths[stop]) and here.depths[stop][turn] > -_NEXT_TO * family.sizes[0]:
+            found.append(_extrapolated(family, here, _depth(stop, turn), barrier.side))
+    return [grazing for grazing in found if grazing is not None]
+
+
+def _extrapolated(
+    family: Family, here: Stage, depth: Callable[[Family, Member], float], side: str
+) -> Located | None:  # fmt: skip
+    """Approach the root of a depth along the tangent from short of it; None if it does not lie just ahead."""
+
+    def member(way: float) -> Member:
+        return family.corrected(here.member.place + way * here.tangent, here.slope, here.tangent)
+
+    way, now, left = 0.0, here.member, math.inf
+    try:
+        before, last, deep = -_BACK, depth(family, member(-_BACK)), depth(family, now)
+        for _ in range(_APPROACHES):
+            left = -deep * (way - before) / (deep - last) if deep > last else math.inf
+            if not 0 <= left <= _JUST_AHEAD:
+                return None
+            nearer = member(way + _CLOSER * left)
+            new = depth(family, nearer)
+            if not deep < new <= 0:
+                break
+            before, last, way, deep, now = way, deep, way + _CLOSER * left, new, nearer
+    except VibrokitError:
+        pass  # as near as it goes
+    if not math.isfinite(left):
+        return None
+    ahead = float(left * here.tangent[-1]) * family.span
+    error = abs(ahead) + 4 * float(np.spacing(abs(now.value)))
+    return Located(GRAZING, now.value + ahead, error, family.period, now.point, side)
+
+
+def _rates(family: Family, member: Member) -> NDArray[np.complex128]:
+    """Exponents at an equilibrium; multipliers of an orbit, without that of a shift along a limit cycle."""
+    multipliers = np.linalg.eigvals(member.monodromy).astype(complex)
+    if family.kind == "equilibrium":
+        return np.log(multipliers) / member.duration
+    if family.kind == "limit cycle":
+        return np.delete(multipliers, np.argmin(np.abs(multipliers - 1)))
+    return multipliers
+
+
+def _tests(family: Family, member: Member, rates: NDArray[np.complex128]) -> dict[str, float]:
+    pairs = list(itertools.combinations(rates, 2))
+    tests = {FOLD: float(np.linalg.det(member.jacobian / family.sizes))}
+    if family.kind == "equilibrium":
+        return tests | {HOPF: float(np.prod([first + second for first, second in pairs]).real)}
+    tests[DOUBLING] = float(np.prod(rates + 1).real)
+    if pairs:
+        tests[TORUS] = float(np.prod([first * second - 1 for first, second in pairs]).real)
+    return tests
+
+
+def _test(name: str) -> Callable[[Family, Member], float]:
+    return lambda family, member: _tests(family, member, _rates(family, member))[name]
+
+
+def _depth(stop: int, turn: int) -> Callable[[Family, Member], float]:
+    def depth(family: Family, member: Member) -> float:
+        depths = turning_depths(family, member, family.at(member.value).barriers[stop])
+        return float(depths[turn]) if turn < len(depths) else -float(family.sizes[0])
+
+    return depth
+
+
+def turning_depths(family: Family, member: Member, barrier: Barrier) -> Array:
+    """Return how deep a motion is in a stop at each of its turns towards it, the deepest first."""
+    if family.kind == "equilibrium":
+        return np.array([barrier.sign * (member.point[0] - barrier.position)])
+    osc = family.at(member.value)
+    unit = min(osc.section_interval, 2 * math.pi / osc.natural_frequency)
+    count = _SAMPLES * math.ceil(member.duration / unit - 1e-9)
+    spacing = member.duration / count
+    # A sample more, for a turn at the section itself.
+    path = record(osc, Flow.STATE, family.stepper, member.point, 0.0, spacing, count + 1)
+    depths: list[float] = []
+    for index, depth in _turns(path, spacing, barrier):
+        if index == count and depths and _turns(path[:2], spacing, barrier):
+            continue
+        if abs(depth) < _NEXT_TO * family.sizes[0]:
+            finer = spacing / _FINER
+            closer = record(osc, Flow.STATE, family.stepper, path[index], index * spacing, finer, _FINER)
+            depth = max((found for _, found in _turns(closer, finer, barrier)), default=depth)
+        depths.append(depth)
+    return np.sort(depths)[::-1]
+
+
+def _turns(path: Array, spacing: float, barrier: Barrier) -> list[tuple[int, float]]:
+    """Where a path turns back from a stop: the sample before, and the depth by the cubic through both samples."""
+    depth, rate = barrier.sign * (path[:, 0] - barrier.position), barrier.sign * path[:, 1]
+    found = []
+    for index in np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0)):
+        rise, before, after = depth[index + 1] - depth[index], spacing * rate[index], spacing * rate[index + 1]
+        # Depth along the step is the cubic d + before·s + bend·s² + twist·s³; it is stationary at the root in (0, 1].
+        bend, twist = 3 * rise - 2 * before - after, before + after - 2 * rise
+        root = before / (math.sqrt(max(bend * bend - 3 * twist * before, 0.0)) - bend)
+        root = min(max(root, 0.0), 1.0) if math.isfinite(root) else 0.5
+        found.append((int(index), float(depth[index] + root * (before + root * (bend + root * twist)))))
+    return found
+
+
+def _between(family: Family, before: Stage, after: Stage, share: float) -> Member:
+    """The member that a share of the way leads to, on the plane across it."""
+    way = after.member.place - before.member.place
+    slope = before.slope + share * (after.slope - before.slope)
+    return family.corrected(before.member.place + share * way, slope, way / np.linalg.norm(way))
+
+
+def _located(
+    kind: str,
+    family: Family,
+    before: Stage,
+    after: Stage,
+    test: Callable[[Family, Member], float],
+    side: str = "",
+) -> Located | None:
+    """Locate the root of a test between two members; None if it is no bifurcation of that kind."""
+
+    def tested(share: float, family: Family = family) -> float:
+        return test(family, _between(family, before, after, share))
+
+    if kind == FOLD and before.tangent[-1] * after.tangent[-1] > 0:
+        kind = CROSSING
+    try:
+        share = brentq(tested, 0.0, 1.0, xtol=_SHARP, rtol=8 * np.finfo(float).eps)
+        member = _between(family, before, after, share)
+        if _spurious(kind, family, member, test):
+            return None
+        error = _error(family, before, after, share, tested)
+    except (VibrokitError, ValueError, FloatingPointError):  # between the two, Newton's method went elsewhere
+        return _bracketed(kind, family, before, after, side)
+    return Located(kind, member.value, error, family.period, member.point, side)
+
+
+def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family, Member], float]) -> bool:
+    """Whether a test vanishes for another reason: two real rates of opposite sign, or a turn that came or went."""
+    if kind in (TORUS, HOPF):
+        return not (np.abs(_rates(family, member).imag) > 1e-9).any()
+    return kind == GRAZING and not abs(test(family, member)) < _TOUCHES * family.sizes[0]
+
+
+def _error(family: Family, before: Stage, after: Stage, share: float, tested: Callable[..., float]) -> float:
+    """How far a root moves when the integration is tightened, in the parameter."""
+    finer = dataclasses.replace(family, stepper=family.stepper.refined())
+    low, high = max(share - _SLOPE, 0.0), min(share + _SLOPE, 1.0)
+    steepness = (tested(high) - tested(low)) / (high - low)
+    moved = -tested(share, finer) / steepness
+    tight = _between(finer, before, after, min(max(share + moved, 0.0), 1.0))
+    value = _between(family, before, after, share).value
+    return abs(tight.value - value) + 4 * float(np.spacing(abs(value))) + _SHARP * family.span
+
+
+def _bracketed(kind: str, family: Family, before: Stage, after: Stage, side: str = "") -> Located:
+    first, last = before.member.value, after.member.value
+    error = 0.5 * abs(last - first) + float(np.spacing(abs(first)))
+    return Located(kind, 0.5 * (first + last), error, family.period, before.member.point, side, bracketed=True)

@@ -1,0 +1,54 @@
+"""Recurrences: when a motion on a boundary has come to stay at an orbit or a cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+_RECURRENCE = 1e-6  # of the region's size: a motion has come to where it was
+_CLOSE = 1e-3  # of the region's size: a motion that keeps so close to where it was
+_STAY = 48  # sections, is coming to an orbit
+
+Array = NDArray[np.float64]
+
+
+def same_place(points: Array, places: Array, distance: float) -> bool:
+    """Whether each point (count, n) is within a distance of one of some places."""
+    return bool(np.linalg.norm(points[:, None] - places, axis=2).min(axis=1).max() < distance)
+
+
+def recurrence(points: Array, size: float, longest: int) -> int:
+    """After how many sections the last point was come to again, for good; 0 if it was not.
+
+    On a chaotic set a motion passes by periodic orbits at any distance, the smaller the rarer.
+    """
+    for period in range(1, min(longest, len(points) - 1) + 1):
+        apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        staying = len(apart) >= _STAY and apart[-_STAY:].max() < _CLOSE * size
+        if apart[-period:].max() < _RECURRENCE * size or staying:
+            return period
+    return 0
+
+
+def almost_repeats(points: Array, last: int, longest: int, near: float) -> bool:
+    """Whether the last points of a motion are close to what they were some sections before."""
+    return any(
+        np.linalg.norm(points[-last:] - points[-last - period : -period], axis=1).max() < near
+        for period in range(1, min(longest, len(points) - last) + 1)
+    )
+
+
+def closing(points: Array, size: float, interval: float) -> tuple[Array, float] | None:
+    """Guess a turning point of greatest x and the duration of a cycle from the end of a motion, if it closes there."""
+    motion = CubicHermiteSpline(interval * np.arange(len(points)), points[:, 0], points[:, 1])
+    turns = motion.derivative().roots(extrapolate=False)
+    turns = turns[motion.derivative(2)(turns) < 0]
+    heights = motion(turns)
+    for back in range(1, len(turns)):
+        highest = len(turns) - back + int(np.argmax(heights[-back:]))
+        if highest >= back and abs(heights[highest] - heights[highest - back]) < _CLOSE * size:
+            state = points[int(turns[highest] / interval)].copy()
+            state[0], state[1] = heights[highest], 0.0
+            return state, float(turns[highest] - turns[highest - back])
+    return None
