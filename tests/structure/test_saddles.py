@@ -278,3 +278,26 @@ def test_one_basin_has_no_boundary():
     found, words = saddles_of(osc, orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
     assert found == ()
     assert "no boundary" in words
+
+
+@pytest.mark.parametrize(("amplitude", "wound"), [(0.05, False), (0.1, True)])
+def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
+    # x″ + δ x′ − x + x³ = γ cos ωt: the hilltop's manifolds cross, and the boundary is fractal, for
+    # γ > 4 δ cosh(πω/2) / (3 √2 π ω) (Moon and Holmes, 1979); to first order in δ and γ.
+    delta, omega = 0.1, 0.8
+    critical = 4 * delta * np.cosh(np.pi * omega / 2) / (3 * np.sqrt(2) * np.pi * omega)
+    assert (amplitude > 1.3 * critical) if wound else (amplitude < critical / 1.3)
+    osc = double_well(excitations=(vk.Harmonic(amplitude=amplitude, frequency=omega),))
+    found, words = saddles_of(osc, orbits(osc, (-0.95, 0), (1.05, 0)), ((-1.8, 1.8), (-1.5, 1.5)))
+    assert any(saddle.kind == "chaotic" for saddle in found) == ("chaotic" in words) == wound
+    named = [saddle for saddle in found if saddle.kind != "chaotic"]
+    assert all(set(saddle.leads_to) == {0, 1} and saddle.residual <= 1e-10 for saddle in named)
+    if wound:
+        set_ = found[-1]
+        assert (set_.period, set_.leads_to) == (0, (0, 1))
+        assert len(set_.points) > 50
+        assert set_.exponents[0].real > 0.1  # it parts by e in less than one and a half periods
+        # The scene is its own mirror image half a period later: so are its saddles.
+        np.testing.assert_allclose(named[0].multipliers, named[1].multipliers, rtol=1e-8)
+    else:
+        assert len(found) == 1

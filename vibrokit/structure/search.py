@@ -13,20 +13,23 @@ from vibrokit.kernels.ensemble import Progress, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.results.survival import Survival
 from vibrokit.structure.bands import separate
 from vibrokit.structure.cycles import find_cycle
 from vibrokit.structure.describe import describe_cycle, describe_orbit, describe_wandering
 from vibrokit.structure.lyapunov import kind_of, lyapunov_exponent
 from vibrokit.structure.orbits import EQUAL, least_period, refine_orbit, same_point, visited
-from vibrokit.structure.survival import watch
+from vibrokit.structure.survival import follow, watch
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
 _LONGER_PERIOD = 64  # looked for among those that are long in settling
 _RECURRENCE = 1e-5
 _NEAR = 1e-3  # what a coarse stepper may make of an orbit
-_ROUNDS = 2
+_LOOSE = 1e-2  # recurrences that are worth a try with Newton's method
+_GUESSES = 8
+_FIRST_WAIT = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for long
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent; it depends on the steps, so that they are carried exactly
@@ -81,13 +84,13 @@ class Search:
         ----------
         states : array (count, n)
         wait : int
-            Periods that a transient is given before recurrences are looked for; twice, for some are slow.
+            Periods that a transient is given; twice, for some are slow.
         patient : bool
             Whether that is as long as the damping asks for. If not, and nothing has settled, it was too short, and
             what goes on says nothing.
         """
-        for _ in range(_ROUNDS):
-            states = self._after(states, wait)
+        for periods in _schedule(wait):
+            states = self._after(states, periods)
             states = self._add_orbits(states, LONGEST_PERIOD)
             if not len(states):
                 return
@@ -97,13 +100,15 @@ class Search:
         elif patient or self.attractors:
             self._watch(states)
 
-    def _after(self, states: Array, wait: int) -> Array:
-        means = self.means
-        ended = run_ensemble(
-            self.osc, Flow.STATE, means.carrier, states, wait, executor=means.executor, progress=means.progress
-        )
-        self.lost += int(np.sum(ended.intervals < wait))
-        return ended.states[ended.intervals == wait]
+    def _after(self, states: Array, periods: int) -> Array:
+        """Where the states are some periods later, without those that came to a known orbit and those that are lost."""
+        means, known = self.means, [attractor.points for attractor in self.attractors]
+        ended, labels = follow(
+            self.osc, states, known, tolerance=self.tolerance, periods=periods, stepper=means.carrier,
+            executor=means.executor, progress=means.progress,
+        )  # fmt: skip
+        self.lost += int(np.sum(labels == LEFT))
+        return ended.states[labels == UNSETTLED]
 
     def _known(self, point: Array, tolerance: float) -> bool:
         return any(same_point(point, known.points, tolerance) for known in self.attractors if known.repeats)
@@ -115,12 +120,25 @@ class Search:
             history.append(run_ensemble(self.osc, Flow.STATE, self.means.carrier, history[-1], 1).states)
         path = np.array(history)
         scale = 1.0 + np.abs(path).max(axis=(0, 2))
-        close = np.linalg.norm(path[1:] - path[0], axis=2) / scale < _RECURRENCE
+        distance = np.linalg.norm(path[1:] - path[0], axis=2) / scale
+        close = distance < _RECURRENCE
         settled = close.any(axis=0)
         for index in np.flatnonzero(settled):
             period = int(np.argmax(close[:, index])) + 1
             settled[index] = self._known(path[0, index], _NEAR) or self._add_orbit(path[0, index], period)
+        self._guess(path[:, ~settled], distance[:, ~settled])
         return path[0, ~settled]
+
+    def _guess(self, path: Array, distance: Array) -> None:
+        """Try Newton's method where the motion nearly recurs: an orbit known early spares the wait for it."""
+        tried = 0
+        for index in np.argsort(distance.min(axis=0)):
+            nearest = float(distance[:, index].min())
+            if tried == _GUESSES or nearest > _LOOSE:
+                return
+            if not self._known(path[0, index], _LOOSE):
+                self._add_orbit(path[0, index], int(np.argmin(distance[:, index])) + 1)
+                tried += 1
 
     def _add_orbit(self, point: Array, period: int) -> bool:
         """Add the orbit through a point that recurs, if it is new; return whether the point has settled on it."""
@@ -191,6 +209,15 @@ class Search:
                 continue
             sample = np.concatenate([clouds[index] for index in group])[:_SAMPLE]
             self.attractors.append(describe_wandering(osc, kind, sample, estimate, self.survival, finer))
+
+
+def _schedule(wait: int) -> list[int]:
+    """Rounds of ever more periods, twice the wait together."""
+    rounds, left, periods = [], 2 * wait, _FIRST_WAIT
+    while left > 0:
+        rounds.append(min(periods, left))
+        left, periods = left - rounds[-1], 2 * periods
+    return rounds
 
 
 def _clouds(osc: Oscillator, states: Array, stepper: Stepper) -> list[Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from vibrokit.kernels.ensemble import Progress, Stop, run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, Progress, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import RAN_OUT, REACHED
 from vibrokit.oscillator import Oscillator
@@ -25,6 +25,37 @@ _LONG = 10  # times the time watched: no decay to speak of
 _MISFIT = 1.1  # Lilliefors' 5% limit of √n times the distance between an exponential and its fit
 
 Array = NDArray[np.float64]
+
+
+def follow(
+    osc: Oscillator,
+    states: Array,
+    orbits: list[Array],
+    *,
+    tolerance: float,
+    periods: int,
+    stepper: Stepper,
+    executor: concurrent.futures.Executor | None = None,
+    progress: Progress | None = None,
+) -> tuple[Ensemble, NDArray[np.int64]]:
+    """Follow starts until they come to a known orbit, or for some periods.
+
+    Parameters are those of `watch`.
+
+    Returns
+    -------
+    ended : Ensemble
+    labels : int64 array (count,)
+        Index of the orbit that each start came to; UNSETTLED for those that go on, LEFT for numbers out of range.
+    """
+    known = [np.asarray(points, dtype=float)[:, :2] for points in orbits]
+    stop = Stop(
+        points=np.concatenate([np.empty((0, 2)), *known]),
+        point_labels=np.repeat(np.arange(len(known)), [len(points) for points in known]),
+        tolerance=tolerance,
+    )
+    ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor, progress=progress)
+    return ended, np.where(ended.status == REACHED, ended.label, np.where(ended.status == RAN_OUT, UNSETTLED, LEFT))
 
 
 def watch(
@@ -59,21 +90,16 @@ def watch(
     Returns
     -------
     survival : Survival
-        Its lifetime is that of `fit_decay`. A start whose numbers ran out of range counts as
-        settled then: it lives no longer.
+        Its lifetime is that of `fit_decay`. A start whose numbers ran out of range counts as settled then: it lives no
+        longer.
     survivors : array (survivors, n)
         Last states of those that came to no orbit.
     labels : int64 array (count,)
         Index of the orbit that each start came to; UNSETTLED for the survivors, LEFT for numbers out of range.
     """
-    known = [np.asarray(points, dtype=float)[:, :2] for points in orbits]
-    stop = Stop(
-        points=np.concatenate([np.empty((0, 2)), *known]),
-        point_labels=np.repeat(np.arange(len(known)), [len(points) for points in known]),
-        tolerance=tolerance,
+    ended, labels = follow(
+        osc, states, orbits, tolerance=tolerance, periods=periods, stepper=stepper, executor=executor, progress=progress
     )
-    ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor, progress=progress)
-    labels = np.where(ended.status == REACHED, ended.label, np.where(ended.status == RAN_OUT, UNSETTLED, LEFT))
     alive = labels == UNSETTLED
     settled_after = np.where(alive, -1, ended.intervals)
     decay = fit_decay(settled_after, periods)
