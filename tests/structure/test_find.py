@@ -3,6 +3,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
+from vibrokit.results.basins import LEFT, NOT_FOLLOWED
 from vibrokit.results.region import Region
 from vibrokit.structure.orbits import refine_orbit
 
@@ -122,3 +123,93 @@ def test_a_scene_whose_noise_depends_on_the_state():
         noise=vk.StateDependentNoise(0.01, "1 + c*x**2", c=0.5),
     )
     assert len(vk.find_structure(osc, cells=(20, 20), starts=(8, 8)).attractors) == 2
+
+
+def van_der_pol():
+    """x″ + (x² − 1)x′ + x = 0."""
+    return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=vk.CustomSpring("x + (x**2 - 1)*v"))
+
+
+def test_a_limit_cycle():
+    structure = vk.find_structure(van_der_pol(), cells=(40, 40), starts=(8, 8))
+    (cycle,) = structure.attractors
+    assert cycle.kind == "limit cycle"
+    assert cycle.duration == pytest.approx(6.6632868593231302, abs=1e-9)  # known to thirty digits
+    assert cycle.points[0, 0] == pytest.approx(2.0086198608748431, abs=1e-9)
+    assert cycle.basin_fraction == 1.0
+    assert np.sort(np.abs(cycle.multipliers))[-1] == pytest.approx(1.0, abs=1e-8)
+
+
+def test_equilibria_have_eigenvalues():
+    structure = vk.find_structure(vk.load_scene("double-well"), cells=(40, 40), region=((-2, 2), (-2, 2)))
+    zeta = 0.05
+    for well in structure.attractors:
+        exact = -zeta + 1j * np.sqrt(2 - zeta**2) * np.array([-1, 1])
+        np.testing.assert_allclose(np.sort_complex(well.exponents), np.sort_complex(exact), atol=1e-9)
+    (hilltop,) = structure.saddles
+    np.testing.assert_allclose(hilltop.points, 0.0, atol=1e-9)
+    exact = -zeta + np.sqrt(1 + zeta**2) * np.array([1, -1])
+    np.testing.assert_allclose(hilltop.exponents, exact, atol=1e-9)
+    np.testing.assert_allclose(hilltop.multipliers, np.exp(2 * np.pi * exact), rtol=1e-8)
+    assert set(hilltop.leads_to) == {0, 1}
+
+
+def test_what_escapes_is_said_to_have_left():
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
+    structure = vk.find_structure(osc, region=((-1.5, 1.5), (-1.5, 1.5)), cells=(30, 30), starts=(8, 8))
+    assert structure.basins.fraction(LEFT) > 0.1
+    assert structure.basins.fraction(0) + structure.basins.fraction(LEFT) == pytest.approx(1.0)
+    assert "left the region" in structure.status
+    assert sorted(round(saddle.points[0, 0], 9) for saddle in structure.saddles) == [-1.0, 1.0]
+
+
+@pytest.mark.parametrize("stage", ["settle_grid", "find_saddles", "grow_manifolds"])
+def test_ctrl_c_leaves_what_was_found(monkeypatch, stage):
+    def stop(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"vibrokit.structure.find.{stage}", stop)
+    structure = vk.find_structure(vk.load_scene("double-well"), cells=(20, 20), starts=(8, 8))
+    assert not structure.complete
+    assert structure.status.startswith("The work was stopped")
+    assert len(structure.attractors) == 2
+    assert (structure.basins.labels == NOT_FOLLOWED).all() == (stage == "settle_grid")
+    assert len(structure.saddles) == (1 if stage == "grow_manifolds" else 0)
+
+
+def test_ctrl_c_before_anything_is_found_ends_the_work(monkeypatch):
+    def stop(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vibrokit.structure.search.run_ensemble", stop)
+    with pytest.raises(KeyboardInterrupt):
+        vk.find_structure(vk.load_scene("double-well"), cells=(20, 20), starts=(8, 8))
+
+
+def test_forces_of_the_stops_along_an_orbit(paper):
+    osc, structure = paper
+    hammering = structure.attractors[1]
+    depth, force = hammering.peak_depth["right"], hammering.peak_force["right"]
+    assert force == pytest.approx(50.0 * depth**1.5, rel=1e-9)  # Hertz
+    path = osc.trajectory(hammering.points[0], 1, samples=2**15)
+    assert depth == pytest.approx(path.x.max() - 0.5, abs=1e-8)
+    assert hammering.peak_depth["left"] == hammering.peak_force["left"] == 0.0
+    np.testing.assert_allclose(hammering.extent[0], [path.x.min(), path.x.max()], atol=1e-5)
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e8, 1e12])
+def test_the_shortest_contacts_are_counted(stiffness):
+    """A mass that bounces on one stop under a constant push: once per period of the forcing, whatever the stiffness."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.1,
+        barriers=(vk.Barrier(vk.Linear(stiffness=stiffness), position=0.0, side="right"),),
+        excitations=(vk.Harmonic(amplitude=1.0, frequency=2.0),),
+    )
+    structure = vk.find_structure(osc, cells=(4, 4), starts=(4, 4), saddles=False)
+    assert [attractor.hits for attractor in structure.attractors] == [{"right": 1}]
+    # An elastic impact of short duration: half a turn of the stiff spring, 2√k times the speed in momentum.
+    attractor = structure.attractors[0]
+    fastest = attractor.peak_depth["right"] * np.sqrt(stiffness)
+    assert attractor.peak_force["right"] == pytest.approx(stiffness * attractor.peak_depth["right"], rel=1e-9)
+    assert 0.1 < fastest < 10.0

@@ -151,7 +151,7 @@ class _Finder:
         self.search = Search(osc, means, _SEARCH_SETTLING * self.looked_in.size)
         self.attractors: tuple[Attractor, ...] = ()
         self.basins: Basins | None = None
-        self.saddles: tuple[Saddle, ...] = ()
+        self.saddles: list[Saddle] = []
         self.manifolds: tuple[Manifold, ...] = ()
         self.words: list[str] = []
         self.stopped = False
@@ -213,12 +213,12 @@ class _Finder:
     def find_saddles(self, generator: np.random.Generator) -> None:
         """Follow the boundaries between basins to the saddles on them."""
         assert self.basins is not None
-        if len(self.attractors) < 2:
-            return
         settler = self.settler().sharing(self.basins, self.request.margin or 2)
-        self.saddles, words = find_saddles(
-            self.osc, settler, self.basins, self.attractors, carrier=self.carrier, exact=self.exact, rng=generator
-        )
+        ordered, words = find_saddles(
+            self.osc, settler, self.basins, self.attractors,
+            carrier=self.carrier, exact=self.exact, rng=generator, found=self.saddles,
+        )  # fmt: skip
+        self.saddles = list(ordered)
         self.words.append(words)
 
     def grow_manifolds(self) -> None:
@@ -242,7 +242,7 @@ class _Finder:
             basins = Basins(self.frame, np.full(self.request.cells, NOT_FOLLOWED, dtype=np.int16))
         return Structure(
             attractors=self.attractors,
-            saddles=self.saddles,
+            saddles=tuple(self.saddles),
             manifolds=self.manifolds,
             basins=basins,
             survival=self.search.survival,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ _FIRST_WAIT = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for long
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent; it depends on the steps, so that they are carried exactly
+_LEAST_MEASURED = 1000  # periods
 _SAMPLE = 4096  # points of a set that never repeats
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
@@ -199,7 +201,9 @@ class Search:
         clouds = _clouds(osc, survivors, finer)
         for group in separate(clouds, self.tolerance):
             few = survivors[group[:_MEASURED]]
-            estimate = lyapunov_exponent(osc, few, self.means.exact, executor=self.means.executor)
+            estimate = lyapunov_exponent(
+                osc, few, self.means.exact, periods=_measuring_time(osc), executor=self.means.executor
+            )
             kind = kind_of(estimate)
             if kind is None:
                 self.words.append(
@@ -218,6 +222,12 @@ def _schedule(wait: int) -> list[int]:
         rounds.append(min(periods, left))
         left, periods = left - rounds[-1], 2 * periods
     return rounds
+
+
+def _measuring_time(osc: Oscillator) -> int:
+    """Periods in which motion that settles, however slowly, would be seen to: ten e-foldings of the damping."""
+    folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
+    return _LEAST_MEASURED if folds == 0 else min(_WATCH, max(_LEAST_MEASURED, math.ceil(10 / folds)))
 
 
 def _clouds(osc: Oscillator, states: Array, stepper: Stepper) -> list[Array]:
