@@ -1,4 +1,5 @@
 import json
+import math
 import subprocess
 import sys
 import time
@@ -30,6 +31,30 @@ def test_json_is_one_object_of_the_promised_shape(tmp_path, monkeypatch, capsys)
     assert list(record["attractors"][0]) == ["label", "kind", "period", "impacts", "points", "basin_fraction"]
     assert list(record["energies"][0]) == ["source", "target", "method", "value", "lower", "upper", "residual"]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_structure_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "double-well", "--cells", "40", "-o", "s.nc", "--analyzer"]) == 0
+    out = capsys.readouterr().out
+    assert "between" in out
+    assert "saddle" in out
+    assert "ΔU" not in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["double-well-structure.png", "s.nc"]
+    assert main(["plot", "s.nc"]) == 0
+    assert (tmp_path / "s.png").stat().st_size > 5000
+
+
+def test_saddles_are_in_the_json(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "double-well", "--cells", "40", "--json", "--analyzer"]) == 0
+    (saddle,) = json.loads(capsys.readouterr().out)["saddles"]
+    assert list(saddle) == ["period", "points", "multipliers"]
+    assert saddle["points"][0] == pytest.approx([0.0, 0.0], abs=1e-9)
+    zeta = 0.05
+    rates = -zeta + (1 + zeta**2) ** 0.5, -zeta - (1 + zeta**2) ** 0.5
+    exact = [[math.exp(2 * math.pi * rate), 0.0] for rate in rates]
+    assert saddle["multipliers"] == [pytest.approx(pair, rel=1e-8, abs=1e-12) for pair in exact]
 
 
 def test_one_attractor_is_a_finding_and_a_sentence(tmp_path, monkeypatch, capsys):

@@ -9,6 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
+import vibrokit as vk
+
 REPOSITORY = Path(__file__).parents[2]
 OMEGA_N, ZETA, OMEGA, F0, F1 = 1.0, 0.01, 0.57, 0.18, 0.2
 PERIOD = 2 * np.pi / OMEGA
@@ -185,3 +187,45 @@ def test_a_formula_runs_no_code(law, capfd):
 def test_picture_of_the_bounce(law, tmp_path):
     law.save_picture(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["02-bounce.png"]
+
+
+# -- 03: without noise ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def quiet(run):
+    return run("03_without_noise")
+
+
+def test_states_and_saddle_without_noise(quiet):
+    expected = [F1 / OMEGA_N**2 + response().real, (1j * OMEGA * response()).real]
+    assert quiet.clear.points[0] == pytest.approx(expected, abs=1e-10)
+    assert [dict(a.hits) for a in quiet.structure.attractors] == [{"right": 0, "left": 0}, {"right": 2, "left": 0}]
+    shrinking = np.exp(-2 * ZETA * OMEGA_N * PERIOD)  # Liouville
+    assert quiet.products == pytest.approx([shrinking] * 3, rel=1e-8)
+    assert quiet.saddle.leads_to in ((0, 1), (1, 0))
+
+
+def test_the_saddle_is_a_fixed_point_of_the_map(quiet):
+    point = quiet.saddle.points[0]
+    assert quiet.osc.section_map(point[None], 1, stepper=vk.Order8(1e-12))[0] == pytest.approx(point, abs=1e-9)
+
+
+def test_no_kick_in_velocity_alone_is_smaller_than_the_smallest(quiet):
+    for stability in quiet.stability:
+        assert stability.velocity_kick.size >= stability.any_kick.size - stability.any_kick.error
+
+
+def test_where_the_clear_motion_grazes(quiet):
+    def gap(frequency):
+        swing = F0 / np.sqrt((OMEGA_N**2 - frequency**2) ** 2 + (2 * ZETA * OMEGA_N * frequency) ** 2)
+        return 0.5 - F1 / OMEGA_N**2 - swing
+
+    grazing = [b for b in quiet.sweep.bifurcations if b.kind == "grazing" and b.side == "right"]
+    assert min(abs(b.value - brentq(gap, 0.57, 0.65, xtol=1e-14)) for b in grazing) < 1e-9
+    assert quiet.touching == pytest.approx(brentq(gap, 0.57, 0.65, xtol=1e-14), abs=1e-9)
+
+
+def test_pictures_of_the_structure(quiet, tmp_path):
+    quiet.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(quiet.PICTURES)

@@ -32,7 +32,9 @@ _SAMPLES = 8192  # of a cycle
 _APPROACH = 0.25  # of a motion that does not recur is its way to where it stays
 _SEVERAL = 32  # sections after which a few motions go on for each pair of labels
 _FEW = 6
-_MOST = 128  # motions in all
+_MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they take longer
+_QUICK = 2000
+_LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
 _RESIDUAL = 1e-10
 
@@ -83,14 +85,21 @@ def find_saddles(
         What was found, as sentences.
     """
     settler = dataclasses.replace(settler, stepper=carrier)
-    pairs = set(meeting_cells(basins))
-    if not pairs:
+    meetings = meeting_cells(basins)
+    if not meetings:
         return (), "No two basins meet on the grid, so that there is no boundary to follow."
+    most = max(_LEAST_MOTIONS, min(_MOST, _MOST * _QUICK // settler.budget))
+    longest = sorted(meetings, key=lambda pair: (-len(meetings[pair]), pair))[: most // 2]
+    pairs = set(longest)
     search = _Search(osc, settler, attractors, exact, [] if found is None else found)
+    if len(meetings) > len(pairs):
+        search.words.append(
+            f"{len(meetings) - len(pairs)} of {len(meetings)} boundaries, the shortest on the grid, were not followed."
+        )
     for asked in (settler, dataclasses.replace(settler, core=None)):
         open_pairs = pairs - search.explained
         if open_pairs:
-            each = max(2, min(trackers, _MOST // len(open_pairs)))
+            each = max(2, min(trackers, most // len(open_pairs)))
             straddles = Straddles.across(asked, basins, each, rng, only=open_pairs)
             search.follow(straddles, sections)
     ordered = sorted(search.found, key=lambda s: (s.kind == "chaotic", s.period, tuple(s.points[0])))

@@ -35,6 +35,7 @@ _WATCHED = 64  # starts that are followed for long
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent; it depends on the steps, so that they are carried exactly
 _LEAST_MEASURED = 1000  # periods
+_LEAST_STARTS = 4
 _SAMPLE = 4096  # points of a set that never repeats
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
@@ -200,10 +201,9 @@ class Search:
         osc, finer = self.osc, self.means.carrier.refined()
         clouds = _clouds(osc, survivors, finer)
         for group in separate(clouds, self.tolerance):
-            few = survivors[group[:_MEASURED]]
-            estimate = lyapunov_exponent(
-                osc, few, self.means.exact, periods=_measuring_time(osc), executor=self.means.executor
-            )
+            periods = _measuring_time(osc)
+            few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
+            estimate = lyapunov_exponent(osc, few, self.means.exact, periods=periods, executor=self.means.executor)
             kind = kind_of(estimate)
             if kind is None:
                 self.words.append(
@@ -225,9 +225,9 @@ def _schedule(wait: int) -> list[int]:
 
 
 def _measuring_time(osc: Oscillator) -> int:
-    """Periods in which motion that settles, however slowly, would be seen to: ten e-foldings of the damping."""
+    """Periods in which motion that settles, however slowly, would be seen to: three e-foldings of the damping."""
     folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
-    return _LEAST_MEASURED if folds == 0 else min(_WATCH, max(_LEAST_MEASURED, math.ceil(10 / folds)))
+    return _LEAST_MEASURED if folds == 0 else min(_WATCH, max(_LEAST_MEASURED, math.ceil(3 / folds)))
 
 
 def _clouds(osc: Oscillator, states: Array, stepper: Stepper) -> list[Array]:
