@@ -162,7 +162,7 @@ class Search:
         osc, left = self.osc, []
         for state in states:
             known = [a.orbit for a in self.attractors if a.kind == "limit cycle"]
-            if any(np.linalg.norm(orbit - state[:2], axis=1).min() < self.tolerance for orbit in known):
+            if any(_on(orbit, state) for orbit in known):
                 continue
             try:
                 longest = _LONGEST_CYCLE * osc.section_interval
@@ -252,8 +252,9 @@ def persistent(osc: Oscillator, attractors: tuple[Attractor, ...], carrier: Step
 def _persists(osc: Oscillator, attractor: Attractor, carrier: Stepper, tolerance: float) -> bool:
     states, periods = attractor.points[:1], 2000
     if attractor.kind == "limit cycle":
-        known = attractor.orbit
-    elif attractor.repeats:
+        (end,) = run_ensemble(osc, Flow.STATE, carrier, states, periods).states
+        return _on(attractor.orbit, end)
+    if attractor.repeats:
         known, periods = attractor.points, 512 * attractor.period
     else:
         known, states = attractor.points, attractor.points[:: max(1, len(attractor.points) // _WATCHED)]
