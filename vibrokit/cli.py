@@ -83,7 +83,7 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture to write (default: FILE.png)")
     plot.set_defaults(command=_plot)
 
-    trade = commands.add_parser("trade", parents=[scene], help="error against time of each stepper on this machine")
+    trade = commands.add_parser("trade", parents=[scene], help="error against time on this machine")
     trade.add_argument("-o", "--output", type=Path, metavar="FILE", help="where to save the figure")
     trade.set_defaults(command=_trade)
     return parser
@@ -250,11 +250,18 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.plots.trade import work_precision
     from vibrokit.results.pictures import save_figure
     from vibrokit.scene_file import load_scene
+    from vibrokit.trade.basins import measure_basins
     from vibrokit.trade.steppers import measure_steppers
 
-    with _Bar("trade") as bar:
-        table = measure_steppers(load_scene(options.scene), progress=bar)
+    osc = load_scene(options.scene)
+    with _Bar("steppers") as bar:
+        table = measure_steppers(osc, progress=bar)
     print(table)
+    try:
+        with _Bar("basins") as bar:
+            print(f"\n{measure_basins(osc, progress=bar)}")
+    except StructureError as error:  # what was measured so far is worth its table
+        print(f"vibrokit: basins: {error}", file=sys.stderr)
     picture = options.output or Path(f"{_stem(options.scene)}-trade.png")
     save_figure(work_precision(table.rows), picture)
     print(f"figure: {picture}")

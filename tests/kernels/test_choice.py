@@ -10,6 +10,7 @@ import pytest
 import vibrokit as vk
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
 from vibrokit.kernels.contact_time import contact_times
+from vibrokit.kernels.named import name_of, named_stepper
 from vibrokit.scene_file import load_scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -120,3 +121,10 @@ def test_second_process_needs_no_sympy():
     for _ in range(2):
         run = subprocess.run(command, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    "stepper", [vk.RK4(512), vk.Order8(1e-9), vk.FreeFlight(1e-12), vk.FreeFlight(3e-15)], ids=repr
+)
+def test_a_stepper_has_a_name_that_it_is_read_from(stepper):
+    assert named_stepper(name_of(stepper)) == stepper

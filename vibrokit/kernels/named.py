@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 
 from vibrokit.errors import StepperError, nearest
@@ -13,6 +14,12 @@ from vibrokit.kernels.stepper import Stepper
 _KINDS: Mapping[str, tuple[Callable[..., Stepper], Callable[[str], float]]] = {
     kind.name.replace("_", "-"): (kind, number) for kind, number in ((RK4, int), (Order8, float), (FreeFlight, float))
 }
+
+
+def name_of(stepper: Stepper) -> str:
+    """Return what `named_stepper` reads a stepper of this setting from."""
+    (setting,) = (getattr(stepper, field.name) for field in dataclasses.fields(stepper))
+    return f"{stepper.name.replace('_', '-')}:{setting!r}"
 
 
 def named_stepper(text: str) -> Stepper:

@@ -35,7 +35,7 @@ class Structure:
     budget : int
         Most periods that a trajectory was given to settle.
     stepper : str
-        What carried the cells of the basin grid.
+        What carried the cells of the basin grid, as `vibrokit run --stepper` has it: ``"rk4:256"``.
     complete : bool
         False if the work was stopped before its end; `status` says what is missing.
     status : str

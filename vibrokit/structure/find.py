@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import Progress
+from vibrokit.kernels.named import name_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator, generator_from
@@ -248,7 +249,7 @@ class _Finder:
             survival=self.search.survival,
             settling=self.tolerance,
             budget=self.budget,
-            stepper=repr(self.carrier),
+            stepper=name_of(self.carrier),
             complete=not self.stopped,
             status=self._status(basins),
             scene=scene_data(self.osc),

@@ -34,6 +34,7 @@ _SEVERAL = 32  # sections after which a few motions go on for each pair of label
 _FEW = 6
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they take longer
 _QUICK = 2000
+_LONG, _SHORT, _SLOW = 128, 32, 5000
 _LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
 _RESIDUAL = 1e-10
@@ -51,7 +52,7 @@ def find_saddles(
     exact: Stepper,
     rng: np.random.Generator,
     trackers: int = 9,
-    sections: int = 128,
+    sections: int | None = None,
     found: list[Saddle] | None = None,
 ) -> tuple[tuple[Saddle, ...], str]:
     """Find the saddles on the boundaries between basins by edge tracking.
@@ -73,7 +74,8 @@ def find_saddles(
     trackers : int
         Most motions to follow for each pair of basins that meet.
     sections : int
-        How long a motion is followed before it is taken for one that does not repeat.
+        How long a motion is followed before it is taken for one that does not repeat; by default 128 sections, or 32
+        where states need more than 5000 to settle, for each step on the boundary asks several of them.
     found : list of Saddle, optional
         Is given each saddle as it is found, so that they survive Ctrl-C.
 
@@ -88,6 +90,7 @@ def find_saddles(
     meetings = meeting_cells(basins)
     if not meetings:
         return (), "No two basins meet on the grid, so that there is no boundary to follow."
+    length = sections or (_LONG if settler.budget <= _SLOW else _SHORT)
     most = max(_LEAST_MOTIONS, min(_MOST, _MOST * _QUICK // settler.budget))
     longest = sorted(meetings, key=lambda pair: (-len(meetings[pair]), pair))[: most // 2]
     pairs = set(longest)
@@ -101,7 +104,7 @@ def find_saddles(
         if open_pairs:
             each = max(2, min(trackers, most // len(open_pairs)))
             straddles = Straddles.across(asked, basins, each, rng, only=open_pairs)
-            search.follow(straddles, sections)
+            search.follow(straddles, length)
     ordered = sorted(search.found, key=lambda s: (s.kind == "chaotic", s.period, tuple(s.points[0])))
     return tuple(ordered), search.status(pairs)
 

@@ -25,7 +25,7 @@ from vibrokit.structure.survival import follow, watch
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
-_LONGER_PERIOD = 64  # looked for among those that are long in settling
+_LONGER_PERIOD = 256  # looked for among those that are long in settling
 _RECURRENCE = 1e-5
 _NEAR = 1e-3  # what a coarse stepper may make of an orbit
 _LOOSE = 1e-2  # recurrences that are worth a try with Newton's method

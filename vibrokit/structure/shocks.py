@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import Progress, run_ensemble
+from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
@@ -74,7 +74,7 @@ def shape_stability(
     for name, count, least in (("phases", phases, 1), ("directions", directions, 4)):
         if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= _MOST:
             raise StructureError(f"{name} is {count!r}; give a whole number from {least} to {_MOST}.")
-    carrier = stepper or ensemble_stepper(osc, Flow.STATE)
+    carrier = stepper or named_stepper(structure.stepper)
     settler = Settler(
         osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, carrier, executor
     ).sharing(structure.basins, 2)
