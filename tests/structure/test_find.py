@@ -228,3 +228,43 @@ def test_the_shortest_contacts_are_counted(stiffness):
     speed = np.sqrt(0.8 * stiffness * depth**2.5)  # all of its energy is in the stop there
     contact = 2.94 * depth / speed  # Hertz's duration of an impact, as a part of the period: what the limit leaves out
     assert speed == pytest.approx(speed_at_a_rigid_stop(), rel=3 * contact / np.pi)
+
+
+@pytest.mark.parametrize(("length", "rate"), [(1e-6, 1e3), (1e-3, 1.0), (1e3, 1e-2)])
+def test_units_change_nothing(paper, length, rate):
+    """The same scene in other units: lengths × L, rates × W, Hertz's stiffness × W²/√L."""
+    osc, _ = paper
+    unit = {"": 1.0, "m": length, "s^-1": rate, "m s^-2": length * rate**2, "m^(-1/2) s^-2": rate**2 / length**0.5}
+    scaled = osc.replace(
+        {
+            "natural_frequency": rate,
+            **{f"barriers.{n}.position": sign * 0.5 * unit["m"] for n, sign in ((0, 1), (1, -1))},
+            **{f"barriers.{n}.law.stiffness": 50.0 * unit["m^(-1/2) s^-2"] for n in (0, 1)},
+            "excitations.0.amplitude": 0.18 * unit["m s^-2"],
+            "excitations.0.frequency": 0.57 * unit["s^-1"],
+            "excitations.1.force": 0.2 * unit["m s^-2"],
+        }
+    )
+    structure = vk.find_structure(scaled, cells=(40, 40), starts=(12, 12), manifolds=False)
+    same = vk.find_structure(osc, cells=(40, 40), starts=(12, 12), manifolds=False)
+    scale = np.array([length, length * rate])
+    for ours, theirs in zip(structure.attractors, same.attractors, strict=True):
+        np.testing.assert_allclose(ours.points / scale, theirs.points, atol=1e-9)
+        assert ours.hits == theirs.hits
+        assert ours.basin_fraction == pytest.approx(theirs.basin_fraction, abs=0.01)
+    np.testing.assert_allclose(structure.saddles[0].points / scale, same.saddles[0].points, atol=1e-9)
+
+
+def test_a_symmetric_orbit_meets_both_stops_alike():
+    """A force that damps is largest before the deepest point; the numbers are SciPy's (DOP853, 1e-12)."""
+    law = vk.CustomLaw("k*depth + c*rate", k=100.0, c=2.0)
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.02,
+        barriers=(vk.Barrier(law, 0.3, "right"), vk.Barrier(law, -0.3, "left")),
+        excitations=(vk.Harmonic(0.5, 0.8),),
+    )
+    (orbit,) = vk.find_structure(osc, cells=(4, 4), starts=(6, 6), saddles=False).attractors
+    for side in ("right", "left"):
+        assert orbit.peak_force[side] == pytest.approx(4.154984, abs=1e-6)
+        assert orbit.peak_depth[side] == pytest.approx(0.0407529131, abs=1e-9)

@@ -27,6 +27,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.request import check_belongs, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128
@@ -71,10 +72,7 @@ class ActionPlot(Analyzer):
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise StructureError(f"ActionPlot: radius is {self.radius!r}; give a positive, finite one.")
-        if isinstance(self.points, bool) or not isinstance(self.points, int) or not 4 <= self.points <= _MOST_POINTS:
-            raise StructureError(
-                f"ActionPlot: points is {self.points!r}; give a whole number from 4 to {_MOST_POINTS}."
-            )
+        whole("ActionPlot: points", self.points, 4, _MOST_POINTS)
 
     def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> ActionPlotResult:
         """Run the ring for each attractor.
@@ -90,6 +88,7 @@ class ActionPlot(Analyzer):
         StructureError
             There is one attractor only, so that nothing can be left for another; or the source is unknown.
         """
+        check_belongs(osc, structure)
         if osc.noise is None:
             raise SceneError("the scene has no noise, and nothing leaves an attractor without; give it a noise model.")
         if len(structure.attractors) < 2:

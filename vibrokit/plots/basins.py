@@ -111,6 +111,7 @@ def section_portrait(
     saddle_kinds: Sequence[str] = (),
     stable: Sequence[ArrayLike] = (),
     unstable: Sequence[ArrayLike] = (),
+    cycles: Mapping[int, ArrayLike] | None = None,
     ax: Axes | None = None,
 ) -> list[Any]:
     """Draw attractors, saddles and their manifolds over the basins: the global structure on the section.
@@ -126,13 +127,15 @@ def section_portrait(
         (triangle), ``"chaotic"`` (dots). All saddles by default.
     stable, unstable : sequence of array_like (count, 2)
         Branches of the manifolds as curves; what lies outside the bounds is cut off.
+    cycles : dict of int to array_like (count, 2), optional
+        Limit cycles as curves, by the place of the attractor.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
 
     Returns
     -------
     list of artists
-        Those of `basin_map`, a line for each branch (stable ones first), the markers of each saddle.
+        Those of `basin_map`, a line for each branch (stable ones first) and each cycle, the markers of each saddle.
     """
     axes = axes_or_new(ax, 7.0, 4.8)
     box = np.asarray(bounds, dtype=float)
@@ -144,6 +147,9 @@ def section_portrait(
                 inside[:, 0], inside[:, 1], color=ink, linewidth=0.8, zorder=3, rasterized=len(inside) > _DENSE,
                 label=name if index == 0 else "_more",
             )  # fmt: skip
+    for place, curve in (cycles or {}).items():
+        x, v = np.asarray(curve, dtype=float)[:, :2].T
+        artists += axes.plot(x, v, color=colour(place), linewidth=1.4, zorder=4, label="_cycle")
     artists += _draw_saddles(axes, saddles, saddle_kinds)
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])

@@ -51,7 +51,7 @@ class Region:
     def around(cls, points: NDArray[np.float64], margin: float) -> Region:
         """Return the region round some points, widened on each side by `margin` times its width."""
         low, high = points.min(axis=0), points.max(axis=0)
-        width = np.maximum(high - low, 1e-3 * np.maximum(1.0, np.abs(high)))
+        width = high - low
         low, high = low - margin * width, high + margin * width
         return cls((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
 

@@ -94,6 +94,7 @@ class Structure:
             saddle_kinds=[saddle.kind for saddle in self.saddles],
             stable=[manifold.curve for manifold in self.manifolds if manifold.stable],
             unstable=[manifold.curve for manifold in self.manifolds if not manifold.stable],
+            cycles={a.label: a.orbit for a in self.attractors if a.kind == "limit cycle"},
             ax=ax,
         )
 
@@ -122,4 +123,7 @@ def _described(attractor: Attractor) -> str:
     hits = (
         "no hits" if attractor.impacts == 0 else f"{attractor.impacts:.3g} hit{'s' if attractor.impacts != 1 else ''}"
     )
+    pressed = [side for side, depth in attractor.peak_depth.items() if depth > 0 and attractor.hits[side] == 0]
+    if pressed and attractor.impacts == 0:
+        hits = f"pressed on the {pressed[0]} stop"
     return f"{attractor.label}: {kind}, {hits}" + ("" if attractor.repeats or attractor.impacts == 0 else " a period")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _FINER = 64  # samples that a stretch is looked at with again
 _DEEPEST = 6  # how often, before a touch that is never seen counts as none
 _ENOUGH = 32  # samples in one contact, for its peak
+_LOOKS = 5  # each thirty times as close as the one before
 
 Array = NDArray[np.float64]
 
@@ -80,10 +82,10 @@ def contacts_along(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> 
     for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1):
         if run.size:
             around = _around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, len(depth) - 1), stepper)
-            peak = _peak(osc, around.states, stop, stepper)
+            peak = _peak(osc, around, stop, stepper)
             deepest, hardest = max(deepest, peak[0]), max(hardest, peak[1])
-    for states in _hidden(osc, path, barrier, stepper, _DEEPEST):
-        peak = _peak(osc, states, stop, stepper)
+    for unseen in _hidden(osc, path, barrier, stepper, _DEEPEST):
+        peak = _peak(osc, unseen, stop, stepper)
         entries, deepest, hardest = entries + 1, max(deepest, peak[0]), max(hardest, peak[1])
     return Contacts(entries, deepest, hardest)
 
@@ -101,7 +103,7 @@ def _around(osc: Oscillator, path: Path, first: int, last: int, stepper: Stepper
     return Path(record(osc, Flow.STATE, stepper, path.states[first], begin, finer, _FINER), begin, finer)
 
 
-def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, finer: int) -> list[Array]:
+def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, finer: int) -> list[Path]:
     """Stretches in which the stop is touched between two samples that are both clear of it."""
     depth, rate = _depth_and_rate(path.states, barrier)
     clear, turns = (depth[:-1] <= 0) & (depth[1:] <= 0), (rate[:-1] > 0) & (rate[1:] < 0)
@@ -111,25 +113,34 @@ def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, fin
         closer = _around(osc, path, int(index), int(index) + 1, stepper)
         inside, _ = _depth_and_rate(closer.states, barrier)
         if inside.max() > 0:
-            found.append(closer.states)
+            found.append(closer)
         elif finer > 0:
             found += _hidden(osc, closer, barrier, stepper, finer - 1)
     return found
 
 
-def _peak(osc: Oscillator, states: Array, stop: int, stepper: Stepper) -> tuple[float, float]:
-    """Greatest depth, by a parabola through the deepest samples, and greatest push, at that depth or at a sample."""
-    barrier = osc.barriers[stop]
-    depth, rate = _depth_and_rate(states, barrier)
-    law = kernel_for(osc, Flow.STATE, stepper).module.law
-    theta = theta_of(osc)
-    force = max((float(law(stop, d, r, theta)) for d, r in zip(depth, rate, strict=True) if d > 0), default=0.0)
-    top = int(np.argmax(depth))
-    deepest = float(depth[top])
-    if 0 < top < len(depth) - 1:
-        before, after = float(depth[top - 1]), float(depth[top + 1])
-        bend = before - 2 * deepest + after
-        if bend < 0 and rate[top - 1] > 0 > rate[top + 1]:
-            deepest -= (after - before) ** 2 / (8 * bend)
-            force = max(force, float(law(stop, deepest, 0.0, theta)))
-    return max(deepest, 0.0), max(force, 0.0)
+def _peak(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> tuple[float, float]:
+    """Greatest depth and greatest push along a stretch, each looked at again ever more closely."""
+    law, theta = kernel_for(osc, Flow.STATE, stepper).module.law, theta_of(osc)
+
+    def depths(states: Array) -> Array:
+        return _depth_and_rate(states, osc.barriers[stop])[0]
+
+    def pushes(states: Array) -> Array:
+        pairs = zip(*_depth_and_rate(states, osc.barriers[stop]), strict=True)
+        return np.array([float(law(stop, depth, rate, theta)) if depth > 0 else 0.0 for depth, rate in pairs])
+
+    return _greatest(osc, path, depths, stepper), _greatest(osc, path, pushes, stepper)
+
+
+def _greatest(osc: Oscillator, path: Path, measure: Callable[[Array], Array], stepper: Stepper) -> float:
+    """Largest value of a function of the state along a path, by ever finer samples round the largest one."""
+    best = 0.0
+    for _ in range(_LOOKS):
+        values = measure(path.states)
+        top = int(np.argmax(values))
+        best = max(best, float(values[top]))
+        path = _around(osc, path, max(top - 1, 0), min(top + 1, len(values) - 1), stepper)
+        if len(path.states) < 2:
+            break
+    return best

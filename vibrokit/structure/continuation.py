@@ -8,7 +8,7 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from vibrokit.structure.branches import Tracing, unshared
 from vibrokit.structure.continuation_record import recorded
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.regions import frame_of
-from vibrokit.structure.request import Request
+from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.shares import share_out
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -97,9 +97,10 @@ def continuation(
         A region, or counts, that are not what they must be.
     """
     began = time.perf_counter()
+    check_means(osc, stepper, executor, progress)
     entry, numbers = _entry(osc, path), _checked(values)
     request = Request(cells, 0, None, starts, 0.5, None)
-    seed = rng if isinstance(rng, int) and not isinstance(rng, bool) else seed_from(rng)
+    seed = int(rng) if isinstance(rng, Integral) and not isinstance(rng, bool) else seed_from(rng)
     frame = None if region is None else Region.of(region)
     work = _Work(osc, path, numbers.tolist(), stepper, executor, progress)
     try:
@@ -231,7 +232,7 @@ def _union(bounds: list[Array]) -> Region | None:
 
 def _entry(osc: Oscillator, path: Any) -> Entry:
     entries = {entry.path: entry for entry in osc.entries()}
-    if path not in entries:
+    if not isinstance(path, str) or path not in entries:
         open_ones = [name for name, entry in entries.items() if not entry.declared.structural]
         raise ParameterError(f"continuation: the scene has no parameter {shown(path)}{nearest(str(path), open_ones)}")
     if entries[path].declared.structural:

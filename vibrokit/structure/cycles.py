@@ -15,6 +15,7 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import RAN_OUT
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _ITERATIONS = 30
@@ -95,7 +96,7 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
         step[1] = 0.0
         point = point + step
     found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
-    if best is None or best.residual > _CONVERGED * (1.0 + float(np.linalg.norm(start))):
+    if best is None or best.residual > _CONVERGED * (size_of(osc) + float(np.linalg.norm(start))):
         raise StructureError(
             f"Newton's method found no cycle of duration {guess:.6g} s near {tuple(np.round(start, 6).tolist())}: "
             f"{found}. The start is too far off, or the cycle is one of a family; wait longer, take a finer stepper, "
@@ -110,7 +111,7 @@ def _check_cycle(osc: Oscillator, cycle: Cycle, stepper: Stepper) -> None:
     rate = _rate(osc, cycle.point, stepper)
     speed = float(np.linalg.norm(rate))
     place = tuple(np.round(cycle.point, 6).tolist())
-    if speed * cycle.duration < _AT_REST * (1.0 + float(np.linalg.norm(cycle.point))):
+    if speed * cycle.duration < _AT_REST * (size_of(osc) + float(np.linalg.norm(cycle.point))):
         raise StructureError(
             f"Newton's method came to the equilibrium {place}, not to a cycle; start farther from the equilibrium."
         )
@@ -219,12 +220,15 @@ def equilibrium_exponents(osc: Oscillator, point: Array, stepper: Stepper) -> ND
     fastest = 0.0
     for _ in range(_ITERATIONS):
         image, multipliers = _carried(osc, place, time, stepper)
+        if not np.isfinite(multipliers).all():  # too short a time for the stepper to find its way in a contact
+            time *= 4
+            continue
         fastest = float(np.abs(np.linalg.eigvals(multipliers) - 1.0).max()) / time
         if time * fastest > 0.5 * _FRACTION or time > _FRACTION * osc.time_unit:
             break
         time = min(4 * time, _FRACTION / max(fastest, 1e-300))
     moved = float(np.linalg.norm(image - place))
-    if not moved <= _AT_REST * time * max(fastest, 1.0 / osc.time_unit) * (1.0 + float(np.linalg.norm(place))):
+    if not moved <= _AT_REST * time * max(fastest, 1.0 / osc.time_unit) * (size_of(osc) + float(np.linalg.norm(place))):
         raise StructureError(
             f"{tuple(np.round(place, 6).tolist())} is no equilibrium: the state moves at {moved / time:.2e} per second "
             "there; give a point at rest."

@@ -17,6 +17,7 @@ from vibrokit.structure.contacts import Contacts, Path, contacts_along
 from vibrokit.structure.cycles import Cycle, equilibrium_exponents, refine_cycle
 from vibrokit.structure.lyapunov import LyapunovEstimate
 from vibrokit.structure.orbits import Orbit, refine_orbit, visited
+from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 1024  # along one forcing period
@@ -30,7 +31,9 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
     """Describe a stable periodic orbit, or an equilibrium."""
     period = orbit.period
     path = _path(osc, orbit.point, period * osc.section_interval, _SAMPLES * period, stepper)
-    resting = osc.autonomous and np.ptp(path.states, axis=0).max() < _RESTING * (1.0 + np.abs(path.states).max())
+    resting = osc.autonomous and np.ptp(path.states, axis=0).max() < _RESTING * (
+        size_of(osc) + np.abs(path.states).max()
+    )
     multipliers = np.linalg.eigvals(orbit.monodromy).astype(complex)
     duration = 0.0 if resting else period * osc.section_interval
     exponents = equilibrium_exponents(osc, orbit.point, stepper) if resting else _rates(multipliers, duration)

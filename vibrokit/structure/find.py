@@ -6,12 +6,13 @@ import concurrent.futures
 import dataclasses
 import math
 import time
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError
+from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.named import name_of
@@ -19,7 +20,7 @@ from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator, generator_from
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import NOT_FOLLOWED, Basins
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
@@ -28,10 +29,11 @@ from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.manifolds import grow_manifolds
 from vibrokit.structure.regions import frame_of, search_region
-from vibrokit.structure.request import Request
+from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.saddles import find_saddles
 from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, persistent
 from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.structure.status import lies_in, none_inside, nothing_found, status_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _FOLDS = 30  # e-foldings of the linear damping that a transient is given
@@ -40,7 +42,6 @@ _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients that a cell is given
 _REFINEMENTS = 4  # of the carrier, until every attractor is one for it too
 _SEARCH_SETTLING = 1e-3
-_FATES = {UNSETTLED: "did not settle in the time given", LEFT: "left the region", NOT_FOLLOWED: "were not followed"}
 
 Array = NDArray[np.float64]
 
@@ -111,6 +112,10 @@ def find_structure(
     NoSectionError
         The excitations have no common period.
     """
+    check_means(osc, stepper, executor, progress)
+    for name, flag in (("saddles", saddles), ("manifolds", manifolds)):
+        if not isinstance(flag, bool):
+            raise StructureError(f"{name} is {shown(flag)}; give True or False.")
     request = Request(cells, refine, margin, starts, settling, budget)
     finder = _Finder(osc, request, None if region is None else Region.of(region), stepper, executor, progress)
     generator = generator_from(rng)
@@ -125,7 +130,7 @@ def find_structure(
         if not finder.search.attractors:
             raise
         finder.stopped = True
-    return finder.structure(rng if isinstance(rng, int) else None)
+    return finder.structure(int(rng) if isinstance(rng, Integral) else None)
 
 
 class _Finder:
@@ -156,6 +161,7 @@ class _Finder:
         self.manifolds: tuple[Manifold, ...] = ()
         self.words: list[str] = []
         self.stopped = False
+        self.missing = "attractors, basins, saddles and manifolds"
 
     def _search_carrier(self) -> Stepper:
         """Finer than the basins need: a weak attractor must not be lost to the steps."""
@@ -167,13 +173,11 @@ class _Finder:
         starts = _starts(self.osc, self.looked_in, self.request.starts, generator)
         self.search.run(starts, self.budget, self.budget >= self.wait)
         if not self.search.attractors:
-            raise StructureError(
-                f"no steady state was found from {len(starts)} starts in x ∈ {self.looked_in.x}, v ∈ "
-                f"{self.looked_in.v}: none came to an orbit of period up to {LONGEST_PERIOD} within {self.budget} "
-                f"periods, or to a set that lasts, and {self.search.lost} ran out of range; widen the region or raise "
-                "budget."
-            )
+            hasty = self.budget < self.wait
+            raise StructureError(nothing_found(self.search, self.looked_in, self.budget, hasty, LONGEST_PERIOD))
         self._settle_order()
+        if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
+            raise StructureError(none_inside(self.region, self.attractors))
         tolerance = self.tolerance
         for _ in range(_REFINEMENTS):
             if self.given is not None or persistent(self.osc, self.attractors, self.carrier, tolerance):
@@ -204,6 +208,7 @@ class _Finder:
     def find_basins(self) -> None:
         """Follow every cell of the grid, and note the share of each attractor."""
         request = self.request
+        self.missing = "basins, saddles and manifolds"
         self.basins = settle_grid(
             self.settler(), request.cells, margin=request.margin, refine=request.refine, progress=self.progress
         )
@@ -214,6 +219,7 @@ class _Finder:
     def find_saddles(self, generator: np.random.Generator) -> None:
         """Follow the boundaries between basins to the saddles on them."""
         assert self.basins is not None
+        self.missing = "saddles and manifolds"
         settler = self.settler().sharing(self.basins, self.request.margin or 2)
         ordered, words = find_saddles(
             self.osc, settler, self.basins, self.attractors,
@@ -221,9 +227,13 @@ class _Finder:
         )  # fmt: skip
         self.saddles = list(ordered)
         self.words.append(words)
+        outside = sum(not lies_in(self.frame, saddle) for saddle in ordered)
+        if outside:
+            self.words.append(f"{outside} of these lie outside the region; a wider one shows them.")
 
     def grow_manifolds(self) -> None:
         """Grow the manifolds of each saddle that is an orbit."""
+        self.missing = "manifolds"
         for index, saddle in enumerate(self.saddles):
             if saddle.kind not in ("saddle", "flip saddle"):
                 continue
@@ -251,26 +261,14 @@ class _Finder:
             budget=self.budget,
             stepper=name_of(self.carrier),
             complete=not self.stopped,
-            status=self._status(basins),
+            status=status_of(
+                self.search, len(self.attractors), basins, self.missing if self.stopped else "", self.words
+            ),
             scene=scene_data(self.osc),
             seed=seed,
             seconds=time.perf_counter() - self.began,
             versions=versions(),
         )
-
-    def _status(self, basins: Basins) -> str:
-        count = len(self.attractors)
-        starts = self.request.starts[0] * self.request.starts[1]
-        words = ["The work was stopped before its end."] if self.stopped else []
-        words.append(f"{count} steady state{'s' if count != 1 else ''} found from {starts} starts.")
-        if self.search.lost:
-            words.append(f"{self.search.lost} starts ran out of range.")
-        words += [*self.search.words, *(f"{report}." for report in self.search.survival)]
-        for label, fate in _FATES.items():
-            share = basins.fraction(label)
-            if share:
-                words.append(f"{100 * share:.2g}% of the cells {fate}.")
-        return " ".join([*words, *(word for word in self.words if word)])
 
 
 def _wait(osc: Oscillator) -> int:

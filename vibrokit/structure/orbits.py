@@ -11,6 +11,7 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _ITERATIONS = 30
@@ -78,7 +79,7 @@ def refine_orbit(
             point = point - np.linalg.solve(monodromy - np.eye(len(point)), image - point)
         except np.linalg.LinAlgError:
             break
-    scale = 1.0 + float(np.linalg.norm(guess))
+    scale = size_of(osc) + float(np.linalg.norm(guess))
     if best is None or best.residual > 1e-6 * scale:
         found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
         raise StructureError(
@@ -96,7 +97,7 @@ def least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
                 shorter = refine_orbit(osc, orbit.point, divisor, stepper)
             except StructureError:
                 continue
-            if same_point(orbit.point, shorter.point[None], EQUAL):
+            if same_point(osc, orbit.point, shorter.point[None], EQUAL):
                 return shorter
     return orbit
 
@@ -109,7 +110,7 @@ def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     return np.array(points)
 
 
-def same_point(point: Array, known: Array, tolerance: float) -> bool:
-    """Whether a point is one of some known points (count, n), to a tolerance relative to their size."""
+def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
+    """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion."""
     nearest = np.linalg.norm(known - point, axis=1).min()
-    return bool(nearest < tolerance * (1.0 + np.abs(known).max()))
+    return bool(nearest < tolerance * (size_of(osc) + np.abs(known).max()))

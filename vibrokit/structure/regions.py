@@ -9,30 +9,36 @@ import numpy as np
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
+from vibrokit.structure.scales import length_of
 
-_STRENGTHS = ("amplitude", "force")
-_RESONANCE = 5.0
+_MARGIN = 0.25  # of the width, on each side
+_RESTING = 1e-3
 
 
 def search_region(osc: Oscillator) -> Region:
     """Return a region wide enough for starts: the stops, and the reach of a linear oscillator under the same forces."""
-    numbers = [value for part in osc.excitations for name, value in part.parameters.items() if name in _STRENGTHS]
-    push = float(sum(abs(number) for number in numbers)) / osc.natural_frequency**2
-    free = len(osc.barriers) < 2  # where nothing limits it, a resonance makes more of the push
-    places = [2 * abs(barrier.position) for barrier in osc.barriers]
-    reach = max([1.0, _RESONANCE * push if free else push, *places])
+    reach = length_of(osc)
     return Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
-    """Return a region that holds the attractors' points and the stops, with room around them."""
+    """Return a region that holds the attractors' points and the stops, with room around them.
+
+    It is at least as wide as the gap between two stops; elsewhere as the widest motion, or, where all is at rest, as
+    motion may be expected to be, so that it shows more than a single point.
+    """
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
-    curves = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
-    points = np.concatenate([points, *curves])
-    reach = np.abs(points - points.mean(axis=0)).max()
-    places = [[barrier.position, 0.0] for barrier in osc.barriers]
-    speed = max(
-        reach * osc.natural_frequency, np.abs(points[:, 1]).max(), 0.5 * np.ptp([p[0] for p in places] or [0.0])
-    )
-    corners = np.array([*points, *places, [points[0, 0], speed], [points[0, 0], -speed]])
-    return Region.around(corners, margin=0.25)
+    cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
+    points = np.concatenate([points, *cycles])
+    places = [barrier.position for barrier in osc.barriers]
+    gap = float(np.ptp(places)) if len(places) == 2 else 0.0
+    x, v = points.T
+    low, high = min([x.min(), *places]), max([x.max(), *places])
+    swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
+    widest = max(swings)
+    least = 0.5 * gap or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
+    swing = float(np.abs(x - x.mean()).max())
+    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()))
+    half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
+    return Region((float(middle - half), float(middle + half)), (-speed, speed))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Progress, run_ensemble
+from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
@@ -21,6 +22,7 @@ from vibrokit.structure.cycles import find_cycle
 from vibrokit.structure.describe import describe_cycle, describe_orbit, describe_wandering
 from vibrokit.structure.lyapunov import kind_of, lyapunov_exponent
 from vibrokit.structure.orbits import EQUAL, least_period, refine_orbit, same_point, visited
+from vibrokit.structure.scales import size_of
 from vibrokit.structure.survival import follow, watch
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -32,11 +34,15 @@ _LOOSE = 1e-2  # recurrences that are worth a try with Newton's method
 _GUESSES = 8
 _FIRST_WAIT = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for long
+_LEAST_WATCHED = 16
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent; it depends on the steps, so that they are carried exactly
 _LEAST_MEASURED = 1000  # periods
 _LEAST_STARTS = 4
+_VISITS = 2048  # of each survivor, to see which are on one attractor
+_OVERLAP = 4.0  # times the settling distance
 _SAMPLE = 4096  # points of a set that never repeats
+_FAILURES = 8  # states that come to no cycle, after which no more are tried
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
 Array = NDArray[np.float64]
@@ -77,7 +83,7 @@ class Search:
         self.osc, self.means, self.tolerance = osc, means, tolerance
         self.attractors: list[Attractor] = []
         self.survival: tuple[Survival, ...] = ()
-        self.lost = 0
+        self.starts = self.lost = 0
         self.words: list[str] = []
 
     def run(self, states: Array, wait: int, patient: bool) -> None:
@@ -92,6 +98,7 @@ class Search:
             Whether that is as long as the damping asks for. If not, and nothing has settled, it was too short, and
             what goes on says nothing.
         """
+        self.starts = len(states)
         for periods in _schedule(wait):
             states = self._after(states, periods)
             states = self._add_orbits(states, LONGEST_PERIOD)
@@ -99,9 +106,15 @@ class Search:
                 return
         if self.osc.autonomous:
             states = self._add_cycles(states)
-            self.words += [f"{len(states)} starts settled on no equilibrium and no limit cycle."] if len(states) else []
+            some = "Some" if len(states) == _FAILURES else len(states)
+            self.words += [f"{some} starts settled on no equilibrium and no limit cycle."] if len(states) else []
         elif patient or self.attractors:
             self._watch(states)
+
+    @property
+    def _many(self) -> int:
+        """How many starts are followed for long: fewer where contacts are located, trajectory by trajectory."""
+        return _WATCHED if isinstance(self.means.carrier, RK4) else _LEAST_WATCHED
 
     def _after(self, states: Array, periods: int) -> Array:
         """Where the states are some periods later, without those that came to a known orbit and those that are lost."""
@@ -114,7 +127,7 @@ class Search:
         return ended.states[labels == UNSETTLED]
 
     def _known(self, point: Array, tolerance: float) -> bool:
-        return any(same_point(point, known.points, tolerance) for known in self.attractors if known.repeats)
+        return any(same_point(self.osc, point, known.points, tolerance) for known in self.attractors if known.repeats)
 
     def _add_orbits(self, states: Array, longest: int) -> Array:
         """Add the new stable orbits that states lie on; return the states that lie on none."""
@@ -122,7 +135,7 @@ class Search:
         for _ in range(longest):
             history.append(run_ensemble(self.osc, Flow.STATE, self.means.carrier, history[-1], 1).states)
         path = np.array(history)
-        scale = 1.0 + np.abs(path).max(axis=(0, 2))
+        scale = size_of(self.osc) + np.abs(path).max(axis=(0, 2))
         distance = np.linalg.norm(path[1:] - path[0], axis=2) / scale
         close = distance < _RECURRENCE
         settled = close.any(axis=0)
@@ -151,7 +164,7 @@ class Search:
         except StructureError:
             return False
         unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1
-        if unstable or not same_point(point, visited(self.osc, orbit, exact), _NEAR):
+        if unstable or not same_point(self.osc, point, visited(self.osc, orbit, exact), _NEAR):
             return False  # passing by a saddle
         if not self._known(orbit.point, EQUAL):
             self.attractors.append(describe_orbit(self.osc, orbit, exact))
@@ -159,8 +172,10 @@ class Search:
 
     def _add_cycles(self, states: Array) -> Array:
         """Add the limit cycles that states lie on; return the states that lie on none."""
-        osc, left = self.osc, []
+        osc, left = self.osc, list[Array]()
         for state in states:
+            if len(left) == _FAILURES:
+                break
             known = [a.orbit for a in self.attractors if a.kind == "limit cycle"]
             if any(_on(orbit, state) for orbit in known):
                 continue
@@ -179,7 +194,7 @@ class Search:
     def _watch(self, states: Array) -> None:
         """Tell long transients from motion that never settles, by how many survive, at two accuracies."""
         osc, means = self.osc, self.means
-        watched = states[np.linspace(0, len(states) - 1, min(_WATCHED, len(states))).astype(int)]
+        watched = states[np.linspace(0, len(states) - 1, min(self._many, len(states))).astype(int)]
         reports, survivors = [], watched[:0]
         for carrier in (means.carrier, means.carrier.refined()):
             points = [attractor.points for attractor in self.attractors]
@@ -200,10 +215,11 @@ class Search:
             return
         osc, finer = self.osc, self.means.carrier.refined()
         clouds = _clouds(osc, survivors, finer)
-        for group in separate(clouds, self.tolerance):
+        for group in separate(clouds, _OVERLAP * self.tolerance):
             periods = _measuring_time(osc)
             few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
-            estimate = lyapunov_exponent(osc, few, self.means.exact, periods=periods, executor=self.means.executor)
+            carrier = self.means.exact if osc.barriers else finer  # without contacts to locate, steps do as well
+            estimate = lyapunov_exponent(osc, few, carrier, periods=periods, executor=self.means.executor)
             kind = kind_of(estimate)
             if kind is None:
                 self.words.append(
@@ -211,7 +227,8 @@ class Search:
                     "the multipliers are close to 1; raise budget."
                 )
                 continue
-            sample = np.concatenate([clouds[index] for index in group])[:_SAMPLE]
+            visits = np.concatenate([clouds[index] for index in group])
+            sample = visits[:: -(-len(visits) // _SAMPLE)]
             self.attractors.append(describe_wandering(osc, kind, sample, estimate, self.survival, finer))
 
 
@@ -231,9 +248,9 @@ def _measuring_time(osc: Oscillator) -> int:
 
 
 def _clouds(osc: Oscillator, states: Array, stepper: Stepper) -> list[Array]:
-    """Points that each state visits, together as many as a sample has."""
+    """Points that each state visits, enough to fill a closed curve too."""
     visits = [states]
-    for _ in range(max(1, _SAMPLE // len(states)) - 1):
+    for _ in range(_VISITS - 1):
         visits.append(run_ensemble(osc, Flow.STATE, stepper, visits[-1], 1).states)
     return list(np.array(visits).transpose(1, 0, 2))
 

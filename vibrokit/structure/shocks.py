@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Progress, run_ensemble
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -19,6 +18,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.shock import ShapeStability, Shock
 from vibrokit.results.structure import Structure
+from vibrokit.structure.request import check_belongs, check_means, whole
 from vibrokit.structure.settle import Settler
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -69,11 +69,11 @@ def shape_stability(
     Raises
     ------
     StructureError
-        Counts that are not whole numbers, 1 or more.
+        Counts that are not whole numbers, 1 or more; a structure of another scene.
     """
-    for name, count, least in (("phases", phases, 1), ("directions", directions, 4)):
-        if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= _MOST:
-            raise StructureError(f"{name} is {count!r}; give a whole number from {least} to {_MOST}.")
+    check_means(osc, stepper, executor, progress)
+    check_belongs(osc, structure)
+    phases, directions = whole("phases", phases, 1, _MOST), whole("directions", directions, 4, _MOST)
     carrier = stepper or named_stepper(structure.stepper)
     settler = Settler(
         osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, carrier, executor

@@ -14,6 +14,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.cycles import Cycle, equilibrium_exponents, refine_cycle
 from vibrokit.structure.orbits import Orbit, least_period, refine_orbit, visited
+from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -49,7 +50,7 @@ def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper
         return least_period(osc, orbit, stepper)
     # A cycle may happen to close after this time; it does not after every other.
     later = run_ensemble(osc, Flow.STATE, stepper, orbit.point[None], 1, interval=0.618 * interval).states[0]
-    if np.linalg.norm(later - orbit.point) > _RESTING * (1.0 + np.linalg.norm(orbit.point)):
+    if np.linalg.norm(later - orbit.point) > _RESTING * (size_of(osc) + np.linalg.norm(orbit.point)):
         raise StructureError(f"the motion through {tuple(np.round(orbit.point, 6))} is not at rest.")
     return orbit
 

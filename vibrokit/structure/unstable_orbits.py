@@ -17,6 +17,8 @@ from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, visited
 from vibrokit.structure.regions import search_region
+from vibrokit.structure.request import check_means, pair
+from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
 from vibrokit.structure.unstable import branch_fates, describe_unstable, refine_unstable, short_interval
 from vibrokit.symbolic.flow_kind import Flow
@@ -82,8 +84,9 @@ def unstable_orbits(
     NoSectionError
         The excitations have no common period.
     """
+    check_means(osc, stepper, executor, progress)
     _check_period(osc, period)
-    counts = _checked_starts(starts)
+    counts = pair("starts", starts, _MOST_STARTS)
     where = search_region(osc) if region is None else Region.of(region)
     carrier = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
     exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
@@ -147,7 +150,7 @@ class _Newton:
         roots = []
         for _ in range(_ITERATIONS):
             sizes = np.linalg.norm(offsets, axis=1)
-            done = sizes < _CONVERGED * (1.0 + np.linalg.norm(points, axis=1))
+            done = sizes < _CONVERGED * (size_of(self.osc) + np.linalg.norm(points, axis=1))
             roots.append(points[done])
             going = ~done & np.isfinite(steps).all(axis=1) & (shares > _LEAST_SHARE)
             points, offsets, steps, shares, sizes = (a[going] for a in (points, offsets, steps, shares, sizes))
@@ -194,7 +197,7 @@ def _distinct(osc: Oscillator, roots: Array, period: int, stepper: Stepper, apar
             continue
         points = visited(osc, orbit, stepper)
         seen = np.vstack([seen, points])
-        if orbit.period == period and not any(same_point(orbit.point, other, EQUAL) for _, other in known):
+        if orbit.period == period and not any(same_point(osc, orbit.point, other, EQUAL) for _, other in known):
             known.append((orbit, points))
     return known
 
@@ -208,13 +211,3 @@ def _check_period(osc: Oscillator, period: Any) -> None:
         raise StructureError(
             f"period is {period}, but the scene has no periodic excitation; give 1, for its equilibria."
         )
-
-
-def _checked_starts(starts: Any) -> tuple[int, int]:
-    pair = tuple(starts) if isinstance(starts, tuple | list) else ()
-    whole = len(pair) == 2 and all(isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 1 for n in pair)
-    if not whole or pair[0] * pair[1] > _MOST_STARTS:
-        raise StructureError(
-            f"starts is {shown(starts)}; give two whole numbers, 1 or more, whose product is at most {_MOST_STARTS}."
-        )
-    return int(pair[0]), int(pair[1])
