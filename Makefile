@@ -19,7 +19,7 @@ test: .venv/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 docs: .venv/docs.stamp
 	$(BIN)/python -m sphinx -b html docs docs/_build/html

@@ -123,7 +123,7 @@ def _described(attractor: Attractor) -> str:
     hits = (
         "no hits" if attractor.impacts == 0 else f"{attractor.impacts:.3g} hit{'s' if attractor.impacts != 1 else ''}"
     )
-    pressed = [side for side, depth in attractor.peak_depth.items() if depth > 0 and attractor.hits[side] == 0]
+    pressed = [side for side, depth in attractor.peak_depth.items() if depth > 0 and not attractor.hits.get(side)]
     if pressed and attractor.impacts == 0:
         hits = f"pressed on the {pressed[0]} stop"
     return f"{attractor.label}: {kind}, {hits}" + ("" if attractor.repeats or attractor.impacts == 0 else " a period")

@@ -15,8 +15,8 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.structure.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
 from vibrokit.structure.families import Family, Member, short_interval
 
-_MOST_STEPS = 200
-_LONGEST = 0.1  # share of the region's size that a motion may move in one step
+_MOST_STEPS = 800
+_LONGEST = 0.01  # share of the region's size that a motion may move in one step
 _SHORTEST = 1e-6  # the same, below which a family counts as lost
 _ASTRAY = 0.3  # share of a step that Newton's method may correct
 _FAR = 0.01  # share of the region's size that it may correct, whatever the step
