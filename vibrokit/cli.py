@@ -93,6 +93,7 @@ def _run(options: argparse.Namespace) -> None:
     from vibrokit.analyzers.analyzer import Analyzer
     from vibrokit.kernels.named import named_stepper
     from vibrokit.registry import Group, load
+    from vibrokit.results.pictures import checked_picture
     from vibrokit.scene_file import load_scene
     from vibrokit.structure.find import find_structure
 
@@ -100,6 +101,8 @@ def _run(options: argparse.Namespace) -> None:
     for target in (options.output, options.figure):
         if target is not None and not target.parent.is_dir():
             raise VibrokitError(f"{target} would be in {target.parent}, which is no folder; make it first.")
+    if options.figure is not None:
+        checked_picture(options.figure)
     osc = load_scene(options.scene)
     kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
     settings = _settings(options.set)

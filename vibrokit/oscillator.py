@@ -245,6 +245,8 @@ def generator_from(rng: int | np.random.Generator) -> np.random.Generator:
         Neither a generator nor a whole number, 0 or more.
     """
     try:
+        if isinstance(rng, bool):
+            raise TypeError("a truth value")
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
         raise ParameterError(f"rng is {rng!r}; give a whole number, 0 or more, or a numpy.random.Generator.") from error

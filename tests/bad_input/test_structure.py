@@ -106,3 +106,14 @@ def test_any_executor_will_do():
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         found = vk.find_structure(WELL, executor=pool, **QUICK)
     np.testing.assert_array_equal(found.basins.labels, vk.find_structure(WELL, **QUICK).basins.labels)
+
+
+def test_a_folder_that_is_not_there(structure, tmp_path):
+    with pytest.raises(FileNotFoundError, match="which is no folder; make it first"):
+        structure.save(tmp_path / "nowhere" / "x.nc")
+
+
+@pytest.mark.parametrize("rng", [True, -1, "x"])
+def test_seeds_are_whole_numbers(rng):
+    with pytest.raises(VibrokitError, match="rng"):
+        vk.find_structure(WELL, rng=rng, **QUICK)

@@ -173,7 +173,7 @@ def open_content(path: str | os.PathLike[str]) -> Content:
     except ResultFileError:
         raise
     except Exception as error:  # what SciPy and xarray raise at strange bytes is of every kind
-        raise ResultFileError(f"it is no netCDF 3 file, or a damaged one ({type(error).__name__}: {error})") from error
+        raise ResultFileError(f"it is no netCDF 3 file, or a damaged one ({type(error).__name__})") from error
     try:
         header = json.loads(dataset.attrs.pop(HEADER))
     except (KeyError, TypeError, ValueError, RecursionError) as error:

@@ -15,8 +15,8 @@ _DPI = 150
 _FORMATS = (".png", ".pdf", ".svg")
 
 
-def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
-    """Save the figure that some artists are in; the file's ending chooses the format.
+def checked_picture(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a picture that can be written.
 
     Raises
     ------
@@ -26,6 +26,18 @@ def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
     target = Path(path)
     if target.suffix not in _FORMATS:
         raise VibrokitError(f"{target} ends in {target.suffix!r}; a picture ends in {', '.join(_FORMATS)}.")
+    return target
+
+
+def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
+    """Save the figure that some artists are in; the file's ending chooses the format.
+
+    Raises
+    ------
+    VibrokitError
+        An ending other than .png, .pdf or .svg.
+    """
+    target = checked_picture(path)
     content = io.BytesIO()
     artists[0].get_figure().savefig(content, format=target.suffix[1:], dpi=_DPI)
     write_atomically(target, content.getvalue())
