@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
 from vibrokit.errors import VibrokitError
-from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper
+from vibrokit.kernels.choice import CoarseStepsWarning
+from vibrokit.kernels.named import named_stepper
 from vibrokit.results.basins import LEFT, UNSETTLED
-from vibrokit.symbolic.flow_kind import Flow
 
 SCENE = "hertz-0.570"
 GRIDS = (50, 100, 200, 400, 800)
@@ -84,16 +84,8 @@ def tightened(osc, structure, limit: int) -> vk.Structure:
     basins = structure.basins
     return run(
         osc, limit, region=basins.region, cells=basins.labels.shape, margin=None, settling=SETTLING / 10,
-        budget=2 * structure.budget, stepper=carrier(osc, structure).refined(),
+        budget=2 * structure.budget, stepper=named_stepper(structure.stepper).refined(),
     )  # fmt: skip
-
-
-def carrier(osc, structure):
-    """The stepper that carried the cells: the record keeps it as text."""
-    stepper = ensemble_stepper(osc, Flow.STATE)
-    while repr(stepper) != structure.stepper and isinstance(stepper, vk.RK4) and stepper.steps < 2**20:
-        stepper = stepper.refined()
-    return stepper
 
 
 def renamed(structure, reference) -> NDArray[np.int64]:
