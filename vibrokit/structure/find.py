@@ -42,6 +42,7 @@ _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients that a cell is given
 _REFINEMENTS = 4  # of the carrier, until every attractor is one for it too
 _SEARCH_SETTLING = 1e-3
+_MOST_STEPS = 8192  # beyond which locating contacts is as quick
 
 Array = NDArray[np.float64]
 
@@ -165,8 +166,10 @@ class _Finder:
 
     def _search_carrier(self) -> Stepper:
         """Finer than the basins need: a weak attractor must not be lost to the steps."""
-        coarse = self.given is None and isinstance(self.carrier, RK4)
-        return self.carrier.refined().refined() if coarse else self.carrier
+        if self.given is not None or not isinstance(self.carrier, RK4):
+            return self.carrier
+        finer = self.carrier.refined().refined()
+        return finer if finer.steps <= _MOST_STEPS else self.exact
 
     def find_attractors(self, generator: np.random.Generator) -> None:
         """Search from a grid of starts, and see for which carrier every attractor is one."""
