@@ -15,7 +15,8 @@ import numpy as np
 import xarray
 from numpy.typing import DTypeLike, NDArray
 
-from vibrokit.errors import VibrokitError, shown
+from vibrokit.errors import StructureError, VibrokitError, shown
+from vibrokit.results.region import Region
 
 FORMAT = 1
 HEADER = "vibrokit"  # the attribute that holds all texts, as JSON
@@ -135,6 +136,21 @@ def versions_of(header: Any) -> dict[str, str]:
     """Return the versions by name."""
     versions = taken(header, "versions", dict)
     return {str(name): taken(versions, name, str) for name in versions}
+
+
+def region_of(content: Content) -> Region:
+    """Return the region that a grid is laid over.
+
+    Raises
+    ------
+    ResultFileError
+        It is missing, or no region.
+    """
+    x, v = (tuple(bounds) for bounds in content.numbers("region", (2, 2)).tolist())
+    try:
+        return Region(x, v)
+    except StructureError as error:
+        raise ResultFileError(f"its {error}") from error
 
 
 class _ReadOnce(io.BytesIO):

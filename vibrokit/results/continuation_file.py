@@ -6,19 +6,15 @@ import dataclasses
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from vibrokit.errors import StructureError
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.attractor_file import ATTRACTOR_COLUMNS, read_attractors, write_attractors
 from vibrokit.results.basins import UNSETTLED
-from vibrokit.results.columns import BySide, Draft, Number, Rows, Spectrum, Table, Whole, Wholes, Word
-from vibrokit.results.content import Content, ResultFileError, seed_of, taken, versions_of
+from vibrokit.results.columns import Draft, Number, Rows, Table, Whole, Word
+from vibrokit.results.content import Content, ResultFileError, region_of, seed_of, taken, versions_of
 from vibrokit.results.continuation import BIFURCATIONS, Bifurcation, Continuation, SteadyStates
-from vibrokit.results.region import Region
-from vibrokit.results.structure_file import ATTRACTOR_KINDS
-from vibrokit.results.survival import Survival
 from vibrokit.results.writing import write_content
 
 KIND = "continuation"
@@ -27,34 +23,10 @@ _STATES = Table("states", {"value": Number(-np.finfo(float).max, np.finfo(float)
 _ATTRACTORS = Table(
     "attractor",
     {
+        **ATTRACTOR_COLUMNS,
         "label": Whole(UNSETTLED),  # if the work was stopped before they were labelled
-        "kind": Word(ATTRACTOR_KINDS),
-        "period": Whole(),
-        "duration": Number(),
-        "points": Rows(),
-        "orbit": Rows(2),
-        "multipliers": Spectrum(finite=True),
-        "exponents": Spectrum(finite=False),
-        "exponent_error": Number(),
-        "hits": BySide(),
-        "peak_depth": BySide(),
-        "peak_force": BySide(),
         "basin_fraction": Number(),  # NaN if the work was stopped before it
         "basin_fraction_error": Number(),
-        "residual": Number(),
-        "error": Number(),
-    },
-)
-_SURVIVALS = Table(
-    "survival",
-    {
-        "stepper": Word(),
-        "starts": Whole(),
-        "periods": Whole(),
-        "survivors": Whole(),
-        "lifetime": Number(),
-        "lifetime_error": Number(),
-        "settled_after": Wholes(-1),
     },
 )
 _BIFURCATIONS = Table(
@@ -71,7 +43,6 @@ _BIFURCATIONS = Table(
 )
 _OWNERS = "attractor_states"  # which value each attractor belongs to, in ascending order
 _BRANCHES = "attractor_branch"
-_PROOFS = "attractor_survivals"  # how many survivals each attractor has
 
 
 def save_continuation(continuation: Continuation, path: str | os.PathLike[str]) -> None:
@@ -80,13 +51,11 @@ def save_continuation(continuation: Continuation, path: str | os.PathLike[str]) 
     states = continuation.states
     attractors = [attractor for at in states for attractor in at.attractors]
     _STATES.write(draft, states)
-    _ATTRACTORS.write(draft, attractors)
-    _SURVIVALS.write(draft, [survival for attractor in attractors for survival in attractor.survival])
+    write_attractors(draft, _ATTRACTORS, attractors)
     _BIFURCATIONS.write(draft, [_as_row(bifurcation) for bifurcation in continuation.bifurcations])
     owners = np.repeat(np.arange(len(states)), [len(at.attractors) for at in states])
     draft.put(_OWNERS, ("attractor",), owners)
     draft.put(_BRANCHES, ("attractor",), np.array([b for at in states for b in at.branches], dtype=np.int64))
-    draft.put(_PROOFS, ("attractor",), np.array([len(attractor.survival) for attractor in attractors], dtype=np.int64))
     region = continuation.region
     if region is not None:
         draft.put("region", ("axis", "bound"), region.bounds)
@@ -119,7 +88,7 @@ def read_continuation(content: Content) -> Continuation:
         parameter=taken(header, "parameter", str),
         symbol=taken(header, "symbol", str),
         unit=None if header.get("unit", "") is None else taken(header, "unit", str),
-        region=_region(content) if taken(header, "common", bool) else None,
+        region=region_of(content) if taken(header, "common", bool) else None,
         states=_states(content),
         bifurcations=tuple(_bifurcations(content)),
         complete=taken(header, "complete", bool),
@@ -143,13 +112,6 @@ def _bifurcations(content: Content) -> Iterator[Bifurcation]:
         yield Bifurcation(**{**values, "point": values["point"][0]})
 
 
-def _region(content: Content) -> Region:
-    try:
-        return Region.of(content.numbers("region", (2, 2)).tolist())
-    except StructureError as error:
-        raise ResultFileError(f"its {error}") from error
-
-
 def _states(content: Content) -> tuple[SteadyStates, ...]:
     rows = list(_STATES.read(content))
     attractors = _attractors(content)
@@ -167,16 +129,11 @@ def _states(content: Content) -> tuple[SteadyStates, ...]:
     )
 
 
-def _attractors(content: Content) -> list[Attractor]:
-    rows: list[dict[str, Any]] = list(_ATTRACTORS.read(content))
-    survivals = [Survival(**values) for values in _SURVIVALS.read(content)]
-    counts = content.wholes(_PROOFS, (len(rows),), 0, len(survivals)) if rows else np.empty(0, dtype=np.int64)
-    if counts.sum() != len(survivals):
-        raise ResultFileError(f"its attractors claim {counts.sum()} survivals; there are {len(survivals)}")
-    ends = np.cumsum(counts).tolist()
-    attractors = []
-    for row, start, end in zip(rows, [0, *ends], ends, strict=False):
-        if row["points"].ndim != 2 or len(row["points"]) == 0:
-            raise ResultFileError(f"a {row['kind']} state has no points")
-        attractors.append(Attractor(**row, survival=tuple(survivals[start:end])))
+def _attractors(content: Content) -> tuple[Attractor, ...]:
+    attractors, others = read_attractors(content, _ATTRACTORS)
+    if others:
+        raise ResultFileError(f"{len(others)} of its survivals belong to no attractor")
+    for attractor in attractors:
+        if attractor.points.ndim != 2 or len(attractor.points) == 0:
+            raise ResultFileError(f"a {attractor.kind} state has no points")
     return attractors

@@ -10,41 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import shown
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.attractor_file import ATTRACTOR_COLUMNS, read_attractors, write_attractors
 from vibrokit.results.basins import NOT_FOLLOWED, Basins
-from vibrokit.results.columns import BySide, Column, Draft, Flag, Number, Rows, Spectrum, Table, Whole, Wholes, Word
-from vibrokit.results.content import Content, ResultFileError, seed_of, taken, versions_of
+from vibrokit.results.columns import Draft, Flag, Number, Rows, Spectrum, Table, Whole, Wholes, Word
+from vibrokit.results.content import Content, ResultFileError, region_of, seed_of, taken, versions_of
 from vibrokit.results.manifold import Manifold
-from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.results.structure import Structure
-from vibrokit.results.survival import Survival
 from vibrokit.results.writing import write_content
 
 KIND = "structure"
-ATTRACTOR_KINDS = ("periodic", "quasiperiodic", "chaotic", "equilibrium", "limit cycle")
 SADDLE_KINDS = ("saddle", "flip saddle", "repeller", "chaotic")
-_OF_STRUCTURE = -1  # in place of an attractor, where a survival is the structure's own
-
-ATTRACTOR_COLUMNS: Mapping[str, Column] = {
-    "label": Whole(),
-    "kind": Word(ATTRACTOR_KINDS),
-    "period": Whole(),
-    "duration": Number(),
-    "points": Rows(),
-    "orbit": Rows(2),
-    "multipliers": Spectrum(finite=True),
-    "exponents": Spectrum(finite=False),  # −∞ where a multiplier is 0
-    "exponent_error": Number(),
-    "hits": BySide(),
-    "peak_depth": BySide(),
-    "peak_force": BySide(),
-    "basin_fraction": Number(0.0, 1.0),
-    "basin_fraction_error": Number(0.0, 1.0),
-    "residual": Number(),
-    "error": Number(),
-}
 _ATTRACTORS = Table("attractor", ATTRACTOR_COLUMNS)
 _SADDLES = Table(
     "saddle",
@@ -64,30 +42,14 @@ _MANIFOLDS = Table(
     "manifold",
     {"saddle": Whole(), "point": Whole(), "stable": Flag(), "side": Whole(-1, 1), "curve": Rows(2), "status": Word()},
 )
-SURVIVALS = Table(
-    "survival",
-    {
-        "stepper": Word(),
-        "starts": Whole(),
-        "periods": Whole(),
-        "survivors": Whole(),
-        "lifetime": Number(),
-        "lifetime_error": Number(),
-        "settled_after": Wholes(-1),
-    },
-)
-_PROOFS = "attractor_survival_count"  # survivals stand attractor by attractor, those of the structure itself last
 
 
 def save_structure(structure: Structure, path: str | os.PathLike[str]) -> None:
     """Write a structure to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
     draft = Draft()
-    _ATTRACTORS.write(draft, structure.attractors)
+    write_attractors(draft, _ATTRACTORS, structure.attractors, structure.survival)
     _SADDLES.write(draft, structure.saddles)
     _MANIFOLDS.write(draft, structure.manifolds)
-    proofs = [attractor.survival for attractor in structure.attractors]
-    SURVIVALS.write(draft, [survival for some in (*proofs, structure.survival) for survival in some])
-    draft.put(_PROOFS, ("attractor",), np.array([len(some) for some in proofs]))
     draft.put("region", ("axis", "bound"), structure.basins.region.bounds)
     draft.put("basin", ("cell_x", "cell_v"), structure.basins.labels)
     draft.header.update(
@@ -114,7 +76,10 @@ def read_structure(content: Content) -> Structure:
         Something is missing, of another shape or kind, or contradicts the rest.
     """
     header = content.header
-    attractors, survival = _attractors(content)
+    attractors, survival = read_attractors(content, _ATTRACTORS)
+    for place, attractor in enumerate(attractors):
+        if attractor.label != place:
+            raise ResultFileError(f"attractor {place} has label {attractor.label}; the two must be the same")
     saddles = tuple(Saddle(**values) for values in _SADDLES.read(content))
     saddles = tuple(dataclasses.replace(saddle, leads_to=tuple(map(int, saddle.leads_to))) for saddle in saddles)
     for saddle in saddles:
@@ -137,28 +102,6 @@ def read_structure(content: Content) -> Structure:
         seconds=taken(header, "seconds", float),
         versions=versions_of(header),
     )
-
-
-def _attractors(content: Content) -> tuple[tuple[Attractor, ...], tuple[Survival, ...]]:
-    """Attractors, each with its evidence, and the evidence that is the structure's own."""
-    records = list(_ATTRACTORS.read(content))
-    survivals = [Survival(**values) for values in SURVIVALS.read(content)]
-    for survival in survivals:
-        if not (survival.survivors <= survival.starts == len(survival.settled_after)):
-            raise ResultFileError(
-                f"a survival has {survival.starts} starts, {survival.survivors} survivors and "
-                f"{len(survival.settled_after)} times, which do not go together"
-            )
-    counts = content.wholes(_PROOFS, (len(records),), 0, len(survivals)) if records else np.empty(0, dtype=np.int64)
-    cuts = np.cumsum(counts).tolist()
-    if cuts and cuts[-1] > len(survivals):
-        raise ResultFileError(f"its attractors claim {cuts[-1]} survivals; there are {len(survivals)}")
-    own = [tuple(survivals[start:end]) for start, end in zip([0, *cuts], cuts, strict=False)]
-    attractors = tuple(Attractor(**values, survival=some) for values, some in zip(records, own, strict=True))
-    for place, attractor in enumerate(attractors):
-        if attractor.label != place:
-            raise ResultFileError(f"attractor {place} has label {attractor.label}; the two must be the same")
-    return attractors, tuple(survivals[cuts[-1] if cuts else 0 :])
 
 
 def _check_points(attractors: Sequence[Attractor], saddles: Sequence[Saddle]) -> None:
@@ -184,14 +127,9 @@ def _manifolds(content: Content, saddles: Sequence[Saddle]) -> tuple[Manifold, .
 
 
 def _basins(content: Content, attractors: int) -> Basins:
-    low, high = content.numbers("region", (2, 2)).T.tolist()
-    try:
-        region = Region((low[0], high[0]), (low[1], high[1]))
-    except StructureError as error:
-        raise ResultFileError(f"its {error}") from error
     highest = min(attractors - 1, np.iinfo(np.int16).max)
     labels = content.wholes("basin", (None, None), NOT_FOLLOWED, highest, dtype=np.int16)
-    return Basins(region, labels.astype(np.int16, copy=False))
+    return Basins(region_of(content), labels.astype(np.int16, copy=False))
 
 
 def _scene(header: Mapping[str, Any]) -> dict[str, Any]:
