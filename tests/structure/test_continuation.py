@@ -172,6 +172,13 @@ def test_pictures(paper):
     assert len(paper.plot_fractions()) >= len(paper.branches)
 
 
+def test_cells_that_lead_nowhere_are_told_once_at_each_value():
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
+    region = ((-1.5, 1.5), (-1.5, 1.5))
+    result = continuation(osc, "damping_ratio", [0.1, 0.2], region=region, cells=(15, 15), starts=(6, 6))
+    assert [at.status.count("of the cells left the region.") for at in result.states] == [1, 1]
+
+
 def test_values_that_the_scene_refuses_stand_with_the_reason():
     result = continuation(vk.load_scene("duffing"), "damping_ratio", [-0.1, 0.0, 0.05], cells=(8, 8), starts=(6, 6))
     refused, undamped, damped = result.states

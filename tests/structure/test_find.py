@@ -5,9 +5,10 @@ from scipy.optimize import fsolve
 
 import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED
+from vibrokit.results.basins import LEFT, NOT_FOLLOWED, Basins
 from vibrokit.results.region import Region
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.status import fates_of
 
 
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
@@ -164,6 +165,13 @@ def test_what_escapes_is_said_to_have_left():
     assert structure.basins.fraction(0) + structure.basins.fraction(LEFT) == pytest.approx(1.0)
     assert "left the region" in structure.status
     assert sorted(round(saddle.points[0, 0], 9) for saddle in structure.saddles) == [-1.0, 1.0]
+
+
+@pytest.mark.parametrize(("left", "share"), [(1000, "100%"), (123, "12%"), (7, "0.7%")])
+def test_shares_are_said_to_two_digits(left, share):
+    labels = np.where(np.arange(1000) < left, LEFT, 0).astype(np.int16)
+    basins = Basins(Region((0, 1), (0, 1)), labels.reshape(25, 40))
+    assert fates_of(basins) == [f"{share} of the cells left the region."]
 
 
 @pytest.mark.parametrize("stage", ["settle_grid", "find_saddles", "grow_manifolds"])

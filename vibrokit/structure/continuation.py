@@ -5,7 +5,6 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import math
-import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from numbers import Integral, Real
@@ -29,6 +28,7 @@ from vibrokit.structure.find import find_structure
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.shares import share_out
+from vibrokit.structure.status import fates_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _FEW = (2, 2)  # cells where only the attractors are wanted
@@ -218,9 +218,11 @@ def _search(osc: Oscillator, path: str, value: float, settings: dict[str, Any]) 
     except VibrokitError as error:
         return _Found(value, (), None, 0, True, str(error))
     # The few cells of this grid say nothing of the basins, which are found once all attractors are known.
-    words = [word for word in re.split(r"(?<=\.) ", structure.status) if "of the cells" not in word]
+    status = structure.status
+    for sentence in fates_of(structure.basins):
+        status = status.replace(f" {sentence}", "")
     region, budget = structure.basins.region, structure.budget
-    return _Found(value, structure.attractors, region, budget, structure.complete, " ".join(words))
+    return _Found(value, structure.attractors, region, budget, structure.complete, status)
 
 
 def _union(bounds: list[Array]) -> Region | None:

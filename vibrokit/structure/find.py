@@ -31,8 +31,9 @@ from vibrokit.structure.manifolds import grow_manifolds
 from vibrokit.structure.regions import frame_of, search_region
 from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.saddles import find_saddles
-from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, persistent
+from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, lasting_carrier
 from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.structure.shares import with_basin
 from vibrokit.structure.status import lies_in, none_inside, nothing_found, status_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -40,7 +41,6 @@ _FOLDS = 30  # e-foldings of the linear damping that a transient is given
 _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients that a cell is given
-_REFINEMENTS = 4  # of the carrier, until every attractor is one for it too
 _SEARCH_SETTLING = 1e-3
 _MOST_STEPS = 8192  # beyond which locating contacts is as quick
 
@@ -181,11 +181,8 @@ class _Finder:
         self._settle_order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
             raise StructureError(none_inside(self.region, self.attractors))
-        tolerance = self.tolerance
-        for _ in range(_REFINEMENTS):
-            if self.given is not None or persistent(self.osc, self.attractors, self.carrier, tolerance):
-                break
-            self.carrier = self.carrier.refined()
+        if self.given is None:
+            self.carrier = lasting_carrier(self.osc, self.attractors, self.carrier, self.tolerance)
         lifetimes = [report.lifetime for report in self.search.survival if np.isfinite(report.lifetime)]
         if self.request.budget is None and lifetimes:
             self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
@@ -215,7 +212,7 @@ class _Finder:
         self.basins = settle_grid(
             self.settler(), request.cells, margin=request.margin, refine=request.refine, progress=self.progress
         )
-        self.attractors = tuple(_with_basin(attractor, self.basins) for attractor in self.attractors)
+        self.attractors = tuple(with_basin(attractor, self.basins) for attractor in self.attractors)
         if (self.basins.labels == NOT_FOLLOWED).any():
             raise KeyboardInterrupt
 
@@ -292,9 +289,3 @@ def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.ra
     shift = (rng.random(2) - 0.5) * (high - low) / np.array(counts)
     extra = len(osc.noise.extra_states) if osc.noise else 0
     return np.pad(region.cell_centres(counts) + shift, ((0, 0), (0, extra)))
-
-
-def _with_basin(attractor: Attractor, basins: Basins) -> Attractor:
-    share = basins.fraction(attractor.label)
-    error = math.sqrt(share * (1 - share) / basins.labels.size)
-    return dataclasses.replace(attractor, basin_fraction=share, basin_fraction_error=error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,7 @@ _VISITS = 2048  # of each survivor, to see which are on one attractor
 _OVERLAP = 4.0  # times the settling distance
 _SAMPLE = 4096  # points of a set that never repeats
 _FAILURES = 8  # states that come to no cycle, after which no more are tried
+_REFINEMENTS = 4  # of a carrier, until every attractor is one for it too
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
 Array = NDArray[np.float64]
@@ -261,12 +263,17 @@ def _on(orbit: Array, point: Array) -> bool:
     return bool(np.linalg.norm(orbit - point[:2], axis=1).min() <= spacing)
 
 
-def persistent(osc: Oscillator, attractors: tuple[Attractor, ...], carrier: Stepper, tolerance: float) -> bool:
-    """Whether every attractor is one for a carrier too: what starts on it is on it after long."""
-    return all(_persists(osc, attractor, carrier, tolerance) for attractor in attractors)
+def lasting_carrier(osc: Oscillator, attractors: Sequence[Attractor], carrier: Stepper, tolerance: float) -> Stepper:
+    """Return a carrier, refined until every attractor is one for it too, or as often as is worth it."""
+    for _ in range(_REFINEMENTS):
+        if all(_persists(osc, attractor, carrier, tolerance) for attractor in attractors):
+            break
+        carrier = carrier.refined()
+    return carrier
 
 
 def _persists(osc: Oscillator, attractor: Attractor, carrier: Stepper, tolerance: float) -> bool:
+    """Whether what starts on an attractor is on it after long."""
     states, periods = attractor.points[:1], 2000
     if attractor.kind == "limit cycle":
         (end,) = run_ensemble(osc, Flow.STATE, carrier, states, periods).states

@@ -6,21 +6,18 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED
+from vibrokit.results.basins import NOT_FOLLOWED, Basins
 from vibrokit.results.region import Region
-from vibrokit.structure.search import persistent
+from vibrokit.structure.search import lasting_carrier
 from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.structure.status import fates_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _SETTLING = 1e-3
-_REFINEMENTS = 4  # of the carrier, until every attractor is one for it too
-_FATES = {UNSETTLED: "did not settle in the time given", LEFT: "left the region", NOT_FOLLOWED: "were not followed"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,21 +49,16 @@ def share_out(
     """Find the share of a region's cells that lead to each of some attractors, and label these by their place."""
     own = tuple(dataclasses.replace(attractor, label=label) for label, attractor in enumerate(attractors))
     tolerance = _SETTLING * region.size
-    carrier = stepper or ensemble_stepper(osc, Flow.STATE)
-    for _ in range(_REFINEMENTS if stepper is None else 0):
-        if persistent(osc, own, carrier, tolerance):
-            break
-        carrier = carrier.refined()
-    labels = settle_grid(Settler(osc, own, region, tolerance, budget, carrier), cells).labels
-    shares = [float(np.mean(labels == attractor.label)) for attractor in own]
-    fates = [(float(np.mean(labels == label)), fate) for label, fate in _FATES.items()]
-    words = tuple(f"{100 * share:.2g}% of the cells {fate}." for share, fate in fates if share)
-    if (labels == NOT_FOLLOWED).any():
+    carrier = stepper or lasting_carrier(osc, own, ensemble_stepper(osc, Flow.STATE), tolerance)
+    basins = settle_grid(Settler(osc, own, region, tolerance, budget, carrier), cells)
+    words = tuple(fates_of(basins))
+    if (basins.labels == NOT_FOLLOWED).any():
         return Shared(own, False, words)
-    measured = tuple(
-        dataclasses.replace(
-            attractor, basin_fraction=share, basin_fraction_error=math.sqrt(share * (1 - share) / labels.size)
-        )
-        for attractor, share in zip(own, shares, strict=True)
-    )
-    return Shared(measured, True, words)
+    return Shared(tuple(with_basin(attractor, basins) for attractor in own), True, words)
+
+
+def with_basin(attractor: Attractor, basins: Basins) -> Attractor:
+    """Return an attractor with its share of the cells, and the standard error of that as a share of the region."""
+    share = basins.fraction(attractor.label)
+    error = math.sqrt(share * (1 - share) / basins.labels.size)
+    return dataclasses.replace(attractor, basin_fraction=share, basin_fraction_error=error)

@@ -34,11 +34,14 @@ def status_of(search: Search, count: int, basins: Basins, missing: str, words: l
     if search.lost:
         found.append(f"{search.lost} starts ran out of range.")
     found += [*search.words, *(f"{report}." for report in search.survival)]
-    for label, fate in _FATES.items():
-        share = basins.fraction(label)
-        if share:
-            found.append(f"{_percent(share)}% of the cells {fate}.")
+    found += fates_of(basins)
     return " ".join([*found, *(word for word in words if word)])
+
+
+def fates_of(basins: Basins) -> list[str]:
+    """Return what became of the cells that lead to no attractor, as sentences."""
+    shares = [(basins.fraction(label), fate) for label, fate in _FATES.items()]
+    return [f"{_percent(share)}% of the cells {fate}." for share, fate in shares if share]
 
 
 def _percent(share: float) -> str:
