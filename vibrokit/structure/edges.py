@@ -19,6 +19,7 @@ from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import LEFT, Basins
+from vibrokit.structure.regions import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
@@ -146,15 +147,13 @@ class Straddles:
         only : collection of (int, int), optional
             Pairs of labels to begin between, the lower first; all that meet by default.
         """
-        osc = settler.osc
-        extra = len(osc.noise.extra_states) if osc.noise else 0
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
         for pair, cells in meeting_cells(basins).items():
             if only is None or pair in only:
                 lines.append(spread(centres[cells], trackers, rng))
                 origins.append(np.tile(pair, (len(lines[-1]), 1)))
-        ends = np.pad(np.concatenate(lines), ((0, 0), (0, 0), (0, extra)))
+        ends = states_at(settler.osc, np.concatenate(lines))
         width = _WIDTH * basins.region.size
         return cls(settler, ends, np.concatenate(origins), width, rng)
 

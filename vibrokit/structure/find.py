@@ -28,7 +28,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.manifolds import grow_manifolds
-from vibrokit.structure.regions import frame_of, search_region
+from vibrokit.structure.regions import frame_of, search_region, states_at
 from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.saddles import find_saddles
 from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, lasting_carrier
@@ -287,5 +287,4 @@ def _wait(osc: Oscillator) -> int:
 def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.random.Generator) -> Array:
     low, high = region.bounds.T
     shift = (rng.random(2) - 0.5) * (high - low) / np.array(counts)
-    extra = len(osc.noise.extra_states) if osc.noise else 0
-    return np.pad(region.cell_centres(counts) + shift, ((0, 0), (0, extra)))
+    return states_at(osc, region.cell_centres(counts) + shift)

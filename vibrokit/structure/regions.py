@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
@@ -13,6 +14,14 @@ from vibrokit.structure.scales import length_of
 
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
+
+Array = NDArray[np.float64]
+
+
+def states_at(osc: Oscillator, places: Array) -> Array:
+    """Return states (…, n) at places (…, 2); states of the noise are 0."""
+    extra = len(osc.noise.extra_states) if osc.noise else 0
+    return np.pad(places, (*[(0, 0)] * (places.ndim - 1), (0, extra)))
 
 
 def search_region(osc: Oscillator) -> Region:

@@ -14,6 +14,7 @@ from vibrokit.kernels.stopping import RAN_OUT
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.regions import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 _AHEAD = 2  # sections over which a cell that answers must be carried to such cells
@@ -67,8 +68,7 @@ def centres(osc: Oscillator, region: Region, shape: tuple[int, ...], cells: Whol
     """Return states (count, n) at the centres of some cells; states of the noise are 0."""
     low, high = region.bounds.T
     places = np.stack(np.unravel_index(cells, shape), axis=1)
-    extra = len(osc.noise.extra_states) if osc.noise else 0
-    return np.pad(low + (high - low) * (places + 0.5) / np.array(shape), ((0, 0), (0, extra)))
+    return states_at(osc, low + (high - low) * (places + 0.5) / np.array(shape))
 
 
 def _images(

@@ -16,7 +16,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, visited
-from vibrokit.structure.regions import search_region
+from vibrokit.structure.regions import search_region, states_at
 from vibrokit.structure.request import check_means, pair
 from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
@@ -90,10 +90,9 @@ def unstable_orbits(
     where = search_region(osc) if region is None else Region.of(region)
     carrier = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
     exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
-    extra = len(osc.noise.extra_states) if osc.noise else 0
     mapping = stepper or ensemble_stepper(osc, Flow.STATE)
     turning = _turning_cells(osc, period, where, (_FINER * counts[0], _FINER * counts[1]), mapping, executor)
-    begin = np.pad(np.concatenate([where.cell_centres(counts), turning]), ((0, 0), (0, extra)))
+    begin = states_at(osc, np.concatenate([where.cell_centres(counts), turning]))
     roots = _Newton(osc, period, carrier, where.size, executor, progress).roots(begin)
     found = []
     for orbit, points in _distinct(osc, roots, period, exact, _APART * where.size):
@@ -115,9 +114,8 @@ def _turning_cells(
     """Return centres (count, 2) of cells round which the map takes x both ways and v both ways."""
     axes = [np.linspace(low, high, count + 1) for (low, high), count in zip(region.bounds, cells, strict=True)]
     corners = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    extra = len(osc.noise.extra_states) if osc.noise else 0
     ended = run_ensemble(
-        osc, Flow.STATE, stepper, np.pad(corners, ((0, 0), (0, extra))), period,
+        osc, Flow.STATE, stepper, states_at(osc, corners), period,
         interval=short_interval(osc), executor=executor,
     )  # fmt: skip
     moved = (ended.states[:, :2] - corners).reshape(cells[0] + 1, cells[1] + 1, 2)
