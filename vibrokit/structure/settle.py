@@ -18,6 +18,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.arrival import arrival_at
 from vibrokit.structure.sharing import agreeing, centres, core_of
 from vibrokit.structure.spread import Painting, is_spread, paint
 from vibrokit.symbolic.flow_kind import Flow
@@ -108,10 +109,8 @@ class Settler:
     @cached_property
     def points(self) -> Stop:
         """The test for having reached an orbit or an equilibrium."""
-        places = [(place, a.points[:, :2]) for place, a in enumerate(self.attractors) if not is_spread(a)]
-        points = np.concatenate([np.empty((0, 2)), *(points for _, points in places)])
-        labels = np.repeat([place for place, _ in places], [len(points) for _, points in places])
-        return Stop(points=points, point_labels=labels.astype(np.int64), tolerance=self.tolerance)
+        orbits = {place: a.points for place, a in enumerate(self.attractors) if not is_spread(a)}
+        return arrival_at(orbits, self.tolerance)
 
     @cached_property
     def entering(self) -> Stop:

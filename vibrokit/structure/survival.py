@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from vibrokit.kernels.ensemble import Ensemble, Progress, Stop, run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, Progress, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import RAN_OUT, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.results.survival import Survival
+from vibrokit.structure.arrival import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
 _SIGNIFICANT = 3.0  # standard errors
@@ -48,12 +49,7 @@ def follow(
     labels : int64 array (count,)
         Index of the orbit that each start came to; UNSETTLED for those that go on, LEFT for numbers out of range.
     """
-    known = [np.asarray(points, dtype=float)[:, :2] for points in orbits]
-    stop = Stop(
-        points=np.concatenate([np.empty((0, 2)), *known]),
-        point_labels=np.repeat(np.arange(len(known)), [len(points) for points in known]),
-        tolerance=tolerance,
-    )
+    stop = arrival_at(dict(enumerate(orbits)), tolerance)
     ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor, progress=progress)
     return ended, np.where(ended.status == REACHED, ended.label, np.where(ended.status == RAN_OUT, UNSETTLED, LEFT))
 
