@@ -1,8 +1,10 @@
-"""Periodic orbits: refined by Newton on the variational equations."""
+"""Periodic orbits: refined by Newton on the variational equations; what is said of every closed orbit."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,3 +116,37 @@ def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) ->
     """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion."""
     nearest = np.linalg.norm(known - point, axis=1).min()
     return bool(nearest < tolerance * (size_of(osc) + np.abs(known).max()))
+
+
+def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:
+    """Return the rates of growth (s⁻¹) that multipliers over some time stand for; −∞ for a multiplier 0."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(multipliers) / duration, dtype=np.complex128)
+
+
+def moved_by_tightening(point: Array, refined: Callable[[Stepper], Array], stepper: Stepper, times: int) -> float:
+    """Return how far a point of an orbit moves when the integration is tightened.
+
+    Parameters
+    ----------
+    point : array (n,)
+    refined : callable
+        Returns the point as a stepper has it; raises StructureError where there is no such orbit for it.
+    stepper : Stepper
+        What the point was found with.
+    times : int
+        How often the stepper is refined.
+
+    Returns
+    -------
+    float
+        The largest distance; infinite if at a finer setting there is no such orbit.
+    """
+    furthest, finer = 0.0, stepper
+    for _ in range(times):
+        finer = finer.refined()
+        try:
+            furthest = max(furthest, float(np.linalg.norm(refined(finer) - point)))
+        except StructureError:
+            return math.inf
+    return furthest

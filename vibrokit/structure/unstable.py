@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +11,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.cycles import Cycle, equilibrium_exponents, refine_cycle
-from vibrokit.structure.orbits import Orbit, least_period, refine_orbit, visited
+from vibrokit.structure.orbits import Orbit, exponents_of, least_period, moved_by_tightening, refine_orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
 from vibrokit.symbolic.flow_kind import Flow
@@ -26,6 +24,7 @@ _CLEAR = 100.0  # times the error of the carrier at the saddle, if that is more
 _LARGEST_DEPARTURE = 1e-2
 _ON_A_BRANCH = 16
 _ROUND = 32  # directions that a repeller is left in
+_TIGHTENED = 2  # times, for the error
 
 Array = NDArray[np.float64]
 
@@ -70,11 +69,15 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
     interval = short_interval(osc)
     if interval is None:
         duration = orbit.period * osc.section_interval
-        exponents = _logarithms(multipliers) / duration
+        exponents = exponents_of(multipliers, duration)
     else:
         duration = 0.0
         exponents = equilibrium_exponents(osc, orbit.point, stepper)
         multipliers = np.exp(exponents * osc.section_interval)
+
+    def refined(finer: Stepper) -> Array:
+        return refine_orbit(osc, orbit.point, orbit.period, finer, interval=interval).point
+
     return Saddle(
         kind=kind_of(multipliers),
         period=orbit.period,
@@ -84,23 +87,27 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         exponents=exponents,
         leads_to=leads_to,
         residual=orbit.residual,
-        error=_moved(osc, orbit, stepper),
+        error=moved_by_tightening(orbit.point, refined, stepper, _TIGHTENED),
     )
 
 
 def describe_unstable_cycle(osc: Oscillator, cycle: Cycle, stepper: Stepper, leads_to: tuple[int, ...]) -> Saddle:
     """Describe an unstable limit cycle of an autonomous scene; no direction in (x, v) but its own leads to it."""
     multipliers = sorted_multipliers(cycle.monodromy)
+
+    def refined(finer: Stepper) -> Array:
+        return refine_cycle(osc, cycle.point, cycle.duration, finer).point
+
     return Saddle(
         kind="repeller",
         period=1,
         duration=cycle.duration,
         points=cycle.point[None],
         multipliers=multipliers,
-        exponents=_logarithms(multipliers) / cycle.duration,
+        exponents=exponents_of(multipliers, cycle.duration),
         leads_to=leads_to,
         residual=cycle.residual,
-        error=_cycle_moved(osc, cycle, stepper),
+        error=moved_by_tightening(cycle.point, refined, stepper, _TIGHTENED),
     )
 
 
@@ -116,36 +123,6 @@ def sorted_multipliers(monodromy: Array) -> NDArray[np.complex128]:
     """Return eigenvalues, the largest first; of a complex pair the one above the real axis first."""
     values = np.linalg.eigvals(monodromy).astype(complex)
     return values[np.lexsort((-values.imag, -np.abs(values).round(14)))]
-
-
-def _logarithms(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    with np.errstate(divide="ignore"):
-        return np.log(multipliers)
-
-
-def _moved(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> float:
-    """How far the point moves when the integration is tightened, and tightened again."""
-    furthest, finer = 0.0, stepper
-    for _ in range(2):
-        finer = finer.refined()
-        try:
-            tighter = refine_orbit(osc, orbit.point, orbit.period, finer, interval=short_interval(osc))
-        except StructureError:  # at a finer setting there is no such orbit
-            return math.inf
-        furthest = max(furthest, float(np.linalg.norm(tighter.point - orbit.point)))
-    return furthest
-
-
-def _cycle_moved(osc: Oscillator, cycle: Cycle, stepper: Stepper) -> float:
-    furthest, finer = 0.0, stepper
-    for _ in range(2):
-        finer = finer.refined()
-        try:
-            tighter = refine_cycle(osc, cycle.point, cycle.duration, finer)
-        except StructureError:
-            return math.inf
-        furthest = max(furthest, float(np.linalg.norm(tighter.point - cycle.point)))
-    return furthest
 
 
 def branch_fates(settler: Settler, orbit: Orbit) -> tuple[int, ...]:
