@@ -92,18 +92,56 @@ def shape_stability(
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Rays:
-    """Straight lines out of the attractor: where and when each starts, and which way it goes."""
+class _Moment:
+    """A state of the attractor, and how it is come to.
 
-    states: Array
-    times: Array
+    Attributes
+    ----------
+    origin : array (n,)
+        A point of the attractor on the section.
+    lag : float
+        Time from there to the state (s).
+    state : array (n,)
+    time : float
+        Of the state after the section (s): the lag, but 0 in an autonomous scene, where all times are alike.
+    """
+
+    origin: Array
+    lag: float
+    state: Array
+    time: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Rays:
+    """Straight lines out of the attractor: which of some moments each starts at, and which way it goes."""
+
+    moments: list[_Moment]
+    starts: NDArray[np.intp]
     angles: Array
 
+    @classmethod
+    def from_each(cls, moments: list[_Moment], angles: Array) -> _Rays:
+        """All angles at every moment."""
+        return cls(moments, np.repeat(np.arange(len(moments)), len(angles)), np.tile(angles, len(moments)))
+
     def __len__(self) -> int:
-        return len(self.states)
+        return len(self.starts)
+
+    @property
+    def states(self) -> Array:
+        return np.array([moment.state for moment in self.moments])[self.starts]
+
+    @property
+    def times(self) -> Array:
+        return np.array([moment.time for moment in self.moments])[self.starts]
 
     def chosen(self, which: Any) -> _Rays:
-        return _Rays(self.states[which], self.times[which], self.angles[which])
+        return _Rays(self.moments, self.starts[which], self.angles[which])
+
+    def only(self) -> tuple[_Moment, float]:
+        """Where a single ray starts, and its angle."""
+        return self.moments[int(self.starts[0])], float(self.angles[0])
 
 
 class _Hunt:
@@ -117,7 +155,7 @@ class _Hunt:
     def smallest(self, angles: Array, width: float, phases: int) -> Shock | None:
         """Look at all times and angles first, then ever closer round the best; `width` is the angle between two."""
         moments, step = self._moments(phases)
-        rays = self._rays(moments, angles)
+        rays = _Rays.from_each(moments, angles)
         low, high, fates = self._bracket(rays, np.zeros(len(rays)), np.full(len(rays), self.reach))
         if not np.isfinite(high).any():
             return None
@@ -125,8 +163,8 @@ class _Hunt:
         for _ in range(_ZOOMS if self.attractor.repeats else 0):
             width, step = width / _ZOOM, step / _ZOOM
             offsets = np.arange(-_ZOOM, _ZOOM + 1)
-            near = np.unique(best[1].angles[0] + width * offsets)
-            rays = self._rays(self._near(best[1], step * offsets), near)
+            moment, angle = best[1].only()
+            rays = _Rays.from_each(self._near(moment, step * offsets), np.unique(angle + width * offsets))
             around = best[2] * (1 + 1e-9), 0.5 * best[2]
             low, high, fates = self._bracket(rays, np.full(len(rays), around[1]), np.full(len(rays), around[0]))
             if np.isfinite(high).any():
@@ -134,67 +172,47 @@ class _Hunt:
                 error = max(best[2] - found[2], found[3])
                 best = (found[0], found[1], found[2], error) if found[2] <= best[2] else best
         fate, ray, size, error = best
-        state, time = ray.states[0], float(ray.times[0])
-        return Shock(self.attractor.label, fate, size, error, self._kick(ray.angles, np.array([size]))[0], state, time)
+        moment, _ = ray.only()
+        kick = self._kick(ray.angles, np.array([size]))[0]
+        return Shock(self.attractor.label, fate, size, error, kick, moment.state, moment.time)
 
-    def _moments(self, phases: int) -> tuple[list[tuple[Array, float]], float]:
-        """States of the attractor with their times after the section; and the time between two."""
-        attractor, osc = self.attractor, self.osc
+    def _moments(self, phases: int) -> tuple[list[_Moment], float]:
+        """States of the attractor all along it; and the time between two."""
+        attractor = self.attractor
         if attractor.kind == "equilibrium":
-            return [(attractor.points[0], 0.0)], 0.0
-        if attractor.kind == "limit cycle":
-            step = attractor.duration / phases
-            return [(self._carried(attractor.points[0], 0.0, k * step), 0.0) for k in range(phases)], step
-        step = osc.section_interval / phases
+            return [_Moment(attractor.points[0], 0.0, attractor.points[0], 0.0)], 0.0
+        step = (attractor.duration if attractor.kind == "limit cycle" else self.osc.section_interval) / phases
         points = attractor.points[: attractor.period or _SETS]
-        return [(self._carried(point, 0.0, k * step), k * step) for point in points for k in range(phases)], step
+        return [self._moment(point, k * step) for point in points for k in range(phases)], step
 
-    def _near(self, ray: _Rays, offsets: Array) -> list[tuple[Array, float]]:
-        """The same motion a little earlier and later, within the period that the ray is in."""
-        state, time, interval = ray.states[0], float(ray.times[0]), self.osc.section_interval
-        if self.attractor.kind == "equilibrium":
-            return [(state, time)]
-        if self.attractor.kind == "limit cycle":
-            start, phase = self.attractor.points[0], self._phase_of(state)
-            return [(self._carried(start, 0.0, (phase + o) % self.attractor.duration), 0.0) for o in offsets]
-        start = self._section_point(state, time)
-        times = np.unique(np.clip(time + offsets, 0.0, interval * (1 - 1e-12)))
-        return [(self._carried(start, 0.0, float(t)), float(t)) for t in times]
+    def _near(self, moment: _Moment, offsets: Array) -> list[_Moment]:
+        """The same motion a little earlier and later, within the period that the moment is in."""
+        kind, duration = self.attractor.kind, self.attractor.duration
+        if kind == "equilibrium":
+            return [moment]
+        if kind == "limit cycle":
+            lags = (moment.lag + offsets) % duration
+        else:
+            lags = np.unique(np.clip(moment.lag + offsets, 0.0, self.osc.section_interval * (1 - 1e-12)))
+        return [self._moment(moment.origin, float(lag)) for lag in lags]
 
-    def _section_point(self, state: Array, time: float) -> Array:
-        """The point of the section that leads to a state of the attractor in some time."""
-        points = self.attractor.points
-        ahead = np.array([self._carried(point, 0.0, time) for point in points])
-        return points[int(np.argmin(np.linalg.norm(ahead - state, axis=1)))]
-
-    def _phase_of(self, state: Array) -> float:
-        """Time along a limit cycle at which a state lies on it."""
-        orbit = self.attractor.orbit
-        nearest = int(np.argmin(np.linalg.norm(orbit - state[:2], axis=1)))
-        return self.attractor.duration * nearest / (len(orbit) - 1)
-
-    def _carried(self, state: Array, start: float, duration: float) -> Array:
-        if duration == 0.0:
-            return state
-        ended = run_ensemble(
-            self.osc, Flow.STATE, self.settler.stepper, state[None], 1, start_time=start, interval=duration
-        )
-        return ended.states[0]
-
-    def _rays(self, moments: list[tuple[Array, float]], angles: Array) -> _Rays:
-        states = np.repeat([state for state, _ in moments], len(angles), axis=0)
-        return _Rays(states, np.repeat([time for _, time in moments], len(angles)), np.tile(angles, len(moments)))
+    def _moment(self, origin: Array, lag: float) -> _Moment:
+        state = origin
+        if lag > 0:
+            ended = run_ensemble(self.osc, Flow.STATE, self.settler.stepper, origin[None], interval=lag)
+            state = ended.states[0]
+        return _Moment(origin, lag, state, 0.0 if self.attractor.kind == "limit cycle" else lag)
 
     def _kick(self, angles: Array, sizes: Array) -> Array:
         return np.stack([sizes * np.cos(angles) / self.osc.natural_frequency, sizes * np.sin(angles)], axis=1)
 
     def _fates(self, rays: _Rays, sizes: Array) -> NDArray[np.int64]:
         """Where the states at some distance along the rays lead, time by time."""
-        states = rays.states.copy()
+        states, times = rays.states, rays.times
         states[:, :2] += self._kick(rays.angles, sizes)
         fates = np.empty(len(rays), dtype=np.int64)
-        for time in np.unique(rays.times):
-            now = rays.times == time
+        for time in np.unique(times):
+            now = times == time
             fates[now] = self.settler.labels(states[now], start_time=float(time))
         return fates
 
