@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import Progress, run_ensemble
 from vibrokit.kernels.stepper import Stepper
@@ -17,7 +17,7 @@ from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, visited
 from vibrokit.structure.regions import search_region, states_at
-from vibrokit.structure.request import check_means, pair
+from vibrokit.structure.request import check_means, pair, whole
 from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
 from vibrokit.structure.unstable import branch_fates, describe_unstable, refine_unstable, short_interval
@@ -85,7 +85,11 @@ def unstable_orbits(
         The excitations have no common period.
     """
     check_means(osc, stepper, executor, progress)
-    _check_period(osc, period)
+    period = whole("period", period, 1, _LONGEST_PERIOD)
+    if osc.autonomous and period != 1:
+        raise StructureError(
+            f"period is {period}, but the scene has no periodic excitation; give 1, for its equilibria."
+        )
     counts = pair("starts", starts, _MOST_STARTS)
     where = search_region(osc) if region is None else Region.of(region)
     carrier = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
@@ -198,14 +202,3 @@ def _distinct(osc: Oscillator, roots: Array, period: int, stepper: Stepper, apar
         if orbit.period == period and not any(same_point(osc, orbit.point, other, EQUAL) for _, other in known):
             known.append((orbit, points))
     return known
-
-
-def _check_period(osc: Oscillator, period: Any) -> None:
-    if isinstance(period, bool) or not isinstance(period, int | np.integer) or not 1 <= period <= _LONGEST_PERIOD:
-        raise StructureError(
-            f"period is {shown(period)}; give a whole number of forcing periods from 1 to {_LONGEST_PERIOD}."
-        )
-    if osc.autonomous and period != 1:
-        raise StructureError(
-            f"period is {period}, but the scene has no periodic excitation; give 1, for its equilibria."
-        )
