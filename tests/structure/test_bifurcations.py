@@ -7,10 +7,10 @@ from scipy.optimize import brentq, root
 
 import vibrokit as vk
 from vibrokit.kernels.choice import single_stepper
+from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
 from vibrokit.structure.cycles import find_cycle
-from vibrokit.structure.describe import describe_cycle, describe_orbit
-from vibrokit.structure.following import family_of, follow
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.tracing.following import family_of, follow
 from vibrokit.symbolic.flow_kind import Flow
 
 FREQUENCY, AMPLITUDE = "excitations.0.frequency", "excitations.0.amplitude"

@@ -6,9 +6,9 @@ import pytest
 import vibrokit as vk
 from vibrokit.errors import StructureError
 from vibrokit.results.basins import LEFT, UNSETTLED
-from vibrokit.structure.bands import pieces, separate
-from vibrokit.structure.lyapunov import LyapunovEstimate, kind_of, lyapunov_exponent, standard_error
-from vibrokit.structure.survival import fit_decay, watch
+from vibrokit.structure.attractors.bands import pieces, separate
+from vibrokit.structure.attractors.lyapunov import LyapunovEstimate, kind_of, lyapunov_exponent, standard_error
+from vibrokit.structure.attractors.survival import fit_decay, watch
 
 CLEAR = np.array([[0.448438, 0.001891]])  # the attractors of hertz-0.525 that repeat
 HAMMERING = np.array([[0.096614, -0.027017], [0.135228, -0.025599], [0.096896, -0.026171], [0.136309, -0.026357]])

@@ -12,10 +12,10 @@ from vibrokit.kernels.choice import single_stepper
 from vibrokit.results.content import open_content
 from vibrokit.results.continuation_file import read_continuation
 from vibrokit.structure import continuation as module
-from vibrokit.structure.branches import Tracing
+from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.continuation import continuation
-from vibrokit.structure.describe import describe_orbit
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.tracing.branches import Tracing
 from vibrokit.symbolic.flow_kind import Flow
 
 FREQUENCY = "excitations.0.frequency"

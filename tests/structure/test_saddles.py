@@ -11,11 +11,11 @@ import vibrokit as vk
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.basins import LEFT, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
+from vibrokit.structure.boundaries.edges import edge_states, meeting_cells, spread
+from vibrokit.structure.boundaries.saddles import find_saddles
 from vibrokit.structure.cycles import find_cycle
-from vibrokit.structure.describe import describe_cycle, describe_orbit
-from vibrokit.structure.edges import edge_states, meeting_cells, spread
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.saddles import find_saddles
 from vibrokit.structure.settle import Settler, settle_grid
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -7,7 +7,7 @@ import vibrokit as vk
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.region import Region
-from vibrokit.structure.describe import describe_orbit
+from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.settle import Settler
 from vibrokit.structure.unstable_orbits import unstable_orbits

@@ -22,13 +22,13 @@ from vibrokit.parts.scene import Entry
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.region import Region
-from vibrokit.structure.branches import Tracing, unshared
-from vibrokit.structure.continuation_record import recorded
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.request import Request, check_means
 from vibrokit.structure.shares import share_out
 from vibrokit.structure.status import fates_of
+from vibrokit.structure.tracing.branches import Tracing, unshared
+from vibrokit.structure.tracing.continuation_record import recorded
 from vibrokit.symbolic.flow_kind import Flow
 
 _FEW = (2, 2)  # cells where only the attractors are wanted

@@ -27,10 +27,10 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.results.structure import Structure
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
+from vibrokit.structure.boundaries.saddles import find_saddles
 from vibrokit.structure.manifolds import grow_manifolds
 from vibrokit.structure.regions import frame_of, search_region, states_at
 from vibrokit.structure.request import Request, check_means
-from vibrokit.structure.saddles import find_saddles
 from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, lasting_carrier
 from vibrokit.structure.settle import Settler, settle_grid
 from vibrokit.structure.shares import with_basin

@@ -18,13 +18,13 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.results.survival import Survival
-from vibrokit.structure.bands import separate
+from vibrokit.structure.attractors.bands import separate
+from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit, describe_wandering
+from vibrokit.structure.attractors.lyapunov import kind_of, lyapunov_exponent
+from vibrokit.structure.attractors.survival import follow, watch
 from vibrokit.structure.cycles import find_cycle
-from vibrokit.structure.describe import describe_cycle, describe_orbit, describe_wandering
-from vibrokit.structure.lyapunov import kind_of, lyapunov_exponent
 from vibrokit.structure.orbits import EQUAL, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import size_of
-from vibrokit.structure.survival import follow, watch
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16

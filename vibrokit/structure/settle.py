@@ -18,9 +18,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
-from vibrokit.structure.arrival import arrival_at
-from vibrokit.structure.sharing import agreeing, centres, core_of
-from vibrokit.structure.spread import Painting, is_spread, paint
+from vibrokit.structure.basins.arrival import arrival_at
+from vibrokit.structure.basins.sharing import agreeing, centres, core_of
+from vibrokit.structure.basins.spread import Painting, is_spread, paint
 from vibrokit.symbolic.flow_kind import Flow
 
 _FIRST_STAGE = 8  # sections after which those still on the way are packed together anew
@@ -103,7 +103,7 @@ class Settler:
         return journey.found
 
     def sharing(self, basins: Basins, margin: int) -> Settler:
-        """Return a settler to which a finished grid answers, which is quick: see `vibrokit.structure.sharing`."""
+        """Return one to which a finished grid answers, which is quick: see `vibrokit.structure.basins.sharing`."""
         return dataclasses.replace(self, core=core_of(self.osc, self.stepper, basins, margin, self.executor))
 
     @cached_property
@@ -219,7 +219,7 @@ def settle_grid(
     """Label the cells of the settler's region, from coarse grids to fine ones.
 
     The first grid is followed to the attractors. On each finer one a trajectory ends, after one section at least, in a
-    cell of the grid before that answers for its neighbourhood; see `vibrokit.structure.sharing`.
+    cell of the grid before that answers for its neighbourhood; see `vibrokit.structure.basins.sharing`.
 
     Parameters
     ----------

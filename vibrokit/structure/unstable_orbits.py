@@ -15,12 +15,12 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.boundaries.unstable import branch_fates, describe_unstable, refine_unstable, short_interval
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, visited
 from vibrokit.structure.regions import search_region, states_at
 from vibrokit.structure.request import check_means, pair, whole
 from vibrokit.structure.scales import size_of
 from vibrokit.structure.settle import Settler
-from vibrokit.structure.unstable import branch_fates, describe_unstable, refine_unstable, short_interval
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 8  # times as many cells on a side as starts: looked at for where the map turns round

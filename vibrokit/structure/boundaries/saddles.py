@@ -14,12 +14,17 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import Basins
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.boundaries.edges import PARTS_OF_A_TURN, EdgeTrack, Straddles, meeting_cells
+from vibrokit.structure.boundaries.recurrences import almost_repeats, closing, recurrence, same_place
+from vibrokit.structure.boundaries.unstable import (
+    branch_fates,
+    describe_unstable,
+    describe_unstable_cycle,
+    refine_unstable,
+)
 from vibrokit.structure.cycles import refine_cycle
-from vibrokit.structure.edges import PARTS_OF_A_TURN, EdgeTrack, Straddles, meeting_cells
 from vibrokit.structure.orbits import EQUAL
-from vibrokit.structure.recurrences import almost_repeats, closing, recurrence, same_place
 from vibrokit.structure.settle import Settler
-from vibrokit.structure.unstable import branch_fates, describe_unstable, describe_unstable_cycle, refine_unstable
 from vibrokit.symbolic.flow_kind import Flow
 
 _LONGEST_PERIOD = 16

@@ -13,12 +13,12 @@ from vibrokit.errors import VibrokitError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.structure.bifurcations import DOUBLING, Located
+from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
 from vibrokit.structure.cycles import Cycle
-from vibrokit.structure.describe import describe_cycle, describe_orbit
-from vibrokit.structure.families import Family, Member
-from vibrokit.structure.following import family_of, follow
 from vibrokit.structure.orbits import Orbit, refine_orbit, section_derivative, visited
+from vibrokit.structure.tracing.bifurcations import DOUBLING, Located
+from vibrokit.structure.tracing.families import Family, Member
+from vibrokit.structure.tracing.following import family_of, follow
 
 _SAME = 1e-5  # share of the region's size within which two points are one
 _NEAR = 0.1  # the same, within which two sets of points may belong to one branch

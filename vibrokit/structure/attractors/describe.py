@@ -15,9 +15,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
-from vibrokit.structure.contacts import Path, contacts_along
+from vibrokit.structure.attractors.contacts import Path, contacts_along
+from vibrokit.structure.attractors.lyapunov import LyapunovEstimate
 from vibrokit.structure.cycles import Cycle, equilibrium_exponents, refine_cycle
-from vibrokit.structure.lyapunov import LyapunovEstimate
 from vibrokit.structure.orbits import Orbit, exponents_of, moved_by_tightening, refine_orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow

@@ -13,9 +13,9 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.continuation import Bifurcation, Continuation, SteadyStates
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.bifurcations import GRAZING, Located
-from vibrokit.structure.branches import Place, Tracing
 from vibrokit.structure.orbits import refine_orbit, visited
+from vibrokit.structure.tracing.bifurcations import GRAZING, Located
+from vibrokit.structure.tracing.branches import Place, Tracing
 
 _ORBIT_SAMPLES = 1024
 _ONE = 1e-3  # share of the region's size within which the points of two bifurcations of one kind and value are one

@@ -16,7 +16,7 @@ from vibrokit.kernels.stopping import RAN_OUT, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.results.survival import Survival
-from vibrokit.structure.arrival import arrival_at
+from vibrokit.structure.basins.arrival import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
 _SIGNIFICANT = 3.0  # standard errors

@@ -12,8 +12,8 @@ from vibrokit.errors import VibrokitError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.structure.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
-from vibrokit.structure.families import Family, Member, short_interval
+from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
+from vibrokit.structure.tracing.families import Family, Member, short_interval
 
 _MOST_STEPS = 800
 _LONGEST = 0.01  # share of the region's size that a motion may move in one step

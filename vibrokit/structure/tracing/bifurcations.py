@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.single import record
 from vibrokit.parts.barrier import Barrier
-from vibrokit.structure.families import Family, Member
+from vibrokit.structure.tracing.families import Family, Member
 from vibrokit.symbolic.flow_kind import Flow
 
 FOLD, CROSSING = "fold", "pitchfork or transcritical"
