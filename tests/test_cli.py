@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 import subprocess
@@ -7,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from vibrokit.analyzers.action_plot import ActionPlot
 from vibrokit.cli import main
 
-QUICK = ["--cells", "50", "--set", "points=200"]
+PLOT = ["--analyzer", "action-plot"]
+QUICK = ["--cells", "50", "--set", "points=200", *PLOT]
 
 
 def test_run_prints_a_table_and_saves_a_figure(tmp_path, monkeypatch, capsys):
@@ -70,6 +73,32 @@ def test_one_attractor_is_a_finding_and_a_sentence(tmp_path, monkeypatch, capsys
     assert "one attractor only" in err
 
 
+def test_a_stop_that_is_not_there_is_a_sentence_beside_the_structure(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "double-well", *QUICK, "--exit", "first-contact:right"]) == 0
+    out, err = capsys.readouterr()
+    assert "equilibrium" in out
+    assert "no right stop" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_not_finite_is_null_in_json(tmp_path, monkeypatch, capsys):
+    """An energy without a lower bound is still one object that other programs read."""
+    monkeypatch.chdir(tmp_path)
+    original = ActionPlot.run
+
+    def unbounded(self, osc, structure, *, progress=None):
+        result = original(self, osc, structure, progress=progress)
+        energies = tuple(dataclasses.replace(energy, upper=math.inf) for energy in result.energies)
+        return dataclasses.replace(result, energies=energies)
+
+    monkeypatch.setattr(ActionPlot, "run", unbounded)
+    assert main(["run", "double-well", *QUICK, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["energies"]
+    assert {energy["upper"] for energy in record["energies"]} == {None}
+
+
 def test_equations(capsys):
     assert main(["equations", "hertz-0.570"]) == 0
     assert "p_2" in capsys.readouterr().out
@@ -88,12 +117,15 @@ def test_list(capsys):
     ("arguments", "words"),
     [
         (["run", "herz-0.570"], "hertz-0.570"),
-        (["run", "double-well", "--set", "ponts=3"], "points"),
-        (["run", "double-well", "--set", "points"], "FIELD=NUMBER"),
-        (["run", "double-well", "--cells", "1"], "--cells"),
-        (["run", "double-well", "--stepper", "rk5:3"], "rk4"),
-        (["run", "double-well", "--stepper", "rk4:few"], "rk4:few"),
-        (["run", "double-well", "--stepper", "order8:7"], "tolerance"),
+        (["run", "double-well", *PLOT, "--set", "ponts=3"], "points"),
+        (["run", "double-well", *PLOT, "--set", "points"], "FIELD=NUMBER"),
+        (["run", "double-well", *PLOT, "--cells", "1"], "--cells"),
+        (["run", "double-well", *PLOT, "--stepper", "rk5:3"], "rk4"),
+        (["run", "double-well", *PLOT, "--stepper", "rk4:few"], "rk4:few"),
+        (["run", "double-well", *PLOT, "--stepper", "order8:7"], "tolerance"),
+        (["run", "double-well", *PLOT, "--exit", "leave-basins"], "the nearest is 'leave-basin'"),
+        (["run", "double-well", *PLOT, "--exit", "leave-basin:left"], "first-contact:left"),
+        (["run", "double-well", *PLOT, "--exit", "first-contact:top"], "'top'"),
         (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
         (["plot", "nothing.nc"], "nothing.nc"),
         (["check", "herz"], "hertz"),

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
     from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.exits import FirstContact as FirstContact
     from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
+    from vibrokit.analyzers.least_action import LeastAction as LeastAction
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
     from vibrokit.kernels.rk4 import RK4 as RK4
@@ -46,7 +48,9 @@ __version__ = "0.1.0"
 _HOMES = {
     "ActionPlot": "vibrokit.analyzers.action_plot",
     "Analyzer": "vibrokit.analyzers.analyzer",
+    "FirstContact": "vibrokit.analyzers.exits",
     "LeaveBasin": "vibrokit.analyzers.exits",
+    "LeastAction": "vibrokit.analyzers.least_action",
     "FreeFlight": "vibrokit.kernels.free_flight",
     "Order8": "vibrokit.kernels.order8",
     "RK4": "vibrokit.kernels.rk4",

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibrokit import __version__, report
+from vibrokit import __version__
 from vibrokit.errors import StructureError, VibrokitError
 
 if TYPE_CHECKING:
@@ -55,9 +55,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--analyzer",
         nargs="*",
-        default=["action-plot"],
+        default=["least-action"],
         metavar="NAME",
-        help="default: action-plot; none: structure only",
+        help="default: least-action; none: structure only",
+    )
+    run.add_argument(
+        "--exit", metavar="EXIT", help="leave-basin (default) or first-contact[:SIDE], what counts as leaving"
     )
     run.add_argument("--set", action="append", default=[], metavar="FIELD=NUMBER", help="a setting of the analyzer")
     run.add_argument("--stepper", metavar="NAME[:NUMBER]", help="rk4:STEPS, order8:TOLERANCE or free-flight:TOLERANCE")
@@ -90,7 +93,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> None:
+    from vibrokit import report
     from vibrokit.analyzers.analyzer import Analyzer
+    from vibrokit.analyzers.named import named_exit
     from vibrokit.kernels.named import named_stepper
     from vibrokit.registry import Group, load
     from vibrokit.results.pictures import checked_picture
@@ -109,6 +114,8 @@ def _run(options: argparse.Namespace) -> None:
     stepper = None if options.stepper is None else named_stepper(options.stepper)
     if stepper is not None:
         settings["stepper"] = stepper
+    if options.exit is not None:
+        settings["exit"] = named_exit(options.exit)
     analyzers = [kind(**_known(kind, settings)) for kind in kinds]
     cells = (_cells(options.cells),) * 2
     with _Bar("basins") as bar:
@@ -130,6 +137,8 @@ def _run(options: argparse.Namespace) -> None:
 
 def _keep(options: argparse.Namespace, structure: Structure, results: dict[str, Result], seconds: float) -> None:
     """Save and draw the results; the structure itself where no analyzer was asked for."""
+    from vibrokit import report
+
     records: dict[str, Any] = results if options.analyzer else {"structure": structure}
     if options.output is not None:
         for name, found in records.items():
@@ -139,7 +148,7 @@ def _keep(options: argparse.Namespace, structure: Structure, results: dict[str, 
         return
     for name, found in records.items():
         if name in results:
-            print(report.energy_table(name, found))
+            print(report.analysis(name, found))
         figure = options.figure or Path(f"{_stem(options.scene)}.png")
         figure = _numbered(figure, name, len(records) if options.figure else 2)
         _save_figure(found, figure)

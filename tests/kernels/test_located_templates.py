@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from vibrokit.kernels import templates
 from vibrokit.kernels.stopping import LEFT_REGION, NOT_FINITE, RAN_OUT, STALLED
 
 MARKER = "# --- scene above, stepper below ---\n"
+NOT_HERE = re.compile(r"^.*  # (breaking|bending)\n", re.MULTILINE)  # no force of the sample scene jumps
 IMPORTS = """
 import numpy as np
 from vibrokit.kernels.cubic import crossing, summit
@@ -47,9 +49,11 @@ def pasted(folder, stepper, changes=()):
     for old, new in dict(changes).items():
         assert old in scene
         scene = scene.replace(old, new)
-    pieces = [(room / f"{name}.py").read_text("utf-8") for name in ("steps", "located", stepper, "sections")]
+    names = ("steps", "settling", "located", stepper, "sections")
+    pieces = [(room / f"{name}.py").read_text("utf-8").split(MARKER)[1] for name in names]
+    text = "\n\n".join([scene, IMPORTS, *(NOT_HERE.sub("", piece) for piece in pieces)])
     path = folder / f"{stepper}.py"
-    path.write_text("\n\n".join([scene, IMPORTS, *(piece.split(MARKER)[1] for piece in pieces)]), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     specification = importlib.util.spec_from_file_location(f"pasted_{stepper}", path)
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)

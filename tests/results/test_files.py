@@ -10,6 +10,7 @@ import xarray
 
 import vibrokit as vk
 from vibrokit.errors import VibrokitError
+from vibrokit.results.certificate import Certificate
 from vibrokit.results.files import ResultFileError
 
 
@@ -26,7 +27,7 @@ def test_round_trip(result, tmp_path):
     for name in ("scene", "settings", "status", "seconds", "versions", "seed"):
         assert getattr(again, name) == getattr(result, name)
     for old, new in zip(result.energies, again.energies, strict=True):
-        for name in ("source", "target", "value", "lower", "upper", "method", "residual"):
+        for name in ("source", "target", "value", "lower", "upper", "method", "residual", "saddle", "certificate"):
             assert getattr(old, name) == getattr(new, name)
         for name in ("t", "q", "p", "action", "section"):
             np.testing.assert_array_equal(getattr(old.path, name), getattr(new.path, name))
@@ -83,6 +84,24 @@ def test_a_result_without_energies_comes_back(result, tmp_path):
     np.testing.assert_array_equal(again.data["action_0"], result.data["action_0"])
 
 
+def test_certificates_and_saddles_come_back_with_every_kind_of_result(result, tmp_path):
+    certificate = Certificate(1e-12, 1e-6, 2e-6, 40.0, 1e-13, -1e-14, 0.1 + 0.2, 0.5)
+    first, *rest = result.energies
+    first = dataclasses.replace(first, saddle=3, certificate=certificate)
+    dataclasses.replace(result, energies=(first, *rest)).save(tmp_path / "r.nc")
+    again, *others = vk.load_result(tmp_path / "r.nc").energies
+    assert (again.saddle, again.certificate) == (3, certificate)
+    assert {(energy.saddle, energy.certificate) for energy in others} == {(-1, None)}
+
+
+def test_files_from_before_certificates_open(result, tmp_path):
+    result.save(tmp_path / "r.nc")
+    data = xarray.load_dataset(io.BytesIO((tmp_path / "r.nc").read_bytes()), engine="scipy", decode_cf=False)
+    data.drop_vars(["energy_saddle", "energy_certified"]).to_netcdf(tmp_path / "old.nc", engine="scipy")
+    for old, new in zip(result.energies, vk.load_result(tmp_path / "old.nc").energies, strict=True):
+        assert (new.value, new.saddle, new.certificate) == (old.value, -1, None)
+
+
 def without(name):
     return lambda data, header: data.drop_vars(name)
 
@@ -100,7 +119,7 @@ def with_entry(key, value):
     [
         (without("energy_value"), "no array 'energy_value'"),
         (with_array("energy_value", "few", [1.0]), "'energy_value' has shape"),
-        (with_array("energy_source", "energy", [np.nan, 0.0]), "'energy_source' holds NaN"),
+        (with_array("energy_source", "energy", [np.nan, 0.0]), "'energy_source' holds numbers that are not whole"),
         (with_array("energy_value", "energy", ["a", "b"]), "'energy_value' is of kind"),
         (without("path0_p"), "no array 'path0_p'"),
         (with_array("path0_q", ("one", "path0_state"), [[0.0, 0.0]]), "'path0_q' has shape"),

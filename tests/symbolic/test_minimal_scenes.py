@@ -10,7 +10,7 @@ from vibrokit.errors import NoSectionError, SceneError
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
 
-NOISY_FLOWS = (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL, Flow.NOISY)
+NOISY_FLOWS = (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL, Flow.NOISY, Flow.GRAMIAN, Flow.GRAMIAN_REVERSED)
 RIGHT = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
 LEFT = vk.Barrier(vk.Hertz(40.0), -0.5, "left")
 

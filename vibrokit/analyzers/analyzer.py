@@ -6,10 +6,14 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import Any
 
+from vibrokit.analyzers.exits import Exit
+from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
+from vibrokit.structure.request import check_belongs, check_means
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +37,41 @@ class Analyzer(ABC):
         progress : callable, optional
             Called with (work done, work in all).
         """
+
+
+def checked_sources(
+    osc: Oscillator,
+    structure: Structure,
+    exit: Any,  # noqa: A002 - the word of all analyzers
+    source: int | None,
+    stepper: Any,
+    progress: Any,
+) -> tuple[Attractor, ...]:
+    """Check what every search for exits is given, before any work is done, and return the attractors to leave.
+
+    Raises
+    ------
+    SceneError
+        The scene has no noise.
+    StructureError
+        The structure is of another scene, the exit cannot be asked for in it, or the source is unknown.
+    """
+    check_means(osc, stepper, None, progress)
+    check_belongs(osc, structure)
+    if osc.noise is None:
+        raise SceneError("the scene has no noise, and nothing leaves an attractor without; give it a noise model.")
+    if not isinstance(exit, Exit):
+        raise StructureError(f"exit is {shown(exit)}, which is none; give LeaveBasin() or FirstContact().")
+    exit.check(osc, structure)
+    return structure.attractors if source is None else (structure.attractor(source),)
+
+
+def part_of(progress: Progress | None, number: int, count: int) -> Progress | None:
+    """Progress of one of several pieces of work that count alike."""
+    if progress is None:
+        return None
+    grain = 1000
+    return lambda done, total: progress(number * grain + grain * done // max(1, total), count * grain)
 
 
 def plain_settings(analyzer: Any) -> dict[str, Any]:

@@ -45,6 +45,28 @@ class LocalPotential:
         return (inverse + inverse.T) / 2
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Phase:
+    """The quadratic form at one time of an orbit, and what leads to it from the time before.
+
+    Attributes
+    ----------
+    time : float
+        Since the section that the orbit starts on (s).
+    point : array (n,)
+        Of the orbit.
+    covariance : array (n, n)
+        Σ at that time.
+    monodromy : array (n, n)
+        M, derivative of the flow from the phase before to this one.
+    """
+
+    time: float
+    point: Array
+    covariance: Array
+    monodromy: Array
+
+
 def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPotential:
     """Linearise Hamilton's equations along a stable orbit, where p = 0, and solve for the covariance.
 
@@ -57,20 +79,66 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
     StructureError
         The orbit is not stable, so that it has no stationary covariance.
     """
+    return _closed(orbit, _pieces(osc, orbit, stepper))
+
+
+def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> tuple[Phase, ...]:
+    """Return the quadratic form at 16 times of each section interval of a stable orbit, the first the orbit's start.
+
+    From phase to phase Σ' = M Σ Mᵀ + C; the monodromy of the first phase leads to it from the last.
+
+    Raises
+    ------
+    StructureError
+        The orbit is not stable.
+    """
+    pieces = _pieces(osc, orbit, stepper)
+    covariance = _closed(orbit, pieces).covariance
+    phases = []
+    for piece in pieces:
+        phases.append(Phase(piece.time, piece.point, covariance, piece.before))
+        covariance = piece.monodromy @ covariance @ piece.monodromy.T + piece.gramian
+    return tuple(phases)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Piece:
+    """A short part of the orbit: where it starts, M over the piece before, and M and C over it."""
+
+    time: float
+    point: Array
+    before: Array
+    monodromy: Array
+    gramian: Array
+
+
+def _pieces(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> list[_Piece]:
     size = len(orbit.point)
     interval = osc.section_interval / _PIECES
-    point, monodromy, gramian = orbit.point, np.eye(size), np.zeros((size, size))
-    for piece in range(_PIECES * orbit.period):
+    point = orbit.point
+    pieces: list[_Piece] = []
+    for number in range(_PIECES * orbit.period):
         start = np.concatenate([point, np.zeros(size + 1), np.eye(2 * size).ravel()])
-        begin = (piece % _PIECES) * interval
+        begin = (number % _PIECES) * interval
         ended = run_ensemble(
             osc, Flow.HAMILTONIAN_VARIATIONAL, stepper, start[None], 1, start_time=begin, interval=interval
         )
-        point = ended.states[0, :size]
         linear = ended.states[0, 2 * size + 1 :].reshape(2 * size, 2 * size)
         step, upper = linear[:size, :size], linear[:size, size:]
         gathered = upper @ step.T
-        monodromy, gramian = step @ monodromy, step @ gramian @ step.T + (gathered + gathered.T) / 2
+        before = pieces[-1].monodromy if pieces else step
+        pieces.append(_Piece(number * interval, point, before, step, (gathered + gathered.T) / 2))
+        point = ended.states[0, :size]
+    pieces[0] = dataclasses.replace(pieces[0], before=pieces[-1].monodromy)
+    return pieces
+
+
+def _closed(orbit: Orbit, pieces: list[_Piece]) -> LocalPotential:
+    size = len(orbit.point)
+    monodromy, gramian = np.eye(size), np.zeros((size, size))
+    for piece in pieces:
+        monodromy = piece.monodromy @ monodromy
+        gramian = piece.monodromy @ gramian @ piece.monodromy.T + piece.gramian
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
     if not largest < 1:
         raise StructureError(

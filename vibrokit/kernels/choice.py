@@ -11,6 +11,7 @@ from types import FrameType
 from vibrokit.errors import StepperError
 from vibrokit.kernels.contact_time import contact_times
 from vibrokit.kernels.free_flight import FreeFlight
+from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
@@ -53,6 +54,8 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
         steps = _power_of_two(_steps_needed(scene, flow))
     except StepperError:  # not a flow that fixed steps can follow
         return single_stepper(scene, flow)
+    if flow is Flow.HAMILTONIAN_VARIATIONAL and scene.barriers and kernel_for(scene, flow, RK4()).module.BENDS:
+        return single_stepper(scene, flow)  # fixed steps have its derivatives where p = 0 only
     turns = max(1.0, _turns(scene))
     if flow is Flow.NOISY:  # where these are too few, running it warns
         return RK4(min(steps, int(_MOST_NOISY_STEPS * turns)))
@@ -126,8 +129,8 @@ def _flies(scene: Scene, flow: Flow) -> bool:
     sinusoids = all(type(part) in (Harmonic, Constant) for part in scene.excitations)
     if scene.noise is None or type(scene.noise) is WhiteNoise:
         return linear and sinusoids
-    momenta = flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL)
-    return linear and sinusoids and not momenta and not scene.noise.extra_states
+    with_noise = flow.has_momenta or flow.has_covariance  # the amplitude is among what is integrated
+    return linear and sinusoids and not with_noise and not scene.noise.extra_states
 
 
 def _frames_inside(frame: FrameType | None) -> int:

@@ -4,23 +4,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def error_blocks(states: int, equations: int) -> NDArray[np.int64]:
+def error_blocks(states: int, momenta: int, equations: int) -> NDArray[np.int64]:
     """Return the block of each component.
 
     States have a scale each. Momenta share one, the action has its own, and so has each block of derivatives: final
     states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 beside states of
-    size 1, and their error must be small against themselves.
+    size 1, and their error must be small against themselves. So must that of each entry of a covariance, whose powers
+    of a short time differ.
 
     Parameters
     ----------
     states : int
         Components of the state, n.
+    momenta : int
+        Components of the momentum: n or 0.
     equations : int
-        Components of the flow: n, n + n², 2n + 1 or 2n + 1 + (2n)².
+        Components of the flow: n, n + n² or n + n(n + 1)/2 without momenta, 2n + 1 or 2n + 1 + (2n)² with them.
     """
     state = list(range(states))
-    if equations in (states, states + states**2):
-        return np.array(state + [states] * (equations - states))
+    if momenta == 0 and equations == states + states**2:
+        return np.array(state + [states] * states**2)
+    if momenta == 0:
+        return np.arange(equations)
     phase = [*state, *[states] * states]
     matrix = [
         states + 2 + 2 * (row >= states) + (column >= states)

@@ -6,7 +6,6 @@ import dataclasses
 from typing import ClassVar
 
 from vibrokit.kernels.order8 import LocatedStepper
-from vibrokit.kernels.stepper import refuse_jumping_momenta
 from vibrokit.symbolic.scene_text import SceneText
 
 
@@ -25,10 +24,9 @@ class FreeFlight(LocatedStepper):
     """
 
     name: ClassVar[str] = "free_flight"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "located", "free_flight", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "located", "free_flight", "sections")
     flight: ClassVar[bool] = True
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, and the series of the flight."""
-        refuse_jumping_momenta(text)
         return [text.constants, text.forcing, text.rhs, text.stops, text.flight]

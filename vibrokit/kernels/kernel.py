@@ -23,8 +23,14 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MARKER = "# --- scene above, stepper below ---\n"
-_NEED_NOISE = {Flow.NOISY: "random forces", Flow.HAMILTONIAN: "momenta", Flow.HAMILTONIAN_VARIATIONAL: "momenta"}
-_CONDITION = re.compile(r"  # (forced|unforced|noisy)\n$")
+_NEED_NOISE = {
+    Flow.NOISY: "random forces",
+    Flow.GRAMIAN: "random forces",
+    Flow.GRAMIAN_REVERSED: "random forces",
+    Flow.HAMILTONIAN: "momenta",
+    Flow.HAMILTONIAN_VARIATIONAL: "momenta",
+}
+_CONDITION = re.compile(r"  # (forced|unforced|noisy|breaking|unbroken|bending|unbent)\n$")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,10 +106,12 @@ def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
     from vibrokit.symbolic.source import scene_text  # only here is SymPy needed
 
     text = scene_text(scene, flow, flight=stepper.flight)
-    templates = [read_template(name) for name in stepper.templates]
+    templates = [read_template(name) for name in stepper.templates_for(text)]
     imports = "\n".join(dict.fromkeys(line for template in templates for line in template.imports))
     body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)
+    bends = text.breaks and flow is Flow.HAMILTONIAN_VARIATIONAL
     conditions = {"forced": text.forced, "unforced": not text.forced, "noisy": flow is Flow.NOISY}
+    conditions |= {"breaking": text.breaks, "unbroken": not text.breaks, "bending": bends, "unbent": not bends}
     pieces = [text.preamble, imports, *stepper.scene_part(text), _fitting(body, conditions)]
     return _with_needed_imports("\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece))
 

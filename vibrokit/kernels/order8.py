@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.stepper import Stepper, refuse_jumping_momenta
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
 
 FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0
+# What carries over an event, where more is integrated than runs through it unbroken.
+_CROSSING: Mapping[Flow, tuple[str, ...]] = {
+    Flow.STATE_VARIATIONAL: ("crossing_derivatives",),
+    Flow.GRAMIAN: ("crossing_covariance",),
+    Flow.GRAMIAN_REVERSED: ("crossing_covariance",),
+    Flow.HAMILTONIAN: ("grazing", "crossing_momenta"),
+    Flow.HAMILTONIAN_VARIATIONAL: ("grazing", "crossing_extremals"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,8 +44,15 @@ class LocatedStepper(Stepper):
             )
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, most steps in an interval, and whether the forcing repeats with it."""
-        return float(self.tolerance), _MOST_STEPS, float(scene.repeats_after(interval))
+        """Tolerance, most steps in an interval, whether the forcing repeats with it, and a time of the motion's own."""
+        return float(self.tolerance), _MOST_STEPS, float(scene.repeats_after(interval)), 1.0 / scene.natural_frequency
+
+    def templates_for(self, text: SceneText) -> tuple[str, ...]:
+        """The templates, with those for what jumps at events before those that meet events."""
+        if not text.breaks:
+            return self.templates
+        place = self.templates.index("located")
+        return (*self.templates[:place], *_CROSSING[text.flow], *self.templates[place:])
 
     def refined(self) -> Self:
         """A hundredth of the tolerance."""
@@ -68,9 +84,8 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "located", "order8", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "located", "order8", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops."""
-        refuse_jumping_momenta(text)
         return [text.constants, text.forcing, text.rhs, text.stops]

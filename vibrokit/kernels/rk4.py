@@ -7,9 +7,8 @@ from typing import ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.lanes import lane_step, tabulation
-from vibrokit.kernels.stepper import Stepper, refuse_jumping_momenta
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
-from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
 
 _LARGEST = 10**7
@@ -23,6 +22,10 @@ class RK4(Stepper):
     stops, 1 where the force jumps at first touch. Choose it for basins, action plots and noise, where many
     trajectories at 1e-6 are worth more than one at 1e-12; choose `FreeFlight` or `Order8` for orbits and
     certificates, and wherever a contact is shorter than a few steps.
+
+    Derivatives of momenta jump where those of a contact force do: at linear stops, and where a law that would pull is
+    cut. Steps across such a contact miss it, by a term proportional to p₂. So they are right along the motion without
+    noise, where p = 0, and wrong along any other path.
 
     Parameters
     ----------
@@ -51,13 +54,13 @@ class RK4(Stepper):
         Raises
         ------
         StepperError
-            Derivatives of a force that jumps: steps across the jump cannot have them.
+            Momenta or derivatives under a force that jumps: they jump too, and steps across the jump miss that.
         """
-        refuse_jumping_momenta(text)
-        if text.jumps and text.flow is Flow.STATE_VARIATIONAL:
+        if text.jumps and text.breaks:
+            what = "momenta" if text.flow.has_momenta else "derivatives of the motion"
             raise StepperError(
-                "RK4 steps across contacts, and the derivatives of a motion whose contact force jumps at first touch "
-                "jump too; take FreeFlight or Order8 for them."
+                f"RK4 steps across contacts, and where a contact force jumps at first touch, the {what} jump too; take "
+                "FreeFlight or Order8 for them, which locate contacts."
             )
         noise = [text.amplitude, text.slope]
         pieces = [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]

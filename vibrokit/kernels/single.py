@@ -45,7 +45,7 @@ def record(
     Returns
     -------
     array (≤ count + 1, equations)
-        Shorter if the numbers ran out of range.
+        Shorter if the numbers ran out of range, if steps ran out, or if a stop whose force jumps was grazed.
     """
     module = kernel_for(scene, flow, stepper).module
     warn_of_coarse_steps(scene, flow, stepper)

@@ -6,7 +6,6 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
 
-from vibrokit.errors import StepperError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.scene_text import SceneText
@@ -34,6 +33,10 @@ class Stepper(ABC):
     def scene_part(self, text: SceneText) -> list[str]:
         """Pieces of the scene that the templates are pasted under."""
 
+    def templates_for(self, text: SceneText) -> tuple[str, ...]:
+        """Names of the templates that a scene needs, in the order in which they are pasted."""
+        return self.templates
+
     @abstractmethod
     def refined(self) -> Self:
         """The next finer setting, for an error estimate by comparison."""
@@ -44,12 +47,3 @@ class Stepper(ABC):
 
     def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most steppers take every scene
         """Raise StepperError if this stepper cannot integrate this flow of this scene."""
-
-
-def refuse_jumping_momenta(text: SceneText) -> None:
-    """Raise StepperError if momenta are integrated under a contact force that jumps at first touch."""
-    if text.jumps and text.flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
-        raise StepperError(
-            "a contact force jumps at first touch, and so would the momenta of an exit path, which this version does "
-            "not follow; give a law whose force begins at zero, such as damping proportional to depth."
-        )

@@ -13,6 +13,7 @@ LEFT_BASIN = 2  # in a cell of the basin grid that belongs to another attractor
 REACHED = 3  # within the tolerance of a known point
 NOT_FINITE = 4
 STALLED = 5  # the step limit of one interval was not enough
+GRAZED = 6  # it touched a stop whose force jumps too slowly to tell by how much the momenta jump
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

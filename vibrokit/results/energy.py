@@ -7,6 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.results.certificate import Certificate
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExitPath:
@@ -49,6 +51,10 @@ class ActivationEnergy:
     residual : float
         Size of the momentum at the exit: 0 for a path that ends on the basin's boundary for good.
     path : ExitPath or None
+    saddle : int
+        Which of the structure's saddles the path ends on; −1 where it ends on none.
+    certificate : Certificate or None
+        Evidence, where the path was polished.
     """
 
     source: int
@@ -59,3 +65,5 @@ class ActivationEnergy:
     method: str
     residual: float
     path: ExitPath | None = dataclasses.field(default=None, repr=False)
+    saddle: int = -1
+    certificate: Certificate | None = None

@@ -6,21 +6,20 @@ import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 import xarray
 
 from vibrokit.errors import nearest
 from vibrokit.results.action_plot import ActionPlotResult
-from vibrokit.results.content import Content, ResultFileError, open_content, seed_of, taken, texts, versions_of
+from vibrokit.results.content import Content, ResultFileError, open_content, seed_of, taken, versions_of
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.continuation_file import KIND as CONTINUATION
 from vibrokit.results.continuation_file import read_continuation
-from vibrokit.results.energy import ActivationEnergy, ExitPath
+from vibrokit.results.energy_file import ENERGIES, RESERVED
+from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.results.structure_file import KIND as STRUCTURE
 from vibrokit.results.structure_file import read_structure
-from vibrokit.results.writing import NUMBERS, PATH
 
 __all__ = ["ResultFileError", "load_result"]
 
@@ -60,13 +59,13 @@ def load_result(path: str | os.PathLike[str]) -> Result | Structure | Continuati
 def _result_reader(record: type[Result]) -> Callable[[Content], Result]:
     def read(content: Content) -> Result:
         header, dataset = content.header, content.dataset
-        names = [name for name in dataset.variables if str(name).startswith(("energy_", "path"))]
+        names = [name for name in dataset.variables if RESERVED.match(str(name))]
         try:
             data = xarray.decode_cf(dataset.drop_vars(names), decode_times=False).load()
         except Exception as error:  # attributes of strange files have xarray raise errors of every kind
             raise ResultFileError(f"{type(error).__name__}: {error}") from error
         return record(
-            energies=_energies(content),
+            energies=ENERGIES.read(content),
             data=data,
             scene=taken(header, "scene", dict),
             settings=taken(header, "settings", dict),
@@ -74,38 +73,15 @@ def _result_reader(record: type[Result]) -> Callable[[Content], Result]:
             seconds=taken(header, "seconds", float),
             versions=versions_of(header),
             seed=seed_of(header),
+            **record.read_extras(content),
         )
 
     return read
 
 
-def _energies(content: Content) -> tuple[ActivationEnergy, ...]:
-    methods = texts(content.header, "methods")
-    if not methods:
-        return ()
-    columns = [content.numbers(f"energy_{name}", (len(methods),), finite=name in _LABELS) for name in NUMBERS]
-    energies = []
-    for index, method in enumerate(methods):
-        source, target, value, lower, upper, residual = (float(column[index]) for column in columns)
-        path = _read_path(content, PATH.format(index=index))
-        energies.append(ActivationEnergy(int(source), int(target), value, lower, upper, method, residual, path))
-    return tuple(energies)
-
-
-def _read_path(content: Content, prefix: str) -> ExitPath | None:
-    if f"{prefix}t" not in content.dataset:
-        return None
-    t = content.numbers(f"{prefix}t", (None,))
-    state = content.numbers(f"{prefix}q", (len(t), None))
-    momenta = content.numbers(f"{prefix}p", state.shape)
-    action = content.numbers(f"{prefix}action", (len(t),))
-    section = content.wholes(f"{prefix}on_section", (None,), 0, len(t) - 1)
-    return ExitPath(t, state, momenta, action, section.astype(np.int64))
-
-
-_LABELS = ("source", "target")
+_RESULTS = (ActionPlotResult, LeastActionResult)
 _READERS: Mapping[str, Callable[[Content], Any]] = {
     STRUCTURE: read_structure,
     CONTINUATION: read_continuation,
-    **{record.kind: _result_reader(record) for record in (ActionPlotResult,)},
+    **{record.kind: _result_reader(record) for record in _RESULTS},
 }

@@ -13,6 +13,9 @@ from vibrokit.results.energy import ActivationEnergy
 if TYPE_CHECKING:
     import xarray
 
+    from vibrokit.results.columns import Draft
+    from vibrokit.results.content import Content
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Result(ABC):
@@ -39,7 +42,8 @@ class Result(ABC):
     For developers
     --------------
     A subclass names its `kind`, which files carry, and writes `plot`. From these everything else just works: saving,
-    opening, and drawing without what made it.
+    opening, and drawing without what made it. One with attributes of its own also writes `write_extras` and
+    `read_extras`.
     """
 
     kind: ClassVar[str]
@@ -66,3 +70,17 @@ class Result(ABC):
         from vibrokit.results.writing import save_result
 
         save_result(self, path)
+
+    def write_extras(self, draft: Draft) -> None:  # noqa: B027 (most results have nothing to add)
+        """Put what this kind of result has besides into a file in the making; nothing here."""
+
+    @classmethod
+    def read_extras(cls, content: Content) -> dict[str, Any]:
+        """Return, by name, what `write_extras` wrote, and check the arrays that pictures are drawn of.
+
+        Raises
+        ------
+        ResultFileError
+            Something is missing, of another shape or kind, or contradicts the rest.
+        """
+        return {}

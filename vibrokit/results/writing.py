@@ -8,40 +8,45 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import xarray
 
 from vibrokit.results.atomic import write_atomically
-from vibrokit.results.content import FORMAT, HEADER
-from vibrokit.results.energy import ExitPath
+from vibrokit.results.columns import Draft
+from vibrokit.results.content import FORMAT, HEADER, ResultFileError
+from vibrokit.results.energy_file import ENERGIES, RESERVED
 
 if TYPE_CHECKING:
     from vibrokit.results.result import Result
 
-NUMBERS = ("source", "target", "value", "lower", "upper", "residual")
-PATH = "path{index}_"
-
 
 def save_result(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a result to a netCDF file, whole or not at all."""
-    arrays: dict[str, Any] = {}
-    for name in NUMBERS if result.energies else ():  # an array without an entry would be none to netCDF 3
-        arrays[f"energy_{name}"] = ("energy", np.array([getattr(energy, name) for energy in result.energies]))
-    for index, energy in enumerate(result.energies):
-        if energy.path is not None:
-            arrays |= _path_arrays(PATH.format(index=index), energy.path)
+    """Write a result to a netCDF file, whole or not at all.
+
+    Raises
+    ------
+    ResultFileError
+        Its data has an array under a name that is kept for energies, branches or transitions.
+    """
+    for name in result.data.variables:
+        if RESERVED.match(str(name)):
+            raise ResultFileError(
+                f"the result's data has an array {str(name)!r}, a name that is kept for energies; give it another name."
+            )
+    draft = Draft()
+    ENERGIES.write(draft, result.energies)
+    result.write_extras(draft)
     header = {
         "format": FORMAT,
         "kind": result.kind,
-        "methods": [energy.method for energy in result.energies],
         "scene": dict(result.scene),
         "settings": dict(result.settings),
         "status": result.status,
         "seconds": result.seconds,
         "versions": dict(result.versions),
         "seed": None if result.seed is None else str(result.seed),
+        **draft.header,
     }
-    dataset = result.data.assign(arrays).assign_attrs({HEADER: json.dumps(header)})
+    dataset = result.data.assign(draft.arrays).assign_attrs({HEADER: json.dumps(header)})
     content = dataset.to_netcdf(path=None, engine="scipy")
     write_atomically(Path(path), bytes(content))
 
@@ -61,14 +66,3 @@ def write_content(path: Path, arrays: Mapping[str, tuple[Any, Any]], header: Map
     dataset = xarray.Dataset(dict(arrays), attrs={HEADER: text})
     plain: dict[str, dict[str, Any]] = {name: {"_FillValue": None} for name in arrays}  # no NaN stands for "missing"
     write_atomically(path, bytes(dataset.to_netcdf(path=None, engine="scipy", encoding=plain)))
-
-
-def _path_arrays(prefix: str, path: ExitPath) -> dict[str, Any]:
-    sample, state, section = f"{prefix}sample", f"{prefix}state", f"{prefix}section"
-    return {
-        f"{prefix}t": (sample, path.t),
-        f"{prefix}q": ((sample, state), path.q),
-        f"{prefix}p": ((sample, state), path.p),
-        f"{prefix}action": (sample, path.action),
-        f"{prefix}on_section": (section, path.section),
-    }

@@ -46,6 +46,11 @@ class DerivedContact:
     rooted: bool
     smooth: bool
 
+    @property
+    def bends(self) -> bool:
+        """True if first derivatives of the force jump: at first touch, or where the force is cut at zero."""
+        return self.clamped or self.jumps or _bends(self.law)
+
 
 def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol]) -> DerivedContact:
     """Ask the law of a barrier for its formula and derive its properties."""
@@ -105,6 +110,17 @@ def _jumps(law: sympy.Expr) -> bool:
             "law that is finite at depth 0."
         )
     return sympy.simplify(at_touch) != 0
+
+
+def _bends(law: sympy.Expr) -> bool:
+    slope = sympy.diff(law, DEPTH)
+    try:
+        at_touch = slope.subs(DEPTH, 0)
+        if at_touch.has(sympy.nan, sympy.zoo, sympy.oo):
+            at_touch = sympy.limit(slope, DEPTH, 0, "+")
+    except (NotImplementedError, ValueError):
+        return True
+    return at_touch.is_infinite is not True and sympy.simplify(at_touch) != 0
 
 
 def _leading_power(law: sympy.Expr) -> sympy.Expr | None:

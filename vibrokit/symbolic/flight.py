@@ -69,6 +69,9 @@ class FlightWriter:
         bounds += [sympy.Abs(frequency) for frequency, _, _ in self.waves]
         for row in range(2, 2 + len(extra)):
             bounds.append(sum(sympy.Abs(sympy.diff(self.rates[row], variable)) for variable in self.model.state))
+        # A covariance decays at sums of two rates of the motion.
+        pairs = [(v, rate) for v, rate in zip(self.variables, self.rates, strict=True) if str(v).startswith("W")]
+        bounds += [sympy.Abs(own) for own in dict.fromkeys(sympy.diff(rate, v) for v, rate in pairs) if own != 0]
         printer = SourcePrinter()
         text = printer.doprint(bounds[0])
         for bound in bounds[1:]:

@@ -65,13 +65,18 @@ class ReversedModel(Model):
     def _extra_drift(self) -> tuple[sympy.Expr, ...]:
         return tuple(-self._reversed(rate) for rate in super()._extra_drift)
 
+    @cached_property
+    def amplitude(self) -> sympy.Matrix:
+        """Column σ(q): what multiplies √D dW."""
+        return super().amplitude.applyfunc(self._reversed)
+
     def _reversed(self, expression: sympy.Expr) -> sympy.Expr:
         return sympy.sympify(expression).xreplace({self.state[1]: -self.state[1], self.time: -self.time})
 
 
 def model_for(scene: Scene, flow: Flow) -> Model:
     """Return the model whose equations a flow integrates: that of the scene, or of the scene backwards in time."""
-    return ReversedModel(scene) if flow is Flow.STATE_REVERSED else Model(scene)
+    return ReversedModel(scene) if flow.reversed else Model(scene)
 
 
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
@@ -84,7 +89,15 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
     linear: sympy.Matrix | None = None
     if flow is Flow.STATE_VARIATIONAL:
         linear = drift.jacobian(list(model.state))
-    elif flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
+    elif flow.has_covariance:
+        size = len(model.state)
+        places = [(row, column) for row in range(size) for column in range(row, size)]
+        covariance = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"W{min(i, j)}{max(i, j)}", real=True))
+        carried = drift.jacobian(list(model.state)) * covariance
+        gathered = carried + carried.T + model.diffusion
+        variables = (*model.state, *(covariance[place] for place in places))
+        rates += [gathered[place] for place in places]
+    elif flow.has_momenta:
         hamiltonian = model.hamiltonian_with(drift)
         phase = (*model.state, *model.momenta)
         rates = [sympy.diff(hamiltonian, p) for p in model.momenta]

@@ -24,6 +24,9 @@ class SceneText:
         Whether anything depends on time.
     jumps : bool
         Whether a contact force jumps at first touch.
+    breaks : bool
+        Whether something that the flow integrates jumps at an event: derivatives, covariances and momenta where a
+        contact force does, derivatives of momenta where the derivatives of one do.
     preamble, constants, forcing, derivative, rhs, stops, flight, amplitude, slope : str
         Pieces of the module; empty where the scene has no need of them.
     """
@@ -34,6 +37,7 @@ class SceneText:
     states: int
     forced: bool
     jumps: bool
+    breaks: bool
     preamble: str
     constants: str
     forcing: str

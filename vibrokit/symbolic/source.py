@@ -55,6 +55,7 @@ def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
         states=len(writer.model.state),
         forced=writer.forced,
         jumps=any(contact.jumps for contact in writer.model.contacts),
+        breaks=writer.breaks,
         preamble=writer.preamble(f"The {flow.value} flow of a scene."),
         constants=writer.constants(),
         forcing=writer.forcing(),
@@ -96,6 +97,7 @@ class _SceneWriter:
         contacts = self.model.contacts
         rows = {
             "STATES": len(self.model.state),
+            "MOMENTA": len(self.model.state) if self.flow.has_momenta else 0,
             "EQUATIONS": len(self.variables),
             "BARRIERS": len(contacts),
             "SIDES": tuple(float(barrier.sign) for barrier in self.model.scene.barriers),
@@ -106,12 +108,22 @@ class _SceneWriter:
         }
         if not contacts:
             rows = {name: value for name, value in rows.items() if name not in ("SIDES", "CLAMPED", "ROOTED", "JUMPS")}
+        elif self.flow is Flow.HAMILTONIAN_VARIATIONAL:
+            rows["BENDS"] = self.breaks
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
 
     @property
     def forced(self) -> bool:
         """Whether anything depends on time."""
         return bool(self.model.forcing != 0)
+
+    @property
+    def breaks(self) -> bool:
+        """Whether something that the flow integrates jumps at an event."""
+        if self.flow is Flow.HAMILTONIAN_VARIATIONAL:
+            return any(contact.bends for contact in self.model.contacts)
+        follows = self.flow not in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY)
+        return follows and any(contact.jumps for contact in self.model.contacts)
 
     def forcing(self) -> str:
         """Function `forcing(t, theta)`; nothing for a scene that does not depend on time."""

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import cross
+from vibrokit.kernels.templates.crossing_extremals import cross
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
     EQUATIONS,
@@ -18,7 +18,8 @@ from vibrokit.kernels.templates.scene import (
     stop,
     taylor,
 )
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER
+from vibrokit.kernels.templates.settling import settle
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER, SPARE
 
 # --- scene above, stepper below ---
 
@@ -46,8 +47,9 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
         if BARRIERS > 0:
             if touched >= 0:
                 y[0] = stop(touched, theta)
-                cross(y, memory, pushing, theta, desk)
-                return RAN_OUT
+                settle(y, memory, pushing, theta, desk[SPARE])  # unbroken
+                return RAN_OUT  # unbroken
+                return cross(touched, y, memory, pushing, theta, settings, desk)  # breaking
     return RAN_OUT
 
 

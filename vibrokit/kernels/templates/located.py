@@ -1,7 +1,8 @@
-"""The stops: what touches, how a step is shortened to end on an event, how a contact is followed to its end.
+"""The stops: how a step is shortened to end on an event, how a contact is followed to its end.
 
 Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; it changes only between steps. At
-most one stop is touched at a time.
+most one stop is touched at a time. Lines marked "breaking" or "unbroken" are kept only for scenes and flows in which
+something jumps at the touch of a stop, or nothing does; "bending" or "unbent", where a law is cut at zero.
 """
 
 import numpy as np
@@ -9,18 +10,9 @@ from numba import njit
 
 from vibrokit.kernels.cubic import crossing, summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.scene import (
-    BARRIERS,
-    CLAMPED,
-    EQUATIONS,
-    JUMPS,
-    ROOTED,
-    SIDES,
-    STATES,
-    law,
-    rhs,
-    stop,
-)
+from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
+from vibrokit.kernels.templates.scene import CLAMPED, SIDES, law, rhs, stop
+from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_at, settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
@@ -50,63 +42,6 @@ from vibrokit.kernels.templates.steps import (
 # --- scene above, stepper below ---
 
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
-SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
-DERIVATIVES_JUMP = BARRIERS > 0 and True in JUMPS and EQUATIONS == STATES + STATES * STATES
-
-
-@njit(**INNER)
-def settle(y, memory, pushing, theta, spare):
-    """Find out what is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
-    memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
-    switch_off(pushing)
-    for i in range(BARRIERS):
-        wall, rate = stop(i, theta), SIDES[i] * y[1]
-        depth = SIDES[i] * (y[0] - wall)
-        touched = depth > 0.0
-        if depth == 0.0:
-            switch_off(pushing)
-            rhs(y[CLOCK], y, pushing, theta, spare)
-            acceleration = SIDES[i] * spare[1]
-            # A visit too shallow for x to represent is none.
-            seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
-            touched = rate > 0.0 if seen else acceleration > 0.0
-            if touched and ROOTED[i]:
-                memory[SINCE] = y[CLOCK]
-        if touched:
-            memory[TOUCHED] = i
-            memory[CONTACT_STEP] = memory[FIRST_STEP]
-            memory[PULLED] = 0.0
-            if SOME_CLAMPED:
-                memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
-            pushing[i] = memory[PULLED] == 0.0
-            return
-
-
-@njit(**INNER)
-def cross(y, memory, pushing, theta, desk):
-    """Settle at an event. Where the force jumps, so do the derivatives of the velocity, by its saltation matrix."""
-    if DERIVATIVES_JUMP:
-        rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
-        before = desk[SPARE, 1]
-        settle(y, memory, pushing, theta, desk[SPARE])
-        rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
-        leap = (desk[SPARE, 1] - before) / y[1]
-        if leap != 0.0:
-            for e in range(STATES):
-                y[2 * STATES + e] += leap * y[STATES + e]
-    else:
-        settle(y, memory, pushing, theta, desk[SPARE])
-
-
-@njit(**INNER)
-def switch_off(pushing):
-    for i in range(BARRIERS):
-        pushing[i] = False
-
-
-@njit(**INNER)
-def push_at(i, y, theta):
-    return law(i, max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30), SIDES[i] * y[1], theta)
 
 
 @njit(**INNER)
@@ -235,7 +170,7 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
             h *= 0.5
             continue
         break
-    return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, desk)
+    return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, settings, desk)
 
 
 @njit(**INNER)
@@ -261,7 +196,7 @@ def leaves(i, y, lapse, theta, trial):
 
 
 @njit(**INNER)
-def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, desk):
+def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, settings, desk):
     """Accept the step in TRIAL, or the part of it before the law changes its sign or the mass leaves."""
     trial = desk[TRIAL]
     wall, length, turned = stop(i, theta), h, False
@@ -276,10 +211,12 @@ def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, d
     if turned:
         memory[PULLED] = 1.0 - memory[PULLED]
         memory[SINCE] = np.nan
-        pushing[i] = not pushing[i]
+        pushing[i] = not pushing[i]  # unbent
+        turn_law(i, y, pushing, theta, desk)  # bending
     elif (course == ROOT_DEPTH and sigma + length == 0.0) or SIDES[i] * (y[0] - wall) <= 0.0:
         y[0] = wall
-        cross(y, memory, pushing, theta, desk)
+        settle(y, memory, pushing, theta, desk[SPARE])  # unbroken
+        return cross(i, y, memory, pushing, theta, settings, desk)  # breaking
     return RAN_OUT
 
 

@@ -5,8 +5,10 @@ from numba import njit
 
 from vibrokit.kernels.cubic import summit
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
-from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, cross, land
+from vibrokit.kernels.templates.crossing_extremals import cross
+from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land
 from vibrokit.kernels.templates.scene import BARRIERS, SIDES, stop
+from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     COUNT,
@@ -14,6 +16,7 @@ from vibrokit.kernels.templates.steps import (
     FREE_STEP,
     INNER,
     SPAN,
+    SPARE,
     STAGE,
     TIME,
     TRIAL,
@@ -69,8 +72,9 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
             y[CLOCK] = end
         if BARRIERS > 0 and touched >= 0:
             y[0] = stop(touched, theta)
-            cross(y, memory, pushing, theta, desk)
-            return RAN_OUT
+            settle(y, memory, pushing, theta, desk[SPARE])  # unbroken
+            return RAN_OUT  # unbroken
+            return cross(touched, y, memory, pushing, theta, settings, desk)  # breaking
     return RAN_OUT
 
 

@@ -12,6 +12,7 @@ from numba import njit
 OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 
 STATES = 2
+MOMENTA = 2
 EQUATIONS = 5
 BARRIERS = 2
 SIDES = (1.0, -1.0)

@@ -4,9 +4,10 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
-from vibrokit.kernels.templates.located import press, settle
+from vibrokit.kernels.templates.located import press
 from vibrokit.kernels.templates.order8 import fly
 from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
+from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,

@@ -11,7 +11,16 @@ from numba import njit
 
 from vibrokit.kernels.error_blocks import error_blocks
 from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
-from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS, SIDES, STATES, rhs, stop
+from vibrokit.kernels.templates.scene import (
+    BARRIERS,
+    EQUATIONS,
+    MOMENTA,
+    OPTIONS,
+    SIDES,
+    STATES,
+    rhs,
+    stop,
+)
 
 # --- scene above, stepper below ---
 
@@ -26,7 +35,7 @@ MEMORY = 9
 EPSILON = 2.220446049250313e-16
 # Functions that only kernels call: Numba need not wrap them for Python.
 INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-BLOCKS = error_blocks(STATES, EQUATIONS)
+BLOCKS = error_blocks(STATES, MOMENTA, EQUATIONS)
 HAZY = 2 * STATES + 1 if EQUATIONS > 4 * STATES**2 else EQUATIONS  # the first derivative of momenta
 
 

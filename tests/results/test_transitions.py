@@ -1,0 +1,341 @@
+import itertools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from vibrokit.errors import StructureError
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.in_trees import cheapest_tree, tree_cost
+from vibrokit.results.transitions import Transitions
+
+INF = math.inf
+# Worked by hand. W_0 = V21 + V10 = 3.5, W_1 = V01 + V21 = 2.5, W_2 = V01 + V12 = 4.
+THREE = [[0, 1, 5], [2, 0, 3], [4, 1.5, 0]]
+# A chain 0 – 1 – 2 – 3 has one tree for each root: W = 2+4+6, 1+4+6, 1+3+6, 1+3+5.
+CHAIN = [[0, 1, INF, INF], [2, 0, 3, INF], [INF, 4, 0, 5], [INF, INF, 6, 0]]
+
+
+def exact(energies, labels=None):
+    values = np.array(energies, dtype=float)
+    return Transitions(tuple(labels or range(len(values))), values, values.copy(), values.copy())
+
+
+def between(lower, upper):
+    lower, upper = np.array(lower, dtype=float), np.array(upper, dtype=float)
+    return Transitions(tuple(range(len(lower))), (lower + upper) / 2, lower, upper)
+
+
+def all_tree_costs(energies, root):
+    """Costs of every in-tree, by trying every choice of one arc for each other node."""
+    nodes = [node for node in range(len(energies)) if node != root]
+    for ends in itertools.product(range(len(energies)), repeat=len(nodes)):
+        arcs = dict(zip(nodes, ends, strict=True))
+        for node in nodes:
+            for _ in nodes:
+                node = arcs.get(node, root)
+            if node != root:
+                break
+        else:
+            yield math.fsum(energies[i][j] for i, j in arcs.items())
+
+
+def brute_weights(energies):
+    costs = np.array([min(all_tree_costs(energies, root), default=0.0) for root in range(len(energies))])
+    return costs - costs.min()
+
+
+def jump_generator(energies, intensity):
+    """Generator of jumps at rates exp(−V/D), to many digits."""
+    mpmath.mp.dps = 1500
+    count = len(energies)
+    rates = mpmath.matrix(count, count)
+    for i, j in itertools.permutations(range(count), 2):
+        rates[i, j] = mpmath.exp(-mpmath.mpf(float(energies[i][j])) / intensity)
+    for i in range(count):
+        rates[i, i] = -sum(rates[i, :])
+    return rates
+
+
+def energy(source, target, value, error=0.0):
+    return ActivationEnergy(source, target, value, value - error, value + error, "test", 0.0)
+
+
+# Weights
+
+
+@pytest.mark.parametrize(
+    ("energies", "weights"),
+    [
+        ([[0]], [0]),
+        ([[0, 3], [5, 0]], [2, 0]),
+        (THREE, [1, 0, 1.5]),
+        (CHAIN, [3, 2, 1, 0]),
+    ],
+)
+def test_weights_worked_by_hand(energies, weights):
+    transitions = exact(energies)
+    np.testing.assert_array_equal(transitions.weights, weights)
+    np.testing.assert_array_equal(transitions.weight_bounds, [weights, weights])
+    assert transitions.most_stable == int(np.argmin(weights))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_cheapest_tree_is_that_of_trying_all(seed):
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 6))
+    costs = random.exponential(size=(count, count)).round(random.integers(0, 5))  # coarse rounding makes ties
+    costs[random.random((count, count)) < 0.25] = INF
+    np.fill_diagonal(costs, 0.0)
+    before = costs.copy()
+    for root in range(count):
+        least = min((c for c in all_tree_costs(costs, root) if math.isfinite(c)), default=INF)
+        assert tree_cost(costs, root) == pytest.approx(least, rel=1e-14)
+        tree = cheapest_tree(costs, root)
+        assert (tree is None) == math.isinf(least)
+        if tree is not None:
+            assert sorted(tree) == [node for node in range(count) if node != root]
+    np.testing.assert_array_equal(costs, before)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_in_detailed_balance_weights_are_depths(seed):
+    """V_ij = B_ij − U_i with passes B of equal height from both sides: W_i − min W = U_i − min U."""
+    random = np.random.default_rng(seed)
+    count = 12
+    depths = random.random(count)
+    passes = 1 + random.random((count, count))
+    energies = np.maximum(passes, passes.T) - depths[:, None]
+    np.fill_diagonal(energies, 0.0)
+    np.testing.assert_allclose(exact(energies).weights, depths - depths.min(), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ways_through_others_change_no_weight(seed):
+    """Freidlin and Wentzell, chapter 6, section 4."""
+    energies = np.random.default_rng(seed).exponential(size=(7, 7)) ** 3
+    np.fill_diagonal(energies, 0.0)
+    transitions = exact(energies)
+    assert (transitions.quasi_potentials < energies).any()
+    np.testing.assert_allclose(exact(transitions.quasi_potentials).weights, transitions.weights, atol=1e-12)
+
+
+def test_stationary_weights_are_those_of_the_jump_process():
+    """Jumps at rates exp(−V/D): the null vector of the generator, to the order of its exponents."""
+    intensity = 0.01
+    generator = jump_generator(THREE, intensity)
+    for row in range(3):
+        generator[row, 0] = 1  # one balance is that of the others; in its place, all shares make 1
+    shares = mpmath.lu_solve(generator.T, mpmath.matrix([1, 0, 0]))
+    exponents = np.array([float(-intensity * mpmath.log(share)) for share in shares])
+    found = exact(THREE).stationary_weights(intensity)
+    assert found.weights.sum() == pytest.approx(1)
+    np.testing.assert_allclose(-intensity * np.log(found.weights), exponents, atol=intensity * math.log(3))
+    assert "Prefactors are left out" in str(found)
+
+
+def test_tiny_noise_does_not_overflow():
+    np.testing.assert_array_equal(exact(THREE).stationary_weights(1e-300).weights, [0, 1, 0])
+
+
+# Bounds
+
+
+@pytest.mark.parametrize(("seed", "count"), [(0, 2), (1, 3), (2, 3), (3, 4), (4, 5)])
+def test_bounds_hold_for_all_energies_between(seed, count):
+    random = np.random.default_rng(seed)
+    lower = random.exponential(size=(count, count))
+    upper = lower + random.exponential(size=(count, count)) * (random.random((count, count)) < 0.6)
+    for matrix in (lower, upper):
+        np.fill_diagonal(matrix, 0.0)
+    transitions = between(lower, upper)
+    low, high = transitions.weight_bounds
+    intensity = 0.3
+    shares = transitions.stationary_weights(intensity)
+    for _ in range(300):
+        share = random.random((count, count)).round(random.integers(0, 2))  # many of them at corners
+        weights = brute_weights(lower + share * (upper - lower))
+        assert (low <= weights + 1e-12).all()
+        assert (weights <= high + 1e-12).all()
+        exact_shares = np.exp(-weights / intensity) / np.exp(-weights / intensity).sum()
+        assert (shares.lower <= exact_shares + 1e-12).all()
+        assert (exact_shares <= shares.upper + 1e-12).all()
+        assert int(np.argmin(weights)) in transitions.leading
+
+
+def test_bounds_of_two_are_reached():
+    low, high = between([[0, 1], [4, 0]], [[0, 2], [7, 0]]).weight_bounds
+    np.testing.assert_array_equal(low, [2, 0])
+    np.testing.assert_array_equal(high, [6, 0])
+
+
+def test_a_bracket_that_all_trees_share_changes_nothing():
+    """A chaotic attractor 2 from which all goes to 1: what it costs is in the trees of 0 and 1 alike."""
+    lower = [[0, 1, 9], [2, 0, 9], [9, 3, 0]]
+    upper = [[0, 1, 9], [2, 0, 9], [9, 5, 0]]
+    transitions = between(lower, upper)
+    assert transitions.weight_bounds[0][:2].tolist() == transitions.weight_bounds[1][:2].tolist() == [1, 0]
+    assert transitions.most_stable == 1
+
+
+def test_overlapping_brackets_are_undecided_in_words():
+    transitions = between([[0, 1], [1.4, 0]], [[0, 2], [1.5, 0]])
+    assert transitions.most_stable is None
+    assert transitions.leading == (0, 1)
+    assert "undecided between attractors 0, 1" in str(transitions)
+
+
+def test_equal_attractors_are_undecided():
+    assert exact([[0, 1], [1, 0]]).leading == (0, 1)
+
+
+# What was not found
+
+
+def test_an_attractor_that_no_exit_was_found_from_leaves_all_open():
+    transitions = exact([[0, 1, 2], [INF, 0, INF], [3, 1, 0]], labels=(4, 5, 6))
+    assert transitions.not_left == (5,)
+    assert transitions.most_stable is None
+    assert np.isnan(transitions.weights).all()
+    assert np.isnan(transitions.stationary_weights(1.0).weights).all()
+    assert "No exit was found from attractor 5" in str(transitions)
+    assert "not known" in str(transitions.stationary_weights(1.0))
+    assert [(e.members, e.target) for e in transitions.order_of_escapes] == [((4,), 5), ((6,), 5)]
+
+
+def test_two_pairs_that_nothing_joins_leave_all_open():
+    energies = np.full((4, 4), INF)
+    np.fill_diagonal(energies, 0.0)
+    energies[0, 1] = energies[1, 0] = energies[2, 3] = energies[3, 2] = 1.0
+    transitions = exact(energies)
+    assert transitions.most_stable is None
+    assert "reached from all others" in str(transitions)
+
+
+def test_an_attractor_that_no_way_was_found_into_has_weight_zero():
+    transitions = exact([[0, 1, INF], [2, 0, INF], [1, 1, 0]])
+    assert transitions.weights.tolist() == [1, 0, INF]
+    assert transitions.stationary_weights(0.1).weights[2] == 0
+    assert "No way was found into attractor 2" in transitions.verdict
+
+
+def test_nothing_and_one_attractor():
+    assert exact(np.zeros((0, 0))).order_of_escapes == ()
+    assert "no attractor" in str(exact(np.zeros((0, 0))))
+    alone = exact([[0]], labels=(3,))
+    assert alone.most_stable == 3
+    assert alone.stationary_weights(1.0).weights.tolist() == [1.0]
+
+
+# Order of escapes
+
+
+def seen(transitions):
+    return [(e.members, e.source, e.target, e.energy) for e in transitions.order_of_escapes]
+
+
+def test_escapes_worked_by_hand():
+    """0 and 1 go to and fro; the pair is left from 1, where it mostly is, for 2 at 3 (from 0: 1 + 5)."""
+    assert seen(exact(THREE)) == [((0,), 0, 1, 1), ((2,), 2, 1, 1.5), ((1,), 1, 0, 2), ((0, 1), 1, 2, 3)]
+
+
+def test_groups_within_groups():
+    """Within the pair of 0 and 1 the weight of 0 has the exponent 1, so that it is left at min(1 + 4, 7) from 0."""
+    energies = [[0, 1, 4, 9], [2, 0, 7, 9], [6, 9, 0, 9], [9, 9, 8, 0]]
+    found = seen(exact(energies, labels=(10, 11, 12, 13)))
+    assert found[:4] == [((10,), 10, 11, 1), ((11,), 11, 10, 2), ((10, 11), 10, 12, 5), ((12,), 12, 10, 6)]
+    # W within {0, 1, 2}: to 0: 2 + 6, to 1: 1 + 6, to 2: 2 + 4 (0 → 2 and 1 → 0), so 2, 1, 0; left from 2 at 9.
+    assert found[4:] == [((13,), 13, 12, 8), ((10, 11, 12), 12, 13, 9)]
+
+
+def test_the_words_name_the_groups():
+    words = str(exact(THREE))
+    assert "attractor 0 is left for 1 at 1" in words
+    assert "the group 0, 1 is left from 1 for 2 at 3" in words
+
+
+def test_escapes_carry_their_bounds():
+    (first, second) = between([[0, 1], [2, 0]], [[0, 1.5], [4, 0]]).order_of_escapes
+    assert (first.lower, first.upper) == (1, 1.5)
+    assert (second.lower, second.upper) == (2, 4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_groups_are_left_at_the_rate_of_the_jump_process(seed):
+    """Mean times out of each group from the jump process itself: D log τ is the energy, to the order of D."""
+    random = np.random.default_rng(seed)
+    energies = random.uniform(0.5, 3.0, (4, 4))
+    np.fill_diagonal(energies, 0.0)
+    intensity = 0.005
+    generator = jump_generator(energies, intensity)
+    for escape in exact(energies).order_of_escapes:
+        inside = list(escape.members)
+        own = mpmath.matrix([[-generator[i, j] for j in inside] for i in inside])
+        times = mpmath.lu_solve(own, mpmath.ones(len(inside), 1))
+        longest = float(intensity * mpmath.log(max(times)))
+        assert longest == pytest.approx(escape.energy, abs=intensity * math.log(16))  # of at most 16 trees each
+
+
+# Ways
+
+
+def test_ways_go_through_others_where_that_is_cheaper():
+    transitions = exact(THREE)
+    np.testing.assert_array_equal(transitions.quasi_potentials, [[0, 1, 4], [2, 0, 3], [3.5, 1.5, 0]])
+    assert transitions.route(0, 2) == (0, 1, 2)
+    assert transitions.route(2, 0) == (2, 1, 0)
+    assert transitions.route(1, 1) == (1,)
+    assert exact([[0, INF], [1, 0]]).route(0, 1) == ()
+    assert exact([[0, 0, INF], [0, 0, 0], [INF, 0, 0]]).route(2, 0) == (2, 1, 0)  # at no cost
+    with pytest.raises(StructureError, match="label 7"):
+        transitions.route(0, 7)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_routes_cost_what_is_said(seed):
+    energies = np.random.default_rng(seed).exponential(size=(6, 6)) ** 3
+    np.fill_diagonal(energies, 0.0)
+    transitions = exact(energies)
+    for source, target in itertools.permutations(range(6), 2):
+        route = transitions.route(source, target)
+        cost = math.fsum(energies[a, b] for a, b in itertools.pairwise(route))
+        assert (route[0], route[-1]) == (source, target)
+        assert cost == pytest.approx(transitions.quasi_potentials[source, target], rel=1e-14)
+
+
+# Making one
+
+
+def test_the_least_of_each_pair_is_collected():
+    found = [energy(0, 1, 3.0, 0.5), energy(0, 1, 2.8, 0.1), energy(1, 0, 4.0), energy(0, -2, 1.0), energy(9, 0, 1.0)]
+    transitions = Transitions.of((0, 1), found)
+    np.testing.assert_array_equal(transitions.energies, [[0, 2.8], [4, 0]])
+    np.testing.assert_array_equal(transitions.lower, [[0, 2.5], [4, 0]])
+    np.testing.assert_allclose(transitions.upper, [[0, 2.9], [4, 0]])
+    nothing = Transitions.of((0, 1, 2), [])
+    assert np.isinf(nothing.energies[~np.eye(3, dtype=bool)]).all()
+    assert nothing.not_left == (0, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"labels": (0, 0)}, "2 labels, 1 of them different"),
+        ({"labels": tuple(range(300))}, "at most 200"),
+        ({"lower": np.zeros((2, 3))}, "lower of shape"),
+        ({"energies": np.array([[0, np.nan], [1, 0]])}, "no NaN"),
+        ({"lower": np.array([[0, 2.0], [1, 0]])}, "lower ≤ energies"),
+        ({"upper": np.zeros((2, 2))}, "energies ≤ upper"),
+    ],
+)
+def test_what_is_no_transition_matrix_is_refused(change, words):
+    values = np.array([[0.0, 1.0], [1.0, 0.0]])
+    with pytest.raises(StructureError, match=words):
+        Transitions(**({"labels": (0, 1), "energies": values, "lower": values, "upper": values} | change))
+
+
+@pytest.mark.parametrize("intensity", [0, -1.0, math.nan, math.inf])
+def test_noise_that_is_none_is_refused(intensity):
+    with pytest.raises(StructureError, match="noise intensity"):
+        exact(THREE).stationary_weights(intensity)

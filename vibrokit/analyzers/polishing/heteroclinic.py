@@ -1,0 +1,139 @@
+"""Heteroclinic: from a cut candidate to the extremal path, begun and ended as near to its two ends as wanted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.polishing.carrier import Carrier
+from vibrokit.analyzers.polishing.chain import smooth_chain
+from vibrokit.analyzers.polishing.destinations import Cut
+from vibrokit.analyzers.polishing.endings import ComesTo
+from vibrokit.analyzers.polishing.ends import End
+from vibrokit.analyzers.polishing.newton import Extremum, extremal_path
+from vibrokit.analyzers.polishing.relaxing import relaxed
+
+_LINEAR = 1e-2  # of a path's extent: how near its source a candidate is entered
+_RADIUS = 1e-4  # of a path's extent: how near its two ends the linearised equations take over
+_MOST_ADDED = 400  # section intervals before a candidate that starts far from its source
+
+Array = NDArray[np.float64]
+
+
+def polished(carrier: Carrier, source: End, cuts: Sequence[Cut]) -> Extremum:
+    """Polish a candidate: smoothed as a chain, relaxed to a minimum of the action, solved for by Newton's method.
+
+    Parameters
+    ----------
+    carrier : Carrier
+    source : End
+    cuts : sequence of Cut
+        The candidate ended in several ways, of which the cheapest is taken once they are smoothed.
+
+    Raises
+    ------
+    StructureError
+        No extremal path was found near it.
+    """
+    tried = []
+    for cut in cuts:
+        first, states = _begun(carrier, source, cut.states)
+        tried.append((smooth_chain(carrier, source, first, states, cut.last), first, cut))
+    chain, first, cut = min(tried, key=lambda each: each[0].action)
+    points = relaxed(carrier, source, first, cut.ending, chain.points, cut.last)
+    found = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
+    radius = _RADIUS * extent(found)
+    before, after = _missing_before(carrier, found, radius), _missing_after(carrier, found, radius)
+    return solved_again(carrier, found, before, after)
+
+
+def solved_again(carrier: Carrier, found: Extremum, before: int, after: int) -> Extremum:
+    """Solve for the same path, made longer (or shorter, if negative) by so many nodes before and after."""
+    points, first, ending = found.points, found.first, found.ending
+    if before > 0:
+        points = np.concatenate([found.source.before(points[0], first, before), points])
+    elif before < 0:
+        points = points[-before:]
+    if isinstance(ending, ComesTo):
+        if after > 0:
+            points = np.concatenate([points, ending.end.after(points[-1], ending.phase, after)])
+        elif after < 0:
+            points = points[:after]
+        ending = ComesTo(ending.end, ending.phase + after)
+    last = ending.last(found.free, carrier.piece)
+    return extremal_path(carrier, found.source, first - before, ending, points, last=last)
+
+
+def extent(found: Extremum) -> float:
+    """How far from its source a path comes, in (x, v)."""
+    return float(start_distances(found).max())
+
+
+def start_distances(found: Extremum) -> Array:
+    """Distances in (x, v) from the source, node by node."""
+    nodes = (found.first + np.arange(len(found.points))) % len(found.source.states)
+    return np.linalg.norm(found.points[:, :2] - found.source.states[nodes, :2], axis=1)
+
+
+def end_distances(found: Extremum) -> Array:
+    """Distances in (x, v) from the saddle, node by node, from the end backwards; 0 for a touch."""
+    ending = found.ending
+    if not isinstance(ending, ComesTo):
+        return np.zeros(1)
+    nodes = (ending.phase - np.arange(len(found.points))) % len(ending.end.states)
+    return np.linalg.norm(found.points[::-1, :2] - ending.end.states[nodes, :2], axis=1)
+
+
+def _begun(carrier: Carrier, source: End, states: Array) -> tuple[int, Array]:
+    """Enter a candidate where it last is near its source on the section, or add the way from the source."""
+    size = np.ones(states.shape[1])
+    size[1] = carrier.osc.natural_frequency
+    nodes = np.arange(0, len(states) - 1, carrier.pieces)
+    phases = np.arange(0, len(source.states), carrier.pieces)
+    apart = np.linalg.norm((states[nodes][:, None] - source.states[phases]) / size, axis=2)
+    nearest, closest = phases[np.argmin(apart, axis=1)], apart.min(axis=1)
+    wanted = _LINEAR * float(np.linalg.norm(np.ptp(states, axis=0) / size))
+    near = np.flatnonzero(closest <= wanted)
+    if near.size:
+        return int(nearest[near[-1]]), states[nodes[near[-1]] :]
+    periods = math.ceil(math.log(closest[0] / wanted) / (source.rate() * carrier.pieces))
+    added = min(periods, _MOST_ADDED) * carrier.pieces
+    first = int(nearest[0]) - added
+    orbit = source.states[(first + np.arange(added)) % len(source.states)]
+    return first, np.concatenate([orbit, states])
+
+
+def _missing_before(carrier: Carrier, found: Extremum, radius: float) -> int:
+    """Nodes to add before a path for it to start nearer to the source than a radius; negative: to drop."""
+    each = _grain(carrier)
+    distances = start_distances(found)[::each]
+    if distances[0] <= radius:
+        return -each * (int(np.argmax(distances > radius)) - 1)  # from the last before it first is farther away
+    added, point = 0, found.points[0]
+    while np.linalg.norm((point - found.source.point(found.first - added))[:2]) > radius:
+        point = found.source.before(point, found.first - added, each)[0]
+        added += each
+    return added
+
+
+def _missing_after(carrier: Carrier, found: Extremum, radius: float) -> int:
+    """The same at the other end."""
+    ending, each = found.ending, _grain(carrier)
+    if not isinstance(ending, ComesTo):
+        return 0
+    distances = end_distances(found)[::each]
+    if distances[0] <= radius:
+        return -each * (int(np.argmax(distances > radius)) - 1)
+    added, point = 0, found.points[-1]
+    while np.linalg.norm((point - ending.end.point(ending.phase + added))[:2]) > radius:
+        point = ending.end.after(point, ending.phase + added, each)[-1]
+        added += each
+    return added
+
+
+def _grain(carrier: Carrier) -> int:
+    """Nodes from section to section; without forcing each is on it."""
+    return 1 if carrier.osc.autonomous else carrier.pieces

@@ -1,0 +1,173 @@
+"""The fundamental domain: one start for each extremal path that leaves an attractor."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.quasi_potential import Phase
+from vibrokit.analyzers.shooting.starts import Starts
+
+_MOST_GROWTH = 10.0  # of a radius across a shell: the outer edge is to be in the linear range still
+_ROUNDING = 1e-14
+_THINNEST = 1e-3  # domain that is given more than one row of starts, unless they are very many
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shell:
+    """Between an ellipse of the quadratic form at one time and the image of the ellipse of the shell before.
+
+    In coordinates y = L⁻¹ δq, Σ = L Lᵀ, ellipses are spheres and the linear growth of extremals
+    δq ↦ (M + C M⁻ᵀ Σ⁻¹) δq = Σ' M⁻ᵀ Σ⁻¹ δq becomes B⁻ᵀ, with B = L'⁻¹ M L. Since B Bᵀ = 1 − L'⁻¹ C L'⁻ᵀ, every radius
+    grows, and Bᵀ y, which needs no inverse, is where y was.
+
+    Attributes
+    ----------
+    time : float
+        Since the section (s).
+    point : array (n,)
+    root : array (n, n)
+        L.
+    back : array (n, n)
+        Bᵀ.
+    """
+
+    time: float
+    point: Array
+    root: Array
+    back: Array
+
+    def states(self, directions: Array, radius: float, fractions: Array) -> Array:
+        """Return (q, p, S) at unit vectors (count, n), so far between the two edges on a logarithmic scale."""
+        inner = np.linalg.norm(directions @ self.back.T, axis=1)
+        place = directions * (radius * inner**-fractions)[:, None]
+        momentum = np.linalg.solve(self.root.T, place.T).T
+        return np.column_stack([self.point + place @ self.root.T, momentum, 0.5 * np.sum(place**2, axis=1)])
+
+    def fractions(self, states: Array, radius: float) -> Array:
+        """Return how far between the edges states (count, ≥ n) are; from 0 to below 1 inside the shell."""
+        place = np.linalg.solve(self.root, (states[:, : len(self.point)] - self.point).T).T
+        length = np.linalg.norm(place, axis=1)
+        before = np.linalg.norm(place @ self.back.T, axis=1)
+        return np.log(length / radius) / np.log(length / before)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FundamentalDomain(Starts):
+    """Shells through which each orbit of the growth of extremals passes once: the whole unstable manifold, no more.
+
+    One shell, on the section, where radii grow little in a period of the orbit; several at times between, where they
+    grow much. Without forcing any time is as good as another, so that the inner edge alone has every path.
+
+    A place is the direction in spherical coordinates of the whitened plane, then the fraction of the way from the inner
+    to the outer edge, shells one after another.
+
+    Attributes
+    ----------
+    shells : tuple of Shell
+    radius : float
+        Of the inner edge in whitened coordinates: there Ψ = ½ radius².
+    share : float
+        Of the way out that it is.
+    ratio : float
+        Of the fastest rate at which deviations decay to the slowest.
+    edge_only : bool
+    """
+
+    shells: tuple[Shell, ...]
+    radius: float
+    share: float
+    ratio: float
+    edge_only: bool = False
+
+    @property
+    def dimension(self) -> int:
+        """Of the manifold; one less where time does not matter."""
+        return len(self.shells[0].point) - int(self.edge_only)
+
+    @property
+    def patience(self) -> int:
+        """Longer where a round is cheap, for an overdamped way out is a narrow funnel in a plateau."""
+        return 8 if self.edge_only else 3
+
+    @property
+    def polars(self) -> int:
+        """One for each state of the noise."""
+        return len(self.shells[0].point) - 2
+
+    def states(self, places: Array) -> tuple[Array, Array]:
+        """In each place's shell."""
+        size = len(self.shells[0].point)
+        directions = on_sphere(places[:, : size - 1])
+        which, fractions = self._shell(places)
+        starts, times = np.empty((len(places), 2 * size + 1)), np.empty(len(places))
+        for number, shell in enumerate(self.shells):
+            here = which == number
+            starts[here] = shell.states(directions[here], self.radius, fractions[here])
+            times[here] = shell.time
+        return starts, times
+
+    def fractions(self, places: Array) -> Array:
+        """Across all shells."""
+        return np.zeros(len(places)) if self.edge_only else places[:, -1].copy()
+
+    def grid(self, points: int) -> tuple[int, ...]:
+        """As long as wide where whitened coordinates are measured by their logarithms."""
+        grown = -sum(float(np.log(np.linalg.svd(shell.back, compute_uv=False)).mean()) for shell in self.shells)
+        lengths = [2 * math.pi] + [math.pi] * (len(self.shells[0].point) - 2)
+        lengths += [] if self.edge_only else [max(grown, _THINNEST)]
+        scale = (points / math.prod(lengths)) ** (1 / len(lengths))
+        across = [max(1, round(length * scale)) for length in lengths[1:]]
+        return max(4, round(points / math.prod(across))), *across
+
+    def depth(self, first: Array) -> int:
+        """Where rates differ, all but a narrow fan of directions follows the fastest: the fan is to be reached.
+
+        A path that grows from a share ε of the way out along the slowest direction must start within ε^(r − 1) of it, r
+        the ratio of the fastest rate to the slowest.
+        """
+        finest = self.share ** (self.ratio - 1)
+        return max(0, math.ceil(math.log(max(float(first[0]) / max(finest, _ROUNDING), 1.0), 3)))
+
+    def _shell(self, places: Array) -> tuple[NDArray[np.int64], Array]:
+        if self.edge_only:
+            return np.zeros(len(places), dtype=np.int64), np.zeros(len(places))
+        across = places[:, -1] * len(self.shells)
+        which = np.minimum(across.astype(np.int64), len(self.shells) - 1)
+        return which, across - which
+
+
+def shells_of(phases: Sequence[Phase]) -> tuple[Shell, ...]:
+    """Make as few shells, at equal times, as keep the growth across each within a factor of 10; no more than phases."""
+    count = len(phases)
+    for shells in (number for number in range(1, count + 1) if count % number == 0):
+        made = tuple(_shell(phases, last, count // shells) for last in range(0, count, count // shells))
+        if all(1 / np.linalg.svd(shell.back, compute_uv=False)[-1] <= _MOST_GROWTH for shell in made):
+            break
+    return made
+
+
+def _shell(phases: Sequence[Phase], last: int, steps: int) -> Shell:
+    here, before = phases[last], phases[last - steps]
+    root = np.linalg.cholesky(here.covariance)
+    monodromy = np.eye(len(here.point))
+    for number in range(last - steps + 1, last + 1):
+        monodromy = phases[number].monodromy @ monodromy
+    back = np.linalg.solve(root, monodromy @ np.linalg.cholesky(before.covariance)).T
+    return Shell(here.time, here.point, np.asarray(root, dtype=float), np.asarray(back, dtype=float))
+
+
+def on_sphere(places: Array) -> Array:
+    """Return unit vectors (count, k + 1) of places (count, k): an angle in turns, then polar ones in half turns."""
+    angle = 2 * np.pi * places[:, :1]
+    vectors = np.hstack([np.cos(angle), np.sin(angle)])
+    for number in range(1, places.shape[1]):
+        polar = np.pi * places[:, number : number + 1]
+        vectors = np.hstack([vectors * np.sin(polar), np.cos(polar)])
+    return vectors

@@ -1,0 +1,60 @@
+"""Which stop is touched, and whether it pushes."""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES, law, rhs, stop
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
+    CONTACT_STEP,
+    EPSILON,
+    FIRST_STEP,
+    INNER,
+    PULLED,
+    SINCE,
+    TIMED,
+    TOUCHED,
+)
+
+# --- scene above, stepper below ---
+
+SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
+
+
+@njit(**INNER)
+def settle(y, memory, pushing, theta, spare):
+    """Find out what is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
+    memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
+    switch_off(pushing)
+    for i in range(BARRIERS):
+        wall, rate = stop(i, theta), SIDES[i] * y[1]
+        depth = SIDES[i] * (y[0] - wall)
+        touched = depth > 0.0
+        if depth == 0.0:
+            switch_off(pushing)
+            rhs(y[CLOCK], y, pushing, theta, spare)
+            acceleration = SIDES[i] * spare[1]
+            # A visit too shallow for x to represent is none.
+            seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
+            touched = rate > 0.0 if seen else acceleration > 0.0
+            if touched and ROOTED[i]:
+                memory[SINCE] = y[CLOCK]
+        if touched:
+            memory[TOUCHED] = i
+            memory[CONTACT_STEP] = memory[FIRST_STEP]
+            memory[PULLED] = 0.0
+            if SOME_CLAMPED:
+                memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
+            pushing[i] = memory[PULLED] == 0.0
+            return
+
+
+@njit(**INNER)
+def switch_off(pushing):
+    for i in range(BARRIERS):
+        pushing[i] = False
+
+
+@njit(**INNER)
+def push_at(i, y, theta):
+    return law(i, max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30), SIDES[i] * y[1], theta)
