@@ -3,15 +3,14 @@
 A path from the attractor's orbit to the saddle's is a chain of quintic Hermite elements (position, velocity and
 acceleration at every node; the noise u = x″ + 2ζx′ + spring − push that it needs follows by differentiation); Gauss
 quadrature gives its action, a banded Newton method with Levenberg's damping the least one. Neither momentum nor
-shooting takes part, except in first guesses (`reference_guesses`). Elements in which a stop is met, where x⁗ jumps, are halved again and
-again. Every path in the window is one that noise could drive, so up to quadrature a value is an upper bound of the
-least action, and a Hessian that Cholesky accepts shows a local minimum.
+shooting takes part, except in first guesses (`reference_guesses`). Elements in which a stop is met, where x⁗ jumps,
+are halved again and again. Every path in the window is one that noise could drive, so up to quadrature a value is an
+upper bound of the least action, and a Hessian that Cholesky accepts shows a local minimum.
 
 `ENERGIES` were computed with 96, 192 and 384 elements a period, those at the stops 60 times shorter, and again with
-28 to 44 periods more; the error is what the last steps of either changed. They are the lowest minima found: of 40
-random guesses and 300 shot ones (hertz-0.570, clear: next 8.354e-5, 8.706e-5, 8.63e-4, 1.038e-3), of 200 shot ones
-and 250 kicks (hammering: next about 8.9e-4 … 1.04e-3 on coarse grids, of which all refined ended in the lowest), of
-18 (hertz-0.525, clear: no other), of 40 and 111 kicks (hammering: next 7.95e-5, 7.96e-5, 8.45e-5, 8.49e-5, 8.63e-5).
+28 to 44 periods more; the error is what the last steps of either changed. They are the lowest minima found, which is
+no proof that there is none below. Found besides, on refined grids: from 0.570's clear state 8.354e-5, 8.706e-5, 8.63e-4,
+1.038e-3; from 0.525's hammering orbit 7.95e-5, 7.96e-5, 8.45e-5, 8.49e-5, 8.63e-5 and a dozen up to 1.1e-4.
 """
 
 from __future__ import annotations

@@ -127,6 +127,8 @@ def custom():
 
 
 # Rates of -1.7 make 1 + 0.75 rate negative: the law would pull, and the stop lets go.
+# Covariances are held against SciPy in tests/kernels/test_gramian.py.
+FLOWS = [flow for flow in Flow if flow not in (Flow.GRAMIAN, Flow.GRAMIAN_REVERSED)]
 CASES = {
     "hertz": Case(
         oscillator(stop(vk.Hertz(50.0), "right"), stop(vk.Hertz(50.0), "left")),
@@ -239,7 +241,7 @@ def relative_errors(found, exact):
     return errors
 
 
-@pytest.mark.parametrize("flow", list(Flow), ids=lambda flow: flow.value)
+@pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.value)
 @pytest.mark.parametrize("name", CASES)
 def test_lanes(name, flow):
     case = CASES[name]
@@ -251,7 +253,7 @@ def test_lanes(name, flow):
             assert max(errors) <= TOLERANCE, f"at x = {x!r}, v = {v}, entry {int(np.argmax(errors))}"
 
 
-@pytest.mark.parametrize("flow", list(Flow), ids=lambda flow: flow.value)
+@pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.value)
 @pytest.mark.parametrize("name", ["hertz", "linear", "hunt-crossley"])
 def test_lanes_exactly_at_touch(name, flow):
     """At depth 0 nothing pushes yet, and no derivative is infinite."""
