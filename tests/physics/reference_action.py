@@ -9,7 +9,8 @@ upper bound of the least action, and a Hessian that Cholesky accepts shows a loc
 
 `ENERGIES` were computed with 96, 192 and 384 elements a period, those at the stops 60 times shorter, and again with
 28 to 44 periods more; the error is what the last steps of either changed. They are the lowest minima found, which is
-no proof that there is none below. Found besides, on refined grids: from 0.570's clear state 8.354e-5, 8.706e-5, 8.63e-4,
+no proof that there is none below. Found besides, on refined grids: from 0.570's clear state 8.354e-5, 8.706e-5,
+8.63e-4,
 1.038e-3; from 0.525's hammering orbit 7.95e-5, 7.96e-5, 8.45e-5, 8.49e-5, 8.63e-5 and a dozen up to 1.1e-4.
 """
 

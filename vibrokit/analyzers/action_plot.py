@@ -231,7 +231,7 @@ def _by_points(actions: Array, value: float) -> float:
 
 
 def _short_of_a_touch(path: ExitPath, interval: float) -> float:
-    """What a path saves that turns back at the stop between two looks, by as much as none of them sees: p₁ ½ a (τ/2)²."""
+    """What a path saves that turns back at the stop between two looks, by as much as none of them sees: p₁ ½ a (τ/2)²."""  # noqa: E501
     spacing = float(path.t[1] - path.t[0])
     acceleration = float(np.abs(np.diff(path.q[-3:, 1])).max()) / spacing
     return float(abs(path.p[-1, 0])) * acceleration * interval**2 / 8

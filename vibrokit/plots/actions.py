@@ -20,6 +20,7 @@ _PARTS = 360
 _SHOWN = 10.0  # times the least action, up to which colours tell actions apart
 _COLOURS = "viridis"
 _BELOW = 1.4
+_TOP = 300.0  # times the largest energy: what is dearer is not looked for
 
 
 def _labels(data: xarray.Dataset, prefix: str) -> list[int]:
@@ -55,8 +56,8 @@ def action_plot(data: xarray.Dataset, energies: Sequence[Any], *, ax: Axes | Non
         angle, action = data[f"angle_{label}"].values, data[f"action_{label}"].values
         whole = np.any(data[f"radius_{label}"].values > 0)
         artists += axes.plot(
-            np.degrees(angle), action, ".", markersize=0.8 if whole else 1.5, color=colour(label), rasterized=True,
-            alpha=0.35 if whole else 1.0, markeredgewidth=0, label=f"leaving attractor {label}",
+            np.degrees(angle), action, ".", markersize=1.4 if whole else 1.5, color=colour(label), rasterized=True,
+            alpha=0.5 if whole else 1.0, markeredgewidth=0, label=f"leaving attractor {label}",
         )  # fmt: skip
         if whole:
             middle, least = _least_by_angle(angle, action)
@@ -74,7 +75,8 @@ def action_plot(data: xarray.Dataset, energies: Sequence[Any], *, ax: Axes | Non
     axes.set_yscale("log")
     axes.set_xlim(0, 360)
     low, high = axes.get_ylim()
-    axes.set_ylim(low / _BELOW, high)  # room for the numbers under the lines
+    dearest = max((_TOP * energy.value for energy in energies), default=high)
+    axes.set_ylim(low / _BELOW, min(high, dearest))  # room for the numbers under the lines
     axes.set_xlabel(r"angle of the start $\theta$ (°)")
     axes.set_ylabel(r"action at the exit $S$ (m$^2$ s$^{-3}$)")
     axes.xaxis.set_major_locator(MultipleLocator(60))
@@ -112,7 +114,7 @@ def action_map(data: xarray.Dataset, label: int, *, ax: Axes | None = None) -> l
     order = np.flatnonzero(out)[np.argsort(-action[out], kind="stable")]  # the cheap ones drawn last
     least = float(action[out].min()) if out.any() else 1.0
     points = axes.scatter(
-        np.degrees(angle[order]), radius[order], c=action[order], s=1.5, linewidths=0, rasterized=True, cmap=_COLOURS,
+        np.degrees(angle[order]), radius[order], c=action[order], s=2.5, linewidths=0, rasterized=True, cmap=_COLOURS,
         norm=LogNorm(least, _SHOWN * least), zorder=2,
     )  # fmt: skip
     artists.append(points)

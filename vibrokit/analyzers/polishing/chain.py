@@ -10,7 +10,6 @@ import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.polishing.carrier import Carrier, Linear
-from vibrokit.analyzers.polishing.ends import End
 from vibrokit.errors import StructureError
 
 _ITERATIONS = 80
@@ -29,7 +28,7 @@ class Chain:
     points : array (nodes, 2n)
         (q, p) at each node.
     action : float
-        Priced piece by piece by ½ eᵀC⁻¹e, the start by ½ δqᵀΠδq.
+        Priced piece by piece by ½ eᵀC⁻¹e.
     """
 
     points: Array
@@ -42,21 +41,18 @@ class _Look:
 
     linear: Linear
     weights: Array
-    start: Array
     misses: Array
 
     @property
     def action(self) -> float:
-        return 0.5 * float(self.start @ self.start + np.sum(self.misses**2))
+        return 0.5 * float(np.sum(self.misses**2))
 
 
 class _Smoother:
-    """Levenberg and Marquardt's method on the states at the nodes, the last of which stays where it is."""
+    """Levenberg and Marquardt's method on the states at the nodes, the first and last of which stay where they are."""
 
-    def __init__(self, carrier: Carrier, source: End, first: int, last: float | None) -> None:
-        self.carrier, self.source, self.first, self.last = carrier, source, first, last
-        values, vectors = np.linalg.eigh(source.stiffness(first))
-        self.root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    def __init__(self, carrier: Carrier, first: int, last: float | None) -> None:
+        self.carrier, self.first, self.last = carrier, first, last
 
     def look(self, states: Array) -> _Look | None:
         """Price a chain; None where its numbers run out of range."""
@@ -68,23 +64,19 @@ class _Smoother:
         except np.linalg.LinAlgError:
             return None
         misses = np.einsum("kij,kj->ki", weights, states[1:] - linear.images)
-        start = self.root @ (states[0] - self.source.states[self.source.node(self.first)])
-        return _Look(linear, weights, start, misses)
+        return _Look(linear, weights, misses)
 
     def slopes(self, look: _Look) -> scipy.sparse.csr_array:
-        """Derivatives of all residuals in the states but the last; those of the weights are left out."""
+        """Derivatives of all misses in the states between the ends; those of the weights are left out."""
         count, n = look.misses.shape
-        diagonal = [self.root, *look.weights[:-1]]
-        below = -look.weights @ look.linear.steps
+        inner, grid = np.arange(count - 1), np.arange(n)
         rows, columns, values = [], [], []
-        grid = np.arange(n)
-        for shift, blocks in ((0, np.array(diagonal)), (1, below)):
-            numbers = np.arange(count)
-            rows.append(np.repeat(((numbers + shift) * n)[:, None] + grid, n, axis=1).ravel())
-            columns.append(np.tile((numbers * n)[:, None] + grid, (1, n)).ravel())
+        for shift, blocks in ((0, look.weights[:-1]), (1, -(look.weights @ look.linear.steps)[1:])):
+            rows.append(np.repeat(((inner + shift) * n)[:, None] + grid, n, axis=1).ravel())
+            columns.append(np.tile((inner * n)[:, None] + grid, (1, n)).ravel())
             values.append(blocks.ravel())
         table = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return scipy.sparse.csr_array(table, shape=((count + 1) * n, count * n))
+        return scipy.sparse.csr_array(table, shape=(count * n, (count - 1) * n))
 
     def smooth(self, states: Array) -> tuple[Array, _Look]:
         """Descend until the action no longer falls."""
@@ -94,14 +86,14 @@ class _Smoother:
         damping = _FIRST_DAMPING
         for _ in range(_ITERATIONS):
             slopes = self.slopes(look)
-            downhill = -slopes.T @ np.concatenate([look.start, look.misses.ravel()])
+            downhill = -slopes.T @ look.misses.ravel()
             square = (slopes.T @ slopes).tocsc()
             before = look.action
             while damping < _MOST_DAMPING:
                 raised = square + damping * scipy.sparse.diags_array(square.diagonal())
                 step = scipy.sparse.linalg.splu(raised.tocsc(), permc_spec="NATURAL").solve(downhill)
                 tried = states.copy()
-                tried[:-1] += step.reshape(tried[:-1].shape)
+                tried[1:-1] += step.reshape(tried[1:-1].shape)
                 new = self.look(tried)
                 if new is not None and new.action < before:
                     states, look, damping = tried, new, damping / 10
@@ -114,7 +106,7 @@ class _Smoother:
         return states, look
 
 
-def smooth_chain(carrier: Carrier, source: End, first: int, states: Array, last: float | None = None) -> Chain:
+def smooth_chain(carrier: Carrier, first: int, states: Array, last: float | None = None) -> Chain:
     """Make a guessed path the cheapest of its length, by the quadratic price of its pieces.
 
     Over a piece of an eighth of a period, ½ eᵀC⁻¹e is within some 0.2 % of the least action from one node to the next,
@@ -124,12 +116,10 @@ def smooth_chain(carrier: Carrier, source: End, first: int, states: Array, last:
     Parameters
     ----------
     carrier : Carrier
-    source : End
-        The orbit that the path leaves.
     first : int
-        Phase of the first node, in pieces from point 0 of the source.
+        Phase of the first node, in pieces since the section.
     states : array (nodes, n)
-        The guess, a piece apart. The last stays as it is.
+        The guess, a piece apart, three or more. The first and the last stay as they are.
     last : float, optional
         Length of the last piece (s), if it is not one like the others.
 
@@ -138,7 +128,7 @@ def smooth_chain(carrier: Carrier, source: End, first: int, states: Array, last:
     StructureError
         The guess runs out of range.
     """
-    smoother = _Smoother(carrier, source, first, last)
+    smoother = _Smoother(carrier, first, last)
     states, look = smoother.smooth(states)
     ends = np.einsum("kji,kj->ki", look.weights, look.misses)
     starts = np.einsum("kji,kj->ki", look.linear.steps, ends)

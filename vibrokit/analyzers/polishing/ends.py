@@ -52,13 +52,6 @@ class End:
         """The orbit as (q, p)."""
         return np.concatenate([self.states[self.node(phase)], np.zeros(self.states.shape[1])])
 
-    def stiffness(self, phase: int) -> Array:
-        """Matrix Π of a path that has left the orbit: p = Π δq, S = ½ δqᵀ Π δq; Σ⁻¹ for an attractor."""
-        n = self.states.shape[1]
-        basis = self.leaving[self.node(phase)]
-        form = np.linalg.solve(basis[:n].T, basis[n:].T).T
-        return (form + form.T) / 2
-
     def before(self, point: Array, phase: int, count: int) -> Array:
         """Return (q, p) at `count` nodes before a point that lies in the unstable space, the earliest first."""
         offset, nodes = point - self.point(phase), []

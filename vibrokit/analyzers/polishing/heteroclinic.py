@@ -16,9 +16,10 @@ from vibrokit.analyzers.polishing.ends import End
 from vibrokit.analyzers.polishing.newton import Extremum, extremal_path
 from vibrokit.analyzers.polishing.relaxing import relaxed
 
-_LINEAR = 1e-2  # of a path's extent: how near its source a candidate is entered
+_NEAR = 1e-3  # of a path's extent: how near its source a candidate is entered
 _RADIUS = 1e-4  # of a path's extent: how near its two ends the linearised equations take over
-_MOST_ADDED = 400  # section intervals before a candidate that starts far from its source
+_CLOSER, _UNCHANGED = 4, 1e-8  # tenths of that, until the action stays, relative to itself
+_MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
 
@@ -41,11 +42,23 @@ def polished(carrier: Carrier, source: End, cuts: Sequence[Cut]) -> Extremum:
     tried = []
     for cut in cuts:
         first, states = _begun(carrier, source, cut.states)
-        tried.append((smooth_chain(carrier, source, first, states, cut.last), first, cut))
+        tried.append((smooth_chain(carrier, first, states, cut.last), first, cut))
     chain, first, cut = min(tried, key=lambda each: each[0].action)
-    points = relaxed(carrier, source, first, cut.ending, chain.points, cut.last)
+    points = relaxed(carrier, first, cut.ending, chain.points, cut.last)
     found = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
     radius = _RADIUS * extent(found)
+    found = _within(carrier, found, radius)
+    for _ in range(_CLOSER):
+        radius /= 10
+        closer = _within(carrier, found, radius)
+        if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
+            break
+        found = closer
+    return found
+
+
+def _within(carrier: Carrier, found: Extremum, radius: float) -> Extremum:
+    """The same path, begun and ended within a radius of its two ends."""
     before, after = _missing_before(carrier, found, radius), _missing_after(carrier, found, radius)
     return solved_again(carrier, found, before, after)
 
@@ -88,22 +101,27 @@ def end_distances(found: Extremum) -> Array:
 
 
 def _begun(carrier: Carrier, source: End, states: Array) -> tuple[int, Array]:
-    """Enter a candidate where it last is near its source on the section, or add the way from the source."""
+    """Begin a candidate on its source, at the section where it last is near, or long enough before its first state.
+
+    It stays on the orbit there until the path is polished: the linearised equations would price a start far off, where
+    they do not hold, for next to nothing.
+    """
     size = np.ones(states.shape[1])
     size[1] = carrier.osc.natural_frequency
-    nodes = np.arange(0, len(states) - 1, carrier.pieces)
+    nodes = np.arange(0, len(states) - 1, _grain(carrier))
     phases = np.arange(0, len(source.states), carrier.pieces)
     apart = np.linalg.norm((states[nodes][:, None] - source.states[phases]) / size, axis=2)
     nearest, closest = phases[np.argmin(apart, axis=1)], apart.min(axis=1)
-    wanted = _LINEAR * float(np.linalg.norm(np.ptp(states, axis=0) / size))
+    wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / size))
     near = np.flatnonzero(closest <= wanted)
-    if near.size:
-        return int(nearest[near[-1]]), states[nodes[near[-1]] :]
-    periods = math.ceil(math.log(closest[0] / wanted) / (source.rate() * carrier.pieces))
-    added = min(periods, _MOST_ADDED) * carrier.pieces
-    first = int(nearest[0]) - added
-    orbit = source.states[(first + np.arange(added)) % len(source.states)]
-    return first, np.concatenate([orbit, states])
+    entered = int(nodes[near[-1]]) if near.size else 0
+    first, states = int(nearest[entered // _grain(carrier)]), states[entered:]
+    if not near.size:
+        periods = math.ceil(math.log(closest[0] / wanted) / (source.rate() * carrier.pieces))
+        added = min(periods, _MOST_ADDED) * carrier.pieces
+        first -= added
+        states = np.concatenate([source.states[(first + np.arange(added)) % len(source.states)], states])
+    return first, np.concatenate([source.point(first)[None, : states.shape[1]], states[1:]])
 
 
 def _missing_before(carrier: Carrier, found: Extremum, radius: float) -> int:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.polishing.carrier import Carrier, Extremal
 from vibrokit.analyzers.polishing.endings import Ending
-from vibrokit.analyzers.polishing.ends import End
 
 _ITERATIONS = 100
 _INNER = 8
@@ -34,10 +33,9 @@ class _Look:
 class _Relaxer:
     """Newton's method on the action as a function of the states at the nodes, damped until it descends."""
 
-    def __init__(self, carrier: Carrier, source: End, first: int, ending: Ending, last: float | None) -> None:
+    def __init__(self, carrier: Carrier, first: int, ending: Ending, last: float | None) -> None:
         n = carrier.size
         self.carrier, self.first, self.last, self.n = carrier, first, last, n
-        self.origin, self.opening = source.point(first)[:n], source.stiffness(first)
         self.target, closing = ending.closing(n)
         self.pinned = closing is None
         self.closing = np.zeros((n, n)) if closing is None else closing
@@ -51,10 +49,10 @@ class _Relaxer:
             if not np.isfinite(carried.slopes).all():
                 return None
             if np.all(np.abs(misses) <= _MATCHED * extent):
-                head, tail = states[0] - self.origin, states[-1] - self.target
-                ends = 0.5 * float(head @ self.opening @ head + tail @ self.closing @ tail)
+                tail = states[-1] - self.target
+                after = 0.5 * float(tail @ self.closing @ tail)
                 missed = float(np.sum(carried.images[:, self.n :] * misses))
-                return _Look(states, momenta, carried, ends + float(np.sum(carried.actions)) + missed)
+                return _Look(states, momenta, carried, float(np.sum(carried.actions)) + missed + after)
             momenta = momenta + np.linalg.solve(carried.slopes[:, : self.n, self.n :], misses[..., None])[..., 0]
         return None
 
@@ -66,10 +64,11 @@ class _Relaxer:
         return self.look(look.states + step, lifted)
 
     def gradient(self, look: _Look) -> Array:
-        """∂S/∂q at each node: the momentum that comes in less the one that goes out."""
-        incoming = np.vstack([self.opening @ (look.states[0] - self.origin), look.carried.images[:, self.n :]])
+        """∂S/∂q at each node: the momentum that comes in less the one that goes out; 0 where the state is held."""
         outgoing = np.vstack([look.momenta, -(self.closing @ (look.states[-1] - self.target))])
-        slope = incoming - outgoing
+        slope = -outgoing
+        slope[1:] += look.carried.images[:, self.n :]
+        slope[0] = 0.0
         if self.pinned:
             slope[-1] = 0.0
         return slope
@@ -82,8 +81,8 @@ class _Relaxer:
         below = slopes[:, n:, :n] - slopes[:, n:, n:] @ here
         diagonal = np.concatenate([here, self.closing[None]])
         diagonal[1:] += slopes[:, n:, n:] @ turn
-        diagonal[0] += self.opening
         below = (below - turn.transpose(0, 2, 1)) / 2
+        below[0] = 0.0
         if self.pinned:
             below[-1] = 0.0
         return (diagonal + diagonal.transpose(0, 2, 1)) / 2, below
@@ -115,23 +114,19 @@ class _Relaxer:
         return look
 
 
-def relaxed(
-    carrier: Carrier, source: End, first: int, ending: Ending, points: Array, last: float | None = None
-) -> Array:
-    """Bring a path down to a local minimum of the action, with its pieces extremal and its ends linear.
+def relaxed(carrier: Carrier, first: int, ending: Ending, points: Array, last: float | None = None) -> Array:
+    """Bring a path down to a local minimum of the action, with its pieces extremal and its first state held.
 
     The action of a piece as a function of the states at its two nodes has the momenta for its derivatives, and blocks
     of the variational equations for its second ones: Newton's method for the least sum has a banded matrix, and where
-    a step would not descend it is damped. What comes out solves the same equations as `extremal_path`; it comes to it
-    from farther away, and only to minima.
+    a step would not descend it is damped. It comes to the solution of `extremal_path` from farther away, and to minima
+    only.
 
     Parameters
     ----------
     carrier : Carrier
-    source : End
-        The orbit that the path leaves.
     first : int
-        Phase of the first node, in pieces from point 0 of the source.
+        Phase of the first node, in pieces since the section.
     ending : Ending
     points : array (nodes, 2n)
         Guess of (q, p).
@@ -143,7 +138,7 @@ def relaxed(
     array (nodes, 2n)
         The guess itself where it cannot be priced.
     """
-    relaxer = _Relaxer(carrier, source, first, ending, last)
+    relaxer = _Relaxer(carrier, first, ending, last)
     n = relaxer.n
     look = relaxer.relax(points[:, :n], points[:-1, n:])
     if look is None:
