@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from vibrokit.analyzers.action_graph import ActionGraph as ActionGraph
     from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
     from vibrokit.analyzers.analyzer import Analyzer as Analyzer
     from vibrokit.analyzers.exits import FirstContact as FirstContact
@@ -46,6 +47,7 @@ __version__ = "0.1.0"
 
 # The same imports once more, for use; tests/test_import.py holds the two lists together.
 _HOMES = {
+    "ActionGraph": "vibrokit.analyzers.action_graph",
     "ActionPlot": "vibrokit.analyzers.action_plot",
     "Analyzer": "vibrokit.analyzers.analyzer",
     "FirstContact": "vibrokit.analyzers.exits",

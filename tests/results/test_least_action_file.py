@@ -18,6 +18,7 @@ from vibrokit.results.certificate import Certificate
 from vibrokit.results.energy import ActivationEnergy, ExitPath
 from vibrokit.results.files import ResultFileError
 from vibrokit.results.least_action import LeastActionResult
+from vibrokit.results.quasi_potential import QuasiPotential
 from vibrokit.results.section import Section
 from vibrokit.results.transitions import Transitions
 
@@ -63,7 +64,7 @@ def everything() -> LeastActionResult:
     potential[potential > 2] = np.inf
     return LeastActionResult(
         energies=energies,
-        data=section().data.assign(quasi_potential_2=(("cell_x", "cell_v"), potential)),
+        data=section().data.merge(QuasiPotential(2, potential, section().bounds).data),
         scene={"natural_frequency": 1.0, "noise": {"name": "white", "intensity": 2e-5}},
         settings={"orbits": 3},
         status="All is well – nearly.",
@@ -232,6 +233,12 @@ LIES = {
     "a region in words": (region("all"), "attribute 'region'"),
     "a region of three numbers": (region([0.0, 1.0, 2.0]), "attribute 'region'"),
     "a region inside out": (region([1.0, 0.0, 0.0, 1.0]), "region: x goes from 1"),
+    "a potential without a box": (drop("quasi_potential_box_2"), "no array 'quasi_potential_box_2'"),
+    "a potential's box inside out": (put("quasi_potential_box_2", (0, 0), 9.0), "quasi_potential_box_2"),
+    "a potential of one node": (
+        replaced("quasi_potential_2", np.ones((1, 1)), "one", "two"),
+        "fewer than two nodes along a side",
+    ),
     "a potential in one row": (replaced("quasi_potential_2", [1.0], "one"), "'quasi_potential_2' has shape"),
     "a potential in letters": (
         lambda d, h: d.assign(quasi_potential_2=d["quasi_potential_2"].astype("S1")),

@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.polishing.at_saddle import SaddleGoal
 from vibrokit.analyzers.polishing.destinations import Goal
 from vibrokit.analyzers.polishing.touch import TouchGoal
+from vibrokit.analyzers.screening.grids import Grids
+from vibrokit.analyzers.screening.touching import ways_to_touch
+from vibrokit.analyzers.screening.ways_out import Way, home, ways_to_leave
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.saddle import Saddle
 from vibrokit.results.structure import Structure
 
@@ -50,6 +55,16 @@ class Exit(ABC):
     @abstractmethod
     def goals(self, osc: Oscillator, structure: Structure, home: int) -> tuple[tuple[Goal, ...], tuple[str, ...]]:
         """Return what a path of least action from the attractor `home` may end on, and what is left out, in words."""
+
+    @abstractmethod
+    def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
+        """Return what a graph has to reach, from where its paths are followed back."""
+
+    @abstractmethod
+    def within(
+        self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper, grids: Grids, phase: int
+    ) -> NDArray[np.bool_]:
+        """Return which nodes of a phase of a graph lie before the exit, shape (nx, nv)."""
 
     @abstractmethod
     def beyond(self, osc: Oscillator, states: Array) -> NDArray[np.bool_]:
@@ -96,6 +111,16 @@ class LeaveBasin(Exit):
             for number, saddle in named
         ), words
 
+    def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
+        """The saddles on the basin's boundary, and basins that none leads to."""
+        return ways_to_leave(osc, structure, attractor, stepper)
+
+    def within(
+        self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper, grids: Grids, phase: int
+    ) -> NDArray[np.bool_]:
+        """Those of the basin."""
+        return home(osc, structure, attractor, stepper, grids, phase)
+
     def beyond(self, osc: Oscillator, states: Array) -> NDArray[np.bool_]:
         """None: only where the motion leads to tells."""
         return np.zeros(np.shape(states)[:-1], dtype=bool)
@@ -140,6 +165,16 @@ class FirstContact(Exit):
     def goals(self, osc: Oscillator, structure: Structure, home: int) -> tuple[tuple[Goal, ...], tuple[str, ...]]:
         """The stops."""
         return tuple(TouchGoal(-1, -1, side, position) for side, position in self.walls(osc).items()), ()
+
+    def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
+        """The stops, at whatever time."""
+        return ways_to_touch(osc, attractor, self.walls(osc).values(), stepper)
+
+    def within(
+        self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper, grids: Grids, phase: int
+    ) -> NDArray[np.bool_]:
+        """Those that touch no stop."""
+        return ~self.beyond(osc, grids.nodes(phase))
 
     def beyond(self, osc: Oscillator, states: Array) -> NDArray[np.bool_]:
         """Those at a stop or in it."""

@@ -9,6 +9,7 @@ from typing import Any
 import xarray
 
 from vibrokit.errors import nearest
+from vibrokit.results.action_graph import ActionGraphResult
 from vibrokit.results.action_plot import ActionPlotResult
 from vibrokit.results.content import Content, ResultFileError, open_content, seed_of, taken, versions_of
 from vibrokit.results.continuation import Continuation
@@ -79,7 +80,7 @@ def _result_reader(record: type[Result]) -> Callable[[Content], Result]:
     return read
 
 
-_RESULTS = (ActionPlotResult, LeastActionResult)
+_RESULTS = (ActionGraphResult, ActionPlotResult, LeastActionResult)
 _READERS: Mapping[str, Callable[[Content], Any]] = {
     STRUCTURE: read_structure,
     CONTINUATION: read_continuation,

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from typing import Any, ClassVar
 
-from vibrokit.errors import StructureError
 from vibrokit.results.columns import Draft
 from vibrokit.results.content import Content
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.energy_file import BRANCHES
-from vibrokit.results.path_pictures import plot_exit_paths, plot_histories, with_paths
+from vibrokit.results.path_pictures import plot_exit_paths, plot_histories
+from vibrokit.results.quasi_potential import QuasiPotential, plot_quasi_potential
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
 from vibrokit.results.transitions import Transitions
 from vibrokit.results.transitions_file import read_transitions, write_transitions
-
-_POTENTIAL = re.compile(r"quasi_potential_(\d+)")
-_SHOWN = 1.5  # times the largest energy: what lies beyond the exits needs no shades
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -27,7 +23,7 @@ class LeastActionResult(Result):
 
     `energies` has the best path from each attractor to each other. `data` has the section as `Section.data` lays it
     out (basins, points of attractors and saddles, stable manifolds) and, where they were computed, the
-    quasi-potentials ``quasi_potential_k`` of the attractors on the cells of the region.
+    quasi-potentials of the attractors as `QuasiPotential` has them.
 
     Attributes
     ----------
@@ -57,7 +53,7 @@ class LeastActionResult(Result):
         return plot_histories(self.energies, ax)
 
     def plot_quasi_potential(self, source: int | None = None, ax: Any = None) -> Any:
-        """Draw the quasi-potential of an attractor; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
+        """Draw the quasi-potential of an attractor; see `vibrokit.results.quasi_potential.plot_quasi_potential`.
 
         Parameters
         ----------
@@ -70,25 +66,7 @@ class LeastActionResult(Result):
         StructureError
             It was not computed for this attractor, or for none.
         """
-        from vibrokit.plots.quasi_potential import quasi_potential_map
-
-        known = _potentials(self.data.variables)
-        label = source if source is not None else min(known, default=None)
-        if label not in known:
-            there_are = f"; there are those of {', '.join(map(str, sorted(known)))}" if known else ""
-            raise StructureError(f"the result has no quasi-potential of attractor {label}{there_are}.")
-        section = Section.in_data(self.data)
-        own = [energy for energy in self.energies if energy.source == label]
-        return quasi_potential_map(
-            self.data[known[label]].values,
-            section.bounds,
-            section.points[label],
-            label=label,
-            top=_SHOWN * max(energy.value for energy in own) if own else None,
-            saddles=section.saddles,
-            paths=[path.q[path.section] for _, path in with_paths(own)],
-            ax=ax,
-        )
+        return plot_quasi_potential(self.data, self.energies, source, ax)
 
     def write_extras(self, draft: Draft) -> None:
         """Put branches and transitions into a file in the making."""
@@ -100,12 +78,5 @@ class LeastActionResult(Result):
     def read_extras(cls, content: Content) -> dict[str, Any]:
         """Return branches and transitions; raises ResultFileError, also where the section is none."""
         Section.in_data(content.dataset)
-        for name in _potentials(content.dataset.variables).values():
-            content.numbers(name, (None, None), finite=False)
+        QuasiPotential.all_in(content.dataset)
         return {"branches": BRANCHES.read(content), "transitions": read_transitions(content)}
-
-
-def _potentials(names: Any) -> dict[int, str]:
-    """Names of the quasi-potentials by the attractor's label."""
-    matches = (_POTENTIAL.fullmatch(str(name)) for name in names)
-    return {int(match[1]): match[0] for match in matches if match}

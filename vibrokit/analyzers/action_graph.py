@@ -1,0 +1,179 @@
+"""ActionGraph: the quasi-potential on the whole section, as a shortest path in time and space."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from numbers import Real
+
+import numpy as np
+import xarray
+
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
+from vibrokit.analyzers.exits import Exit, LeaveBasin
+from vibrokit.analyzers.screening.screen import Screen, screen
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.kernels.choice import ensemble_stepper
+from vibrokit.kernels.ensemble import Progress
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.action_graph import ActionGraphResult
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.quasi_potential import QuasiPotential
+from vibrokit.results.section import Section
+from vibrokit.results.structure import Structure
+from vibrokit.results.versions import versions
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.request import pair, whole
+from vibrokit.symbolic.flow_kind import Flow
+
+_BYTES_KEPT = 84  # for each node of each phase: V, predecessor, b, Q, flags
+_BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
+_POORER = 1.9  # all grids together, in units of the finest
+_MOST_FRACTION = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class ActionGraph(Analyzer):
+    """Least action from an attractor to everywhere, without a shot that could miss.
+
+    The period is cut into steps, the section at each of these phases into nodes. To come to a node y from a state x one
+    step before costs ½ eᵀ C⁻¹ e, where e is the miss of y by the motion from x and C the Gramian of the noise along it.
+    The least sum of such costs from the attractor is the quasi-potential V. It is found as the shortest path over the
+    phases by value iteration, in which x is any state, not a node: from node to node each step would pay for rounding,
+    which at weak damping is dearer than the whole path. V between nodes is interpolated. Round the attractor V is the
+    exact quadratic form.
+
+    The error that is told is what halving the nodes along each side changed, and half of what doubling the step did.
+    Motion along a path is linearised over one step: the price over a whole period can be far off, over an eighth of it
+    it is right to some 0.2 %.
+
+    Parameters
+    ----------
+    cells : (int, int)
+        Nodes in x and in v.
+    fraction : int
+        Steps in a section interval; even.
+    source : int, optional
+        Label of the attractor to leave; by default each in turn.
+    exit : Exit
+        What counts as leaving.
+    stepper : Stepper, optional
+    memory : float
+        Most memory to take (GiB).
+    """
+
+    cells: tuple[int, int] = (320, 320)
+    fraction: int = 8
+    source: int | None = None
+    exit: Exit = dataclasses.field(default_factory=LeaveBasin)
+    stepper: Stepper | None = None
+    memory: float = 4.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cells", pair("ActionGraph: cells", self.cells))
+        if min(self.cells) < 32:
+            raise StructureError(f"ActionGraph: cells is {self.cells}; give 32 or more each way.")
+        whole("ActionGraph: fraction", self.fraction, 2, _MOST_FRACTION)
+        if self.fraction % 2:
+            raise StructureError(
+                f"ActionGraph: fraction is {self.fraction}; give an even number, for the error is found by steps "
+                "twice as long."
+            )
+        if isinstance(self.memory, bool) or not isinstance(self.memory, Real) or not self.memory > 0:
+            raise StructureError(f"ActionGraph: memory is {shown(self.memory)}; give a positive number of GiB.")
+
+    def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> ActionGraphResult:
+        """Find the potential of each attractor.
+
+        Returns
+        -------
+        ActionGraphResult
+
+        Raises
+        ------
+        SceneError
+            The scene has no noise, or noise with states of its own.
+        StructureError
+            The exit cannot be asked for in this scene, the source is unknown, or the grid would take too much memory.
+        """
+        sources = checked_sources(osc, structure, self.exit, self.source, self.stepper, progress)
+        began = time.perf_counter()
+        section = Section.of(structure)
+        data, energies, words = section.data, [], []
+        for number, attractor in enumerate(sources):
+            try:
+                found = self.search(osc, structure, attractor.label, part_of(progress, number, len(sources)))
+            except StructureError as error:
+                words.append(f"Attractor {attractor.label} was left out: {error}")
+                continue
+            energies += _energies(found)
+            data = data.merge(arrays_of(found))
+            words += [f"Attractor {attractor.label}: {_ways(found)}.", *found.words]
+        return ActionGraphResult(
+            energies=tuple(energies),
+            data=data,
+            scene=scene_data(osc),
+            settings=plain_settings(self) | {"stepper": repr(self._stepper(osc))},
+            status=" ".join(words),
+            seconds=time.perf_counter() - began,
+            versions=versions(),
+        )
+
+    def search(self, osc: Oscillator, structure: Structure, label: int, progress: Progress | None = None) -> Screen:
+        """Search the ways out of one attractor; errors as of `run`."""
+        if osc.noise is not None and osc.noise.extra_states:
+            raise SceneError(
+                f"the noise has {len(osc.noise.extra_states)} states of its own, and the graph covers x and v only; "
+                "take ActionPlot."
+            )
+        self._check_memory(osc)
+        attractor = structure.attractor(label)
+        return screen(
+            osc, structure, attractor, self.exit, self._stepper(osc), self.cells, self.fraction, progress
+        )  # fmt: skip
+
+    def _check_memory(self, osc: Oscillator) -> None:
+        phases = 1 if osc.autonomous else self.fraction
+        nodes = self.cells[0] * self.cells[1]
+        needed = _POORER * nodes * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
+        if needed > self.memory:
+            raise StructureError(
+                f"a graph of {self.cells[0]} × {self.cells[1]} nodes at {phases} phases needs {needed:.3g} GiB of "
+                f"memory, and {self.memory:.3g} GiB are allowed; take fewer cells, or allow more by memory."
+            )
+
+    def _stepper(self, osc: Oscillator) -> Stepper:
+        return self.stepper or ensemble_stepper(osc, Flow.GRAMIAN)
+
+
+def _ways(found: Screen) -> str:
+    return ", ".join(f"{value:.4g} ± {error:.1g} to {target}" for target, (value, error) in found.targets.items())
+
+
+def _energies(found: Screen) -> list[ActivationEnergy]:
+    return [
+        ActivationEnergy(
+            source=found.source,
+            target=target,
+            value=value,
+            lower=max(0.0, value - error),
+            upper=value + error,
+            method="graph",
+            residual=float("nan"),
+            saddle=found.saddles[target],
+        )
+        for target, (value, error) in found.targets.items()
+    ]
+
+
+def arrays_of(found: Screen) -> xarray.Dataset:
+    label, potential = found.source, found.potential
+    values = np.where(potential.values[0] < potential.unreached, potential.values[0], np.nan)
+    data = QuasiPotential(label, values, potential.grids.boxes[0]).data
+    barriers = [(index, *cost) for index, cost in found.barriers.items()]
+    if barriers:
+        data[f"barrier_{label}"] = ((f"barrier_saddle_{label}", "barrier_number"), np.array(barriers))
+    if found.candidates:
+        data[f"graph_path_{label}"] = ((f"graph_step_{label}", "state"), found.candidates[0].states)
+    return data

@@ -1,0 +1,121 @@
+"""The quasi-potential on grids, by value iteration with continuous predecessors."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from vibrokit.analyzers.screening.grids import Grids
+from vibrokit.analyzers.screening.seeds import seeds
+from vibrokit.analyzers.screening.tables import table
+from vibrokit.kernels.ensemble import carry
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.sweeps import interpolate_all, sweep_rows
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
+
+_ROWS = 16  # of a piece of work; fixed, so that the result is the same on any number of processors
+_WIDENING = 7  # cells, across: how far a change is felt
+_TOLERANCE = 1e-5  # of V: a smaller change is not passed on
+_REACH = 8  # cells among which a sweep looks for cheaper predecessors
+_LOOK_EVERY = 4  # periods
+_LOOKS = 8
+_SETTLED = 2e-6  # change of V, in four periods, that is none
+_MOST_PERIODS = 400
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Potential:
+    """Least action V from an attractor to every node of every phase.
+
+    Attributes
+    ----------
+    grids : Grids
+    values : list of array (nx, nv)
+        By phase; `unreached` where no path is known.
+    places : list of array (nx, nv, 2)
+        By phase of the start of the step: from where each node of the next phase is reached best, in cells.
+    tables : list of (array, array)
+        Costs of the steps from each phase, as `tables.table` has them.
+    given : list of bool array (nx, nv)
+        Nodes whose V was given.
+    unreached : float
+    """
+
+    grids: Grids
+    values: list[Array]
+    places: list[Array]
+    tables: list[tuple[Array, Array]]
+    given: list[NDArray[np.bool_]]
+    unreached: float
+
+    def at(self, phase: int, states: Array) -> Array:
+        """Return V at states (count, ≥ 2); NaN outside the grid."""
+        places = np.where(self.grids.inside(phase, states)[:, None], self.grids.places(phase, states), np.nan)
+        return interpolate_all(self.values[phase], np.ascontiguousarray(places))
+
+
+class Iteration:
+    """Sweeps over the phases, until nothing changes. Holds what changes; `potential` is what came of it."""
+
+    def __init__(
+        self,
+        osc: Oscillator,
+        stepper: Stepper,
+        attractor: Attractor,
+        grids: Grids,
+        unreached: float,
+        executor: concurrent.futures.Executor,
+    ) -> None:
+        self.grids, self.unreached, self.executor = grids, unreached, executor
+        self.steps = round(osc.section_interval / grids.step)
+        known = seeds(osc, stepper, attractor, grids)
+        self.given = [np.isfinite(values) for values in known]
+        self.values, self.places, self.tables = [], [], []
+        for phase, values in enumerate(known):
+            self.values.append(np.minimum(values, unreached))
+            centres, forms = table(osc, stepper, grids, phase, executor)
+            self.tables.append((centres, forms))
+            self.places.append(np.clip(np.nan_to_num(centres, nan=1.0), 1.0, np.array(grids.cells) - 2.0))
+
+    def run(self) -> Potential:
+        """Sweep, period by period, until V no longer changes."""
+        steps = self.steps
+        phases = self.grids.phases
+        awake = [np.ones(self.grids.cells, dtype=np.uint8) for _ in range(phases)]
+        before = self._level()
+        for period in range(_MOST_PERIODS):
+            look = period % _LOOK_EVERY == 0 and period < _LOOK_EVERY * _LOOKS
+            changes = sum(self._sweep(step % phases, awake, _REACH if look else 0) for step in range(steps))
+            if period % _LOOK_EVERY == _LOOK_EVERY - 1:
+                level = self._level()
+                if changes == 0 or abs(before - level) <= _SETTLED * level:
+                    break
+                before = level
+        return Potential(self.grids, self.values, self.places, self.tables, self.given, self.unreached)
+
+    def _sweep(self, phase: int, awake: list[Flags], reach: int) -> int:
+        """Carry V one step of time on; return how many nodes changed."""
+        after = (phase + 1) % self.grids.phases
+        before = self.values[phase] if after != phase else self.values[phase].copy()
+        still, changed = self.given[after].view(np.uint8), np.zeros(self.grids.cells, dtype=np.uint8)
+        common = (before, self.values[after], *self.tables[phase], self.places[phase], still, awake[phase], changed)
+        tasks = [
+            (*common, first, min(first + _ROWS, len(before)), reach, self.unreached, _TOLERANCE)
+            for first in range(0, len(before), _ROWS)
+        ]
+        for _ in carry(sweep_rows, tasks, self.executor):
+            pass
+        awake[after] = ndimage.maximum_filter(changed, size=_WIDENING)
+        return int(changed.sum())
+
+    def _level(self) -> float:
+        """A number that tells whether V has settled on the section: its mean, weighted where it is small."""
+        return float(np.mean(np.sqrt(self.values[0])))

@@ -1,0 +1,141 @@
+"""Tables: what each step of time costs, as a quadratic form of where it comes from."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.screening.grids import Grids
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.oscillator import Oscillator
+from vibrokit.symbolic.flow_kind import Flow
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Executor = concurrent.futures.Executor | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Steps:
+    """Costs ½ (x − b)ᵀ Q (x − b) of coming from x, one time step before.
+
+    Attributes
+    ----------
+    centres : array (count, 2)
+        b: from where the motion leads here by itself, or would if it were linear; NaN where there is none.
+    forms : array (count, 2, 2)
+        Q.
+    """
+
+    centres: Array
+    forms: Array
+
+
+def steps_into(
+    osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float, box: Array, executor: Executor = None
+) -> Steps:
+    """Return the costs of steps that end at some states.
+
+    To come to y by way of x costs ½ eᵀ C⁻¹ e, where e is the miss of y by the motion from x and C is the Gramian of
+    the noise along it. It is linearised along the motion that ends at y, which came from b: e = M (b − x), so that
+    Q = Mᵀ C⁻¹ M is the inverse of the Gramian of the motion backwards in time. Where b is out of the grid, as behind
+    strong damping, along the motion that starts at the place of the grid next to it.
+
+    Parameters
+    ----------
+    osc : Oscillator
+    stepper : Stepper
+    states : array (count, 2)
+    time : float
+        At the end of the step (s).
+    step : float
+    box : array (2, 2)
+        Bounds of the grid at the start of the step.
+    executor : concurrent.futures.Executor, optional
+    """
+    mirror = np.array([1.0, -1.0])
+    starts = np.hstack([states * mirror, np.zeros((len(states), 3))])
+    ended = run_ensemble(
+        osc, Flow.GRAMIAN_REVERSED, stepper, starts, 1, start_time=-time, interval=step, executor=executor
+    )
+    centres = ended.states[:, :2] * mirror
+    forms = _inverse(ended.states[:, 2:] * np.array([1.0, -1.0, 1.0]))
+    good = (ended.status == RAN_OUT) & np.isfinite(centres).all(axis=1) & np.isfinite(forms).all(axis=(1, 2))
+    out = ~good | np.any((centres < box[:, 0]) | (centres > box[:, 1]), axis=1)
+    if out.any():
+        nearest = np.clip(np.where(good[:, None], centres, states)[out], box[:, 0], box[:, 1])
+        centres[out], forms[out] = _linearised(osc, stepper, nearest, states[out], time - step, step, executor)
+    return Steps(centres, forms)
+
+
+def _linearised(
+    osc: Oscillator, stepper: Stepper, starts: Array, ends: Array, time: float, step: float, executor: Executor
+) -> tuple[Array, Array]:
+    """Linearise along the motion from some states."""
+    images, slopes, gramians = forward(osc, stepper, starts, time, step, executor)
+    with np.errstate(all="ignore"):
+        det = np.linalg.det(slopes)
+        sound = np.isfinite(images).all(axis=1) & np.isfinite(gramians).all(axis=(1, 2)) & (np.abs(det) > 1e-12)
+    centres, forms = np.full_like(starts, np.nan), np.full((len(starts), 2, 2), np.nan)
+    back = np.linalg.solve(slopes[sound], (ends - images)[sound][..., None])[..., 0]
+    centres[sound] = starts[sound] + back
+    pulled = np.linalg.solve(gramians[sound], slopes[sound])
+    forms[sound] = slopes[sound].transpose(0, 2, 1) @ pulled
+    return centres, forms
+
+
+def forward(
+    osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float, executor: Executor = None
+) -> tuple[Array, Array, Array]:
+    """Return the images of states after a step, the slopes M (count, 2, 2) of that map, and the Gramians C."""
+    count = len(states)
+    slopes = run_ensemble(
+        osc, Flow.STATE_VARIATIONAL, stepper, np.hstack([states, np.tile(np.eye(2).ravel(), (count, 1))]), 1,
+        start_time=time, interval=step, executor=executor,
+    ).states  # fmt: skip
+    ended = run_ensemble(
+        osc, Flow.GRAMIAN, stepper, np.hstack([states, np.zeros((count, 3))]), 1,
+        start_time=time, interval=step, executor=executor,
+    ).states  # fmt: skip
+    gramians = np.stack([ended[:, 2], ended[:, 3], ended[:, 3], ended[:, 4]], axis=1).reshape(-1, 2, 2)
+    return ended[:, :2], slopes[:, 2:].reshape(-1, 2, 2), gramians
+
+
+def _inverse(triangles: Array) -> Array:
+    """Inverses of symmetric matrices given as (00, 01, 11); NaN where they are not positive definite."""
+    a, b, c = triangles.T
+    with np.errstate(all="ignore"):
+        det = a * c - b * b
+        det = np.where((a > 0) & (det > 0), det, np.nan)
+        return np.stack([c / det, -b / det, -b / det, a / det], axis=1).reshape(-1, 2, 2)
+
+
+def table(
+    osc: Oscillator, stepper: Stepper, grids: Grids, phase: int, executor: Executor = None
+) -> tuple[Array, Array]:
+    """Return b and Q of the step from a phase to the next, in cells: shapes (nx, nv, 2) and (nx, nv, 3)."""
+    after = (phase + 1) % grids.phases
+    steps = steps_into(
+        osc, stepper, grids.nodes(after).reshape(-1, 2), grids.time(phase) + grids.step, grids.step,
+        grids.boxes[phase], executor,
+    )  # fmt: skip
+    centres, forms = in_cells(grids, phase, steps)
+    return centres.reshape(*grids.cells, 2), forms.reshape(*grids.cells, 3)
+
+
+def in_cells(grids: Grids, phase: int, steps: Steps) -> tuple[Array, Array]:
+    """Return b (count, 2) and Q (count, 3: ss, st, tt) in cells of the grid at the start of the step."""
+    wide, high = grids.spacing(phase)
+    scale = np.array([wide * wide, wide * high, high * high])
+    forms = np.stack([steps.forms[:, 0, 0], steps.forms[:, 0, 1], steps.forms[:, 1, 1]], axis=1) * scale
+    return grids.places(phase, steps.centres), forms
+
+
+def carried(osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float) -> Array:
+    """Return the images of states after a time, however far."""
+    return run_ensemble(osc, Flow.STATE, stepper, states, 1, start_time=time, interval=step).states

@@ -1,0 +1,83 @@
+"""Touching: the way out that ends where a stop is first touched, at whatever time."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.screening.potential import Potential
+from vibrokit.analyzers.screening.tables import carried, in_cells, steps_into
+from vibrokit.analyzers.screening.ways_out import Tip, Way
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.sweeps import descend_all
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
+
+_LOOKS = 8  # between two phases
+_SPEEDS = 2  # for each node in v
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Touching(Way):
+    """The first touch of one stop.
+
+    The mass may touch between two phases and between two nodes: V is carried on from each phase by parts of a step, to
+    states at the stop.
+
+    Attributes
+    ----------
+    osc : Oscillator
+    stepper : Stepper
+    wall : float
+        Position of the stop (m).
+    """
+
+    osc: Oscillator
+    stepper: Stepper
+    wall: float
+
+    def cost(self, potential: Potential) -> float:
+        """The least cost over all times and speeds."""
+        return self._best(potential)[0]
+
+    def tip(self, potential: Potential) -> Tip:
+        """The state at the phase before, and the one at the phase after the touch."""
+        _, phase, place, touch, part = self._best(potential)
+        grids = potential.grids
+        rest = grids.step * (1 - part)
+        at = grids.time(phase) + grids.step * part
+        beyond = carried(self.osc, self.stepper, touch[None], at, rest) if part < 1 else touch[None]
+        return Tip(grids.states(phase, place), phase, beyond[:, :2])
+
+    def _best(self, potential: Potential) -> tuple[float, int, Array, Array, float]:
+        grids = potential.grids
+        best: tuple[float, int, Array, Array, float] = (np.inf, 0, np.ones(2), np.ones(2), 1.0)
+        for phase in range(grids.phases):
+            speeds = np.linspace(grids.boxes[phase, 1, 0], grids.boxes[phase, 1, 1], _SPEEDS * grids.cells[1])
+            states = np.column_stack([np.full(len(speeds), self.wall), speeds])
+            for look in range(1, _LOOKS + 1):
+                step = grids.step * look / _LOOKS
+                into = steps_into(
+                    self.osc, self.stepper, states, grids.time(phase) + step, step, grids.boxes[phase]
+                )  # fmt: skip
+                centres, forms = in_cells(grids, phase, into)
+                costs, places = descend_all(potential.values[phase], centres[:, None].copy(), centres, forms, 1.0)
+                index = int(np.argmin(costs))
+                if costs[index] < best[0]:
+                    best = (float(costs[index]), phase, places[index], states[index], look / _LOOKS)
+        return best
+
+
+def ways_to_touch(osc: Oscillator, attractor: Attractor, walls: Iterable[float], stepper: Stepper) -> list[Way]:
+    """Return a way out for each stop that counts, its target the attractor itself."""
+    point = attractor.points[0, :2]
+    unit = 1 / osc.natural_frequency
+    scale = 0.5 / max(unit, osc.section_interval) / unit**2  # of the cost of going a distance of 1 m
+    return [
+        Touching(attractor.label, -1, 10 * scale * (wall - float(point[0])) ** 2, osc, stepper, wall) for wall in walls
+    ]
