@@ -9,6 +9,7 @@ from numbers import Real
 import numpy as np
 import xarray
 
+from vibrokit.analyzers.agreement import energies_of
 from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.screening.screen import Screen, screen
@@ -100,14 +101,15 @@ class ActionGraph(Analyzer):
         sources = checked_sources(osc, structure, self.exit, self.source, self.stepper, progress)
         began = time.perf_counter()
         section = Section.of(structure)
-        data, energies, words = section.data, [], []
+        data, words = section.data, []
+        energies: list[ActivationEnergy] = []
         for number, attractor in enumerate(sources):
             try:
                 found = self.search(osc, structure, attractor.label, part_of(progress, number, len(sources)))
             except StructureError as error:
                 words.append(f"Attractor {attractor.label} was left out: {error}")
                 continue
-            energies += _energies(found)
+            energies += energies_of(found).values()
             data = data.merge(arrays_of(found))
             words += [f"Attractor {attractor.label}: {_ways(found)}.", *found.words]
         return ActionGraphResult(
@@ -149,22 +151,6 @@ class ActionGraph(Analyzer):
 
 def _ways(found: Screen) -> str:
     return ", ".join(f"{value:.4g} ± {error:.1g} to {target}" for target, (value, error) in found.targets.items())
-
-
-def _energies(found: Screen) -> list[ActivationEnergy]:
-    return [
-        ActivationEnergy(
-            source=found.source,
-            target=target,
-            value=value,
-            lower=max(0.0, value - error),
-            upper=value + error,
-            method="graph",
-            residual=float("nan"),
-            saddle=found.saddles[target],
-        )
-        for target, (value, error) in found.targets.items()
-    ]
 
 
 def arrays_of(found: Screen) -> xarray.Dataset:

@@ -1,15 +1,22 @@
-"""LeastAction: certified exit paths, from a search and a polish."""
+"""LeastAction: certified exit paths, from two searches and a polish."""
 
 from __future__ import annotations
 
 import dataclasses
 import time
+from typing import Any
 
+import xarray
+
+from vibrokit.analyzers.action_graph import ActionGraph, arrays_of
 from vibrokit.analyzers.action_plot import ActionPlot
+from vibrokit.analyzers.agreement import agreed, energies_of, least_of
 from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
 from vibrokit.analyzers.exits import Exit, LeaveBasin
-from vibrokit.analyzers.polishing.branches import Polished, polish_all
-from vibrokit.errors import StructureError
+from vibrokit.analyzers.polishing.branches import polish_all
+from vibrokit.analyzers.screening.screen import Screen
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -21,23 +28,37 @@ from vibrokit.results.structure import Structure
 from vibrokit.results.transitions import Transitions
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
+from vibrokit.structure.attractors.orbits_inside import orbits_inside
+from vibrokit.structure.orbits import Orbit
+from vibrokit.structure.request import whole
+from vibrokit.symbolic.flow_kind import Flow
 
-_NONE = Polished((), ())
+_ORBITS = ("periodic", "equilibrium")
+_STAGES = 3
+_MOST_ORBITS = 1000
 
 
 @dataclasses.dataclass(frozen=True)
 class LeastAction(Analyzer):
-    """Activation energies with a certificate: a search for ways out, then Newton's method on each.
+    """Activation energies with a certificate: two searches for ways out, then Newton's method on each.
 
-    An action plot over the whole fundamental domain of each attractor proposes ways out. Each is polished to the
-    extremal that leaves the attractor and ends on a saddle of its boundary, by multiple shooting on Hamilton's
-    equations and their variational equations. The least action is the energy, and all others are listed. The
-    certificate says how well a path solves its equations; that no cheaper one exists rests on the search.
+    A graph over the whole section and an action plot over the whole fundamental domain of each attractor propose ways
+    out. Each is polished to the extremal that leaves the attractor and ends on a saddle of its boundary, by multiple
+    shooting on Hamilton's equations and their variational equations. The least action is the energy, and all others are
+    listed. The certificate says how well a path solves its equations; that no cheaper one exists is what the graph,
+    which has an error of its own, speaks for.
+
+    From an attractor that is no orbit, the graph bounds the energy from below, and paths from unstable orbits inside it
+    bound it from above.
 
     Parameters
     ----------
-    plot : ActionPlot
-        The search; its own `exit` and `source` are not looked at.
+    plot : ActionPlot, optional
+        A search; its own `exit` and `source` are not looked at. None to do without.
+    graph : ActionGraph, optional
+        The other, likewise.
+    orbits : int
+        Unstable orbits inside a chaotic attractor that paths are polished from.
     source : int, optional
         Label of the attractor to leave; by default each in turn.
     exit : Exit
@@ -46,10 +67,21 @@ class LeastAction(Analyzer):
         For the polish; by default one that locates contacts.
     """
 
-    plot: ActionPlot = dataclasses.field(default_factory=ActionPlot)
+    plot: ActionPlot | None = dataclasses.field(default_factory=ActionPlot)
+    graph: ActionGraph | None = dataclasses.field(default_factory=ActionGraph)
+    orbits: int = 4
     source: int | None = None
     exit: Exit = dataclasses.field(default_factory=LeaveBasin)
     stepper: Stepper | None = None
+
+    def __post_init__(self) -> None:
+        _one_of("plot", self.plot, ActionPlot)
+        _one_of("graph", self.graph, ActionGraph)
+        if self.plot is None and self.graph is None:
+            raise StructureError(
+                "LeastAction: plot and graph are both None, and one at least has to look for ways out."
+            )
+        whole("LeastAction: orbits", self.orbits, 0, _MOST_ORBITS)
 
     def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> LeastActionResult:
         """Find and certify the exits of each attractor.
@@ -67,52 +99,110 @@ class LeastAction(Analyzer):
         """
         sources = checked_sources(osc, structure, self.exit, self.source, self.stepper, progress)
         began = time.perf_counter()
-        found, words = [], []
+        data = Section.of(structure).data
+        energies: list[ActivationEnergy] = []
+        branches: list[ActivationEnergy] = []
+        words: list[str] = []
         for number, attractor in enumerate(sources):
             try:
-                polished = self._leave(osc, structure, attractor, part_of(progress, number, len(sources)))
+                left = self._leave(osc, structure, attractor, part_of(progress, number, len(sources)))
             except StructureError as error:
-                polished = _NONE
                 words.append(f"Attractor {attractor.label} was left out: {error}")
-            found.append(polished)
-            words += [*polished.words, *_summary(attractor, polished)]
-        energies = tuple(energy for polished in found for energy in _cheapest(polished))
+                continue
+            agreement, said = agreed(attractor, least_of(left.branches), left.screened)
+            energies += agreement
+            branches += left.branches
+            data = data if left.data is None else data.merge(left.data)
+            words += [*left.words, *_summary(attractor, left.branches), *said]
         labels = [attractor.label for attractor in structure.attractors]
         all_left = self.source is None and all(energy.target >= 0 for energy in energies)
         return LeastActionResult(
-            energies=energies,
-            data=Section.of(structure).data,
+            energies=tuple(energies),
+            data=data,
             scene=scene_data(osc),
             settings=plain_settings(self),
             status=" ".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
-            branches=tuple(branch for polished in found for branch in polished.branches),
+            branches=tuple(branches),
             transitions=Transitions.of(labels, energies) if all_left else None,
         )
 
-    def _leave(
-        self, osc: Oscillator, structure: Structure, attractor: Attractor, progress: Progress | None
-    ) -> Polished:
+    def _leave(self, osc: Oscillator, structure: Structure, attractor: Attractor, progress: Progress | None) -> _Left:
         label = attractor.label
-        if attractor.kind in ("periodic", "equilibrium") and self.exit.beyond(osc, attractor.orbit).any():
-            return polish_all(osc, structure, label, (), self.exit, self.stepper)
-        plot = dataclasses.replace(self.plot, exit=self.exit, source=None)
-        search = plot.search(osc, structure, label, part_of(progress, 0, 2))
-        polish = part_of(progress, 1, 2)
-        return polish_all(osc, structure, label, search.candidates, self.exit, self.stepper, polish)
+        orbit_like = attractor.kind in _ORBITS
+        if orbit_like and self.exit.beyond(osc, attractor.orbit).any():
+            polished = polish_all(osc, structure, label, (), self.exit, self.stepper)
+            return _Left(polished.branches, polished.words)
+        words: list[str] = []
+        screened = self._screened(osc, structure, label, words, part_of(progress, 0, _STAGES))
+        candidates = [] if screened is None else list(screened.candidates)
+        if self.plot is not None and orbit_like:
+            plot = dataclasses.replace(self.plot, exit=self.exit, source=None)
+            candidates += plot.search(osc, structure, label, part_of(progress, 1, _STAGES)).candidates
+        orbits = (None,) if orbit_like else self._orbits_inside(osc, attractor, words)
+        last = part_of(progress, 2, _STAGES)
+        branches: list[ActivationEnergy] = []
+        for number, orbit in enumerate(orbits):
+            part = part_of(last, number, len(orbits))
+            polished = polish_all(osc, structure, label, candidates, self.exit, self.stepper, part, orbit=orbit)
+            branches += polished.branches
+            words += polished.words
+        branches.sort(key=lambda branch: branch.value)
+        if screened is None:
+            return _Left(tuple(branches), tuple(words))
+        return _Left(tuple(branches), tuple(words), energies_of(screened), arrays_of(screened))
+
+    def _screened(
+        self, osc: Oscillator, structure: Structure, label: int, words: list[str], progress: Progress | None
+    ) -> Screen | None:
+        """What the graph finds; None, and why, where it cannot be used."""
+        if self.graph is None:
+            return None
+        graph = dataclasses.replace(self.graph, exit=self.exit, source=None)
+        try:
+            found = graph.search(osc, structure, label, progress)
+        except (SceneError, StructureError) as error:
+            if self.plot is None:
+                raise
+            words.append(f"Attractor {label}, without a graph: {error}")
+            return None
+        words += found.words
+        return found
+
+    def _orbits_inside(self, osc: Oscillator, attractor: Attractor, words: list[str]) -> tuple[Orbit, ...]:
+        if attractor.kind != "chaotic":
+            words.append(f"Attractor {attractor.label} is {attractor.kind}: its energies are the graph's alone.")
+            return ()
+        stepper = self.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
+        found = orbits_inside(osc, attractor, stepper, self.orbits)
+        periods = ", ".join(str(orbit.period) for orbit in found)
+        words.append(
+            f"Attractor {attractor.label} is chaotic: paths were polished from {len(found)} unstable orbits inside it"
+            + (f", of periods {periods}." if found else ".")
+        )
+        return found
 
 
-def _cheapest(polished: Polished) -> tuple[ActivationEnergy, ...]:
-    """The least action to each target; branches come the cheapest first."""
-    targets = dict.fromkeys(branch.target for branch in polished.branches)
-    return tuple(next(b for b in polished.branches if b.target == target) for target in targets)
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Left:
+    """All that was found of the exits of one attractor."""
+
+    branches: tuple[ActivationEnergy, ...]
+    words: tuple[str, ...]
+    screened: dict[int, ActivationEnergy] = dataclasses.field(default_factory=dict)
+    data: xarray.Dataset | None = None
 
 
-def _summary(attractor: Attractor, polished: Polished) -> list[str]:
+def _one_of(name: str, value: Any, kind: type) -> None:
+    if value is not None and not isinstance(value, kind):
+        raise StructureError(f"LeastAction: {name} is {shown(value)}; give {kind.__name__}(), or None to do without.")
+
+
+def _summary(attractor: Attractor, branches: tuple[ActivationEnergy, ...]) -> list[str]:
     """How many ways out there are, and what the least costs."""
-    if not polished.branches:
+    if not branches:
         return []
-    best, count = polished.branches[0], len(polished.branches)
+    best, count = branches[0], len(branches)
     ways = f"{count} ways out were polished, the least of" if count > 1 else "one way out was polished, of"
     return [f"Attractor {attractor.label}: {ways} action {best.value:.6g}, residual {best.residual:.1e}."]

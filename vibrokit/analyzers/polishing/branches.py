@@ -207,7 +207,7 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
                 source=label,
                 target=goal.target,
                 value=found.action,
-                lower=found.action - certificate.error,
+                lower=max(0.0, found.action - certificate.error),
                 upper=found.action + certificate.error,
                 method=METHOD,
                 residual=certificate.residual,

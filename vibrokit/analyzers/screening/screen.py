@@ -37,7 +37,7 @@ class Screen:
     barriers : dict of int to (float, float)
         V at each saddle of its boundary, by the saddle's place in the structure, and how far it may be wrong.
     targets : dict of int to (float, float)
-        The same for each attractor that can be reached, or for the attractor itself where a touch is the exit.
+        The same for each attractor that can be reached; −1 for a touch.
     candidates : tuple of Candidate
         The cheapest path of each way out, the cheapest first; their last state is beyond the exit.
     saddles : dict of int to int

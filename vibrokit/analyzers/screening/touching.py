@@ -74,10 +74,8 @@ class Touching(Way):
 
 
 def ways_to_touch(osc: Oscillator, attractor: Attractor, walls: Iterable[float], stepper: Stepper) -> list[Way]:
-    """Return a way out for each stop that counts, its target the attractor itself."""
+    """Return a way out for each stop that counts."""
     point = attractor.points[0, :2]
     unit = 1 / osc.natural_frequency
     scale = 0.5 / max(unit, osc.section_interval) / unit**2  # of the cost of going a distance of 1 m
-    return [
-        Touching(attractor.label, -1, 10 * scale * (wall - float(point[0])) ** 2, osc, stepper, wall) for wall in walls
-    ]
+    return [Touching(-1, -1, 10 * scale * (wall - float(point[0])) ** 2, osc, stepper, wall) for wall in walls]

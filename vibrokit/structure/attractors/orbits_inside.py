@@ -1,0 +1,65 @@
+"""Unstable orbits inside a chaotic attractor, from its close returns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from vibrokit.errors import StructureError
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
+from vibrokit.structure.orbits import EQUAL, Orbit, least_period, refine_orbit, same_point, visited
+
+_LONGEST = 64  # periods after which a return is looked for
+_TRIES = 4  # closest returns of each period that are refined
+_NEAR = 4.0  # times the spacing of the sample: an orbit so near to it is inside
+
+Array = NDArray[np.float64]
+
+
+def orbits_inside(osc: Oscillator, attractor: Attractor, stepper: Stepper, most: int) -> tuple[Orbit, ...]:
+    """Find unstable periodic orbits that are dense in a chaotic attractor, of the shortest periods first.
+
+    A chaotic motion passes by each of them: where it all but returns after some periods, Newton's method finds the
+    orbit (Lathrop & Kostelich, Phys. Rev. A 40, 4028, 1989).
+
+    Parameters
+    ----------
+    osc : Oscillator
+    attractor : Attractor
+        Whose `points` are a long sample of one motion, in the order of time.
+    stepper : Stepper
+    most : int
+        Orbits to stop at.
+
+    Returns
+    -------
+    tuple of Orbit
+        At most `most`; each begun at the point that was returned to.
+    """
+    points = attractor.points
+    spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+    found: list[Orbit] = []
+    known = np.empty((0, points.shape[1]))
+    for period in range(1, min(_LONGEST, len(points) - 1) + 1):
+        apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        for start in np.argsort(apart)[:_TRIES]:
+            if apart[start] > _NEAR * max(spacing, float(apart.min())) or apart[start] > 0.1 * np.ptp(points):
+                break
+            try:
+                orbit = refine_orbit(osc, points[start], period, stepper)
+                orbit = least_period(osc, orbit, stepper)
+                if len(known) and same_point(osc, orbit.point, known, EQUAL):
+                    continue
+                visits = visited(osc, orbit, stepper)
+            except StructureError:
+                continue
+            unstable = float(np.abs(np.linalg.eigvals(orbit.monodromy)).max()) > 1
+            if unstable and cKDTree(points).query(visits)[0].max() < 50 * spacing:
+                found.append(orbit)
+                known = np.concatenate([known, visits])
+            if len(found) == most:
+                return tuple(found)
+    return tuple(found)
