@@ -10,11 +10,10 @@ import numpy as np
 import xarray
 
 from vibrokit.analyzers.agreement import energies_of
-from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings, stepper_for
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.screening.screen import Screen, screen
 from vibrokit.errors import SceneError, StructureError, shown
-from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -111,12 +110,12 @@ class ActionGraph(Analyzer):
                 continue
             energies += energies_of(found).values()
             data = data.merge(arrays_of(found))
-            words += [f"Attractor {attractor.label}: {_ways(found)}.", *found.words]
+            words += [f"Attractor {attractor.label}, by {found.stepper!r}: {_ways(found)}.", *found.words]
         return ActionGraphResult(
             energies=tuple(energies),
             data=data,
             scene=scene_data(osc),
-            settings=plain_settings(self) | {"stepper": repr(self._stepper(osc))},
+            settings=plain_settings(self),
             status=" ".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
@@ -131,8 +130,9 @@ class ActionGraph(Analyzer):
             )
         self._check_memory(osc)
         attractor = structure.attractor(label)
+        stepper = stepper_for(osc, attractor, Flow.GRAMIAN, self.stepper)
         return screen(
-            osc, structure, attractor, self.exit, self._stepper(osc), self.cells, self.fraction, progress
+            osc, structure, attractor, self.exit, stepper, self.cells, self.fraction, progress
         )  # fmt: skip
 
     def _check_memory(self, osc: Oscillator) -> None:
@@ -144,9 +144,6 @@ class ActionGraph(Analyzer):
                 f"a graph of {self.cells[0]} × {self.cells[1]} nodes at {phases} phases needs {needed:.3g} GiB of "
                 f"memory, and {self.memory:.3g} GiB are allowed; take fewer cells, or allow more by memory."
             )
-
-    def _stepper(self, osc: Oscillator) -> Stepper:
-        return self.stepper or ensemble_stepper(osc, Flow.GRAMIAN)
 
 
 def _ways(found: Screen) -> str:

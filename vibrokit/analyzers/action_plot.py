@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings, stepper_for
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.quasi_potential import local_potential, potential_along
 from vibrokit.analyzers.shooting.branches import Branch, sampled
@@ -22,7 +22,6 @@ from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget
 from vibrokit.analyzers.shooting.search import Search, least_near, search
 from vibrokit.analyzers.shooting.starts import Ring, Starts
 from vibrokit.errors import StructureError, shown
-from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import LEFT_REGION
@@ -126,13 +125,13 @@ class ActionPlot(Analyzer):
                 words.append(f"Attractor {attractor.label} was left out: {error}")
                 continue
             data |= _start_data(attractor.label, found)
-            words.append(f"Attractor {attractor.label}: {found.summary()}")
+            words.append(f"Attractor {attractor.label}, by {found.shooter.stepper!r}: {found.summary()}")
             energies += [self._energy(attractor, found, branch) for branch in found.cheapest]
         return ActionPlotResult(
             energies=tuple(energies),
             data=xarray.Dataset(data, attrs={"region": structure.basins.region.bounds.ravel()}),
             scene=scene_data(osc),
-            settings=plain_settings(self) | {"stepper": repr(self._stepper(osc))},
+            settings=plain_settings(self),
             status=" ".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
@@ -166,16 +165,13 @@ class ActionPlot(Analyzer):
             )
         if self.exit.beyond(osc, attractor.orbit).any():
             raise StructureError("it counts as out by itself, without noise: its energy is 0.")
-        stepper = self._stepper(osc)
+        stepper = stepper_for(osc, attractor, Flow.HAMILTONIAN, self.stepper)
         starts, growth = self._starts(osc, structure, attractor, stepper)
         slowest = float(np.abs(attractor.multipliers).max())
         budget = self.budget or default_budget(slowest, attractor.period, growth)
         shooter = Shooter(osc, structure, label, self.exit, stepper, budget)
         rounds = self.rounds if self.radius is None else 0
         return search(starts, shooter, self.points, rounds, self.tolerance, progress)
-
-    def _stepper(self, osc: Oscillator) -> Stepper:
-        return self.stepper or ensemble_stepper(osc, Flow.HAMILTONIAN)
 
     def _starts(
         self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper

@@ -8,12 +8,18 @@ from typing import Any
 
 from vibrokit.analyzers.exits import Exit
 from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import Progress
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
+from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.request import check_belongs, check_means
+from vibrokit.symbolic.flow_kind import Flow
+
+_FINER = 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +70,26 @@ def checked_sources(
         raise StructureError(f"exit is {shown(exit)}, which is none; give LeaveBasin() or FirstContact().")
     exit.check(osc, structure)
     return structure.attractors if source is None else (structure.attractor(source),)
+
+
+def stepper_for(osc: Oscillator, attractor: Attractor, flow: Flow, stepper: Stepper | None) -> Stepper:
+    """Return the stepper given, or the default one for ensembles, with finer steps until it has the attractor's orbit.
+
+    Steps across a contact that all but grazes can be too coarse for an orbit that located contacts show.
+    """
+    if stepper is not None:
+        return stepper
+    chosen = tried = ensemble_stepper(osc, flow)
+    if attractor.kind not in ("periodic", "equilibrium"):
+        return chosen
+    for _ in range(_FINER):
+        try:
+            refine_orbit(osc, attractor.points[0], attractor.period, tried)
+        except StructureError:
+            tried = tried.refined()
+        else:
+            return tried
+    return chosen
 
 
 def part_of(progress: Progress | None, number: int, count: int) -> Progress | None:

@@ -107,7 +107,7 @@ class LeaveBasin(Exit):
             named = [(number, saddle) for number, saddle in between if _named(saddle)]
             words += (f"Attractor {home}: no orbit on its basin's edge is known; those of others were taken.",)
         return tuple(
-            SaddleGoal(number, next(label for label in saddle.leads_to if label != home), saddle)
+            SaddleGoal(number, tuple(dict.fromkeys(label for label in saddle.leads_to if label != home)), saddle)
             for number, saddle in named
         ), words
 
@@ -164,7 +164,7 @@ class FirstContact(Exit):
 
     def goals(self, osc: Oscillator, structure: Structure, home: int) -> tuple[tuple[Goal, ...], tuple[str, ...]]:
         """The stops."""
-        return tuple(TouchGoal(-1, -1, side, position) for side, position in self.walls(osc).items()), ()
+        return tuple(TouchGoal(-1, (-1,), side, position) for side, position in self.walls(osc).items()), ()
 
     def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
         """The stops, at whatever time."""

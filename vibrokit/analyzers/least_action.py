@@ -139,7 +139,12 @@ class LeastAction(Analyzer):
         candidates = [] if screened is None else list(screened.candidates)
         if self.plot is not None and orbit_like:
             plot = dataclasses.replace(self.plot, exit=self.exit, source=None)
-            candidates += plot.search(osc, structure, label, part_of(progress, 1, _STAGES)).candidates
+            try:
+                candidates += plot.search(osc, structure, label, part_of(progress, 1, _STAGES)).candidates
+            except StructureError as error:
+                if screened is None:
+                    raise
+                words.append(f"Attractor {label}, without an action plot: {error}")
         orbits = (None,) if orbit_like else self._orbits_inside(osc, attractor, words)
         last = part_of(progress, 2, _STAGES)
         branches: list[ActivationEnergy] = []
@@ -150,8 +155,8 @@ class LeastAction(Analyzer):
             words += polished.words
         branches.sort(key=lambda branch: branch.value)
         if screened is None:
-            return _Left(tuple(branches), tuple(words))
-        return _Left(tuple(branches), tuple(words), energies_of(screened), arrays_of(screened))
+            return _Left(tuple(branches), tuple(dict.fromkeys(words)))
+        return _Left(tuple(branches), tuple(dict.fromkeys(words)), energies_of(screened), arrays_of(screened))
 
     def _screened(
         self, osc: Oscillator, structure: Structure, label: int, words: list[str], progress: Progress | None

@@ -85,8 +85,8 @@ def refine_orbit(
     if best is None or best.residual > 1e-6 * scale:
         found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
         raise StructureError(
-            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6))}: {found}. The start "
-            "is too far off, or the orbit is not hyperbolic; wait longer or take a finer stepper."
+            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: {found}. "
+            "The start is too far off, or the orbit is not hyperbolic; wait longer or take a finer stepper."
         )
     return best
 

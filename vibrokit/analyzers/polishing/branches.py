@@ -202,10 +202,10 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
         except StructureError as error:
             words.append(f"A path of action {found.action:.6g} was found that has no certificate: {error}")
             continue
-        branches.append(
+        branches += [
             ActivationEnergy(
                 source=label,
-                target=goal.target,
+                target=target,
                 value=found.action,
                 lower=max(0.0, found.action - certificate.error),
                 upper=found.action + certificate.error,
@@ -215,12 +215,13 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
                 saddle=goal.saddle,
                 certificate=certificate,
             )
-        )
+            for target in goal.targets
+        ]
     return tuple(sorted(branches, key=lambda branch: branch.value)), words
 
 
 def _free(label: int, goal: Goal) -> ActivationEnergy:
-    return ActivationEnergy(label, goal.target, 0.0, 0.0, 0.0, METHOD, 0.0, saddle=goal.saddle)
+    return ActivationEnergy(label, goal.targets[0], 0.0, 0.0, 0.0, METHOD, 0.0, saddle=goal.saddle)
 
 
 def _same(one: _Solved, other: _Solved) -> bool:

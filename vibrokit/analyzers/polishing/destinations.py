@@ -44,12 +44,12 @@ class Goal(ABC):
     ----------
     saddle : int
         Which of the structure's saddles; −1 if it ends on none.
-    target : int
-        Label of the attractor behind it; −1 if that is not asked.
+    targets : tuple of int
+        Labels of the attractors that it lets through to; −1 if that is not asked.
     """
 
     saddle: int
-    target: int
+    targets: tuple[int, ...]
 
     @abstractmethod
     def scene(self, osc: Oscillator) -> Oscillator:

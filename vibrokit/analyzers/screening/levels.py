@@ -46,23 +46,28 @@ class Levels:
         The same on half as many nodes along each side.
     long : Potential
         The same with steps twice as long as well.
+    from_set : bool
+        Whether the attractor is no orbit, but a set that is some cells thick on the grid.
     """
 
     whole: Potential
     fine: Potential
     coarse: Potential
     long: Potential
+    from_set: bool
 
     def cost(self, way: Way) -> tuple[float, float]:
         """Return what a way out costs, and how far this may be wrong.
 
-        The error is what halving the grid changed, and half of what doubling the step did.
+        The error is what halving the grid changed, and half of what doubling the step did; from a set also how V rises
+        near by.
         """
         fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
         if not np.isfinite([fine, coarse, long]).all():
             whole = way.cost(self.whole)
             return whole, whole
-        return fine, abs(fine - coarse) + _BY_STEP * abs(coarse - long)
+        blur = way.blur(self.fine) if self.from_set else 0.0
+        return fine, abs(fine - coarse) + _BY_STEP * abs(coarse - long) + blur
 
 
 def levels(
@@ -125,4 +130,4 @@ def levels(
         tell()
         fine, _ = solved(grids.of(cells), _ROOM * dearest)
         tell()
-    return Levels(whole, fine, coarse, long)
+    return Levels(whole, fine, coarse, long, attractor.kind not in ("periodic", "equilibrium"))

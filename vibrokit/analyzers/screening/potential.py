@@ -26,6 +26,7 @@ _LOOK_EVERY = 4  # periods
 _LOOKS = 8
 _SETTLED = 2e-6  # change of V, in four periods, that is none
 _MOST_PERIODS = 400
+_BLUR = 2  # cells
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -60,6 +61,12 @@ class Potential:
         """Return V at states (count, ≥ 2); NaN outside the grid."""
         places = np.where(self.grids.inside(phase, states)[:, None], self.grids.places(phase, states), np.nan)
         return interpolate_all(self.values[phase], np.ascontiguousarray(places))
+
+    def blur(self, phase: int, state: Array) -> float:
+        """Return by how much V rises within two cells of a state, which a grid cannot tell from it."""
+        s, t = np.rint(self.grids.places(phase, state)).astype(int)
+        near = self.values[phase][max(s - _BLUR, 0) : s + _BLUR + 1, max(t - _BLUR, 0) : t + _BLUR + 1]
+        return float(near.max() - self.at(phase, state[None])[0])
 
 
 class Iteration:

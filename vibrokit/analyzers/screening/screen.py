@@ -43,6 +43,7 @@ class Screen:
     saddles : dict of int to int
         By target: the saddle that the cheapest way leads over; −1 for none.
     potential : Potential
+    stepper : Stepper
     words : tuple of str
         What was not found.
     """
@@ -53,6 +54,7 @@ class Screen:
     candidates: tuple[Candidate, ...]
     saddles: dict[int, int]
     potential: Potential
+    stepper: Stepper
     words: tuple[str, ...]
 
 
@@ -98,7 +100,7 @@ def screen(
             candidates.append(candidate)
     if not targets:
         raise StructureError(f"the grid reaches no way out of attractor {attractor.label}; widen the region.")
-    return Screen(attractor.label, barriers, targets, tuple(candidates), saddles, found.fine, tuple(words))
+    return Screen(attractor.label, barriers, targets, tuple(candidates), saddles, found.fine, stepper, tuple(words))
 
 
 def _candidate(osc: Oscillator, stepper: Stepper, found: Levels, way: Way, source: int) -> Candidate | None:

@@ -64,6 +64,10 @@ class Way(ABC):
     def cost(self, potential: Potential) -> float:
         """Return the least V of the way out; NaN where the grid does not reach there."""
 
+    def blur(self, potential: Potential) -> float:
+        """Return how far the cost is uncertain where the source is a set, on the grid some cells thick; 0 if not."""
+        return 0.0
+
     @abstractmethod
     def tip(self, potential: Potential) -> Tip:
         """Return from where the cheapest path is followed back."""
@@ -86,6 +90,10 @@ class Places(Way):
     def cost(self, potential: Potential) -> float:
         """The least V."""
         return _least(potential.at(0, self.states))
+
+    def blur(self, potential: Potential) -> float:
+        """How V rises near the cheapest state."""
+        return potential.blur(0, self.states[_first(potential.at(0, self.states))])
 
     def tip(self, potential: Potential) -> Tip:
         """The cheapest state, or one just beyond a saddle, where V no longer falls."""
