@@ -127,7 +127,7 @@ def sweep_rows(
     first: int,
     last: int,
     reach: int,
-    ceiling: float,
+    ceilings: Array,
     tolerance: float,
 ) -> int:
     """Improve some rows of nodes of the grid after, in place; return how many were looked at.
@@ -153,8 +153,8 @@ def sweep_rows(
         on who does the others.
     reach : int
         Nodes (cells to each side) among which a cheaper one is looked for; 0 to follow known places only.
-    ceiling : float
-        No V is kept above this.
+    ceilings : array (n, m)
+        No V is kept above these.
     tolerance : float
         Relative.
     """
@@ -169,6 +169,7 @@ def sweep_rows(
             if reach == 0 and not awake[int(s + 0.5), int(t + 0.5)]:
                 continue
             looked += 1
+            ceiling = ceilings[i, j]
             centre, quadratic = centres[i, j], quadratics[i, j]
             found = cost(before, s, t, centre, quadratic)
             ns, nt = inside(centre[0], n), inside(centre[1], m)

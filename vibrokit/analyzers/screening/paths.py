@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.screening.potential import Potential
-from vibrokit.analyzers.screening.tables import in_cells, steps_into
+from vibrokit.analyzers.screening.tables import in_cells, step_cost, steps_into
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import descend_all
 from vibrokit.oscillator import Oscillator
@@ -39,49 +39,41 @@ class Followed:
     level: Array
 
 
-def follow_back(
-    osc: Oscillator, stepper: Stepper, potential: Potential, ends: Array, phase: int = 0
-) -> list[Followed | None]:
-    """Follow the cheapest paths to some states (count, 2) of a phase back to where V is given.
+def follow_back(osc: Oscillator, stepper: Stepper, potential: Potential, end: Array, phase: int = 0) -> Followed | None:
+    """Follow the cheapest path to a state of a phase back to where V is given, or to the orbit itself.
 
-    The costs of steps are found for each state anew, not taken from the grid.
-
-    Returns
-    -------
-    list of Followed or None
-        None for a path that came nowhere.
+    The costs of steps are found for each state anew, not taken from the grid. None for a path that comes nowhere.
     """
     grids, phases = potential.grids, potential.grids.phases
-    states, open_ = ends.copy(), np.arange(len(ends))
-    visited, paid = [states.copy()], [np.zeros(len(ends))]
-    found: list[Followed | None] = [None] * len(ends)
-    steps = round(osc.section_interval / grids.step)
-    for count in range(1, _LONGEST * steps):
+    states, costs = [end], [0.0]
+    for count in range(1, _LONGEST * round(osc.section_interval / grids.step)):
         before = (phase - count) % phases
         into = steps_into(
-            osc, stepper, states[open_], grids.time(before) + grids.step, grids.step, grids.boxes[before]
+            osc, stepper, states[-1][None], grids.time(before) + grids.step, grids.step, grids.boxes[before]
         )  # fmt: skip
         centres, forms = in_cells(grids, before, into)
-        starts = _starts(potential, before, states[open_], centres)
-        _, places = descend_all(potential.values[before], starts, centres, forms, _HASTE)
-        miss = places - centres
-        cost = 0.5 * (forms[:, 0] * miss[:, 0] ** 2 + forms[:, 2] * miss[:, 1] ** 2) + forms[:, 1] * miss.prod(axis=1)
-        states[open_] = grids.states(before, places)
-        price = np.zeros(len(ends))
-        price[open_] = cost
-        visited.append(states.copy())
-        paid.append(price)
-        good = np.isfinite(cost)
+        starts = _starts(potential, before, states[-1][None], centres)
+        totals, places = descend_all(potential.values[before], starts, centres, forms, _HASTE)
+        left = _from_orbit(potential, before, centres[0], forms[0], float(totals[0]))
+        if left is not None:
+            visit, off = left
+            orbit = potential.orbit[visit - before : visit + 1]
+            return _path(0.0, [*orbit, *states[::-1]], [*np.zeros(before), off, *costs[:0:-1]])
+        states.append(grids.states(before, places[0]))
+        costs.append(float(step_cost(places - centres, forms)[0]))
+        if not np.isfinite(costs[-1]):
+            return None
         if before == 0:
-            nearest = np.clip(np.rint(np.where(good[:, None], places, 0)), 0, np.array(grids.cells) - 1).astype(int)
-            home = good & potential.given[0][nearest[:, 0], nearest[:, 1]]
-            for index in open_[home]:
-                found[index] = _joined(potential, visited, paid, index)
-            good &= ~home
-        open_ = open_[good]
-        if not len(open_):
-            break
-    return found
+            nearest = tuple(np.clip(np.rint(places[0]), 0, np.array(grids.cells) - 1).astype(int))
+            if potential.given[0][nearest]:
+                first = float(potential.at(0, states[-1][None])[0])
+                return _path(first, states[::-1], costs[:0:-1])
+    return None
+
+
+def _path(first: float, states: list[Array], costs: list[float]) -> Followed:
+    level = first + np.concatenate([[0.0], np.cumsum(costs)])
+    return Followed(np.array(states), float(level[-1]), level)
 
 
 def _starts(potential: Potential, before: int, states: Array, centres: Array) -> Array:
@@ -93,9 +85,13 @@ def _starts(potential: Potential, before: int, states: Array, centres: Array) ->
     return np.concatenate([centres[:, None], potential.places[before][corner[..., 0], corner[..., 1]]], axis=1)
 
 
-def _joined(potential: Potential, visited: list[Array], paid: list[Array], index: int) -> Followed:
-    states = np.array([some[index] for some in visited[::-1]])
-    costs = np.array([some[index] for some in paid[::-1]])
-    first = float(potential.at(0, states[:1])[0])
-    level = first + np.concatenate([[0.0], np.cumsum(costs[:-1])])
-    return Followed(states, float(level[-1]), level)
+def _from_orbit(
+    potential: Potential, before: int, centre: Array, form: Array, total: float
+) -> tuple[int, float] | None:
+    """Where along the orbit a step leaves it for less than coming by any other state costs, and for how much."""
+    visits = np.arange(before, len(potential.orbit), potential.grids.phases)
+    costs = step_cost(potential.grids.places(before, potential.orbit[visits]) - centre, form)
+    if not len(visits) or not costs.min() <= total:
+        return None
+    best = int(np.argmin(costs))
+    return int(visits[best]), float(costs[best])

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from vibrokit.analyzers.screening.grids import Grids
 from vibrokit.analyzers.screening.seeds import seeds
-from vibrokit.analyzers.screening.tables import table
+from vibrokit.analyzers.screening.tables import step_cost, table
 from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import interpolate_all, sweep_rows
@@ -47,6 +47,8 @@ class Potential:
         Costs of the steps from each phase, as `tables.table` has them.
     given : list of bool array (nx, nv)
         Nodes whose V was given.
+    orbit : array (count, 2)
+        States of the attractor from phase to phase, if it is an orbit; else empty.
     unreached : float
     """
 
@@ -55,6 +57,7 @@ class Potential:
     places: list[Array]
     tables: list[tuple[Array, Array]]
     given: list[NDArray[np.bool_]]
+    orbit: Array
     unreached: float
 
     def at(self, phase: int, states: Array) -> Array:
@@ -84,13 +87,19 @@ class Iteration:
         self.grids, self.unreached, self.executor = grids, unreached, executor
         self.steps = round(osc.section_interval / grids.step)
         known = seeds(osc, stepper, attractor, grids)
-        self.given = [np.isfinite(values) for values in known]
-        self.values, self.places, self.tables = [], [], []
-        for phase, values in enumerate(known):
-            self.values.append(np.minimum(values, unreached))
+        self.orbit = known.orbit
+        self.given = [np.isfinite(values) for values in known.values]
+        self.most = [np.full(grids.cells, unreached) for _ in known.values]
+        self.places, self.tables = [], []
+        for phase in range(grids.phases):
             centres, forms = table(osc, stepper, grids, phase, executor)
+            most = self.most[(phase + 1) % grids.phases]
+            for place in grids.places(phase, known.visits(phase)):
+                np.fmin(most, step_cost(place - centres, forms), out=most)
             self.tables.append((centres, forms))
             self.places.append(np.clip(np.nan_to_num(centres, nan=1.0), 1.0, np.array(grids.cells) - 2.0))
+
+        self.values = [np.minimum(*both) for both in zip(known.values, self.most, strict=True)]
 
     def run(self) -> Potential:
         """Sweep, period by period, until V no longer changes."""
@@ -106,7 +115,7 @@ class Iteration:
                 if changes == 0 or abs(before - level) <= _SETTLED * level:
                     break
                 before = level
-        return Potential(self.grids, self.values, self.places, self.tables, self.given, self.unreached)
+        return Potential(self.grids, self.values, self.places, self.tables, self.given, self.orbit, self.unreached)
 
     def _sweep(self, phase: int, awake: list[Flags], reach: int) -> int:
         """Carry V one step of time on; return how many nodes changed."""
@@ -115,7 +124,7 @@ class Iteration:
         still, changed = self.given[after].view(np.uint8), np.zeros(self.grids.cells, dtype=np.uint8)
         common = (before, self.values[after], *self.tables[phase], self.places[phase], still, awake[phase], changed)
         tasks = [
-            (*common, first, min(first + _ROWS, len(before)), reach, self.unreached, _TOLERANCE)
+            (*common, first, min(first + _ROWS, len(before)), reach, self.most[after], _TOLERANCE)
             for first in range(0, len(before), _ROWS)
         ]
         for _ in carry(sweep_rows, tasks, self.executor):

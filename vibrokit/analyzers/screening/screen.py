@@ -106,7 +106,7 @@ def screen(
 def _candidate(osc: Oscillator, stepper: Stepper, found: Levels, way: Way, source: int) -> Candidate | None:
     potential = found.fine if np.isfinite(way.cost(found.fine)) else found.whole
     tip = way.tip(potential)
-    path: Followed | None = follow_back(osc, stepper, potential, tip.state[None], tip.phase)[0]
+    path: Followed | None = follow_back(osc, stepper, potential, tip.state, tip.phase)
     if path is None:
         return None
     states = np.concatenate([path.states, tip.beyond])

@@ -136,6 +136,15 @@ def in_cells(grids: Grids, phase: int, steps: Steps) -> tuple[Array, Array]:
     return grids.places(phase, steps.centres), forms
 
 
+def step_cost(miss: Array, forms: Array) -> Array:
+    """Return ½ (x − b)ᵀ Q (x − b) for x − b of shape (…, 2) and Q as `in_cells` has them, shape (…, 3)."""
+    cost: Array = (
+        0.5 * (forms[..., 0] * miss[..., 0] ** 2 + forms[..., 2] * miss[..., 1] ** 2)
+        + forms[..., 1] * miss[..., 0] * miss[..., 1]
+    )
+    return cost
+
+
 def carried(osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float) -> Array:
     """Return the images of states after a time, however far."""
     return run_ensemble(osc, Flow.STATE, stepper, states, 1, start_time=time, interval=step).states
