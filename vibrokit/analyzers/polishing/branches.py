@@ -202,6 +202,11 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
         except StructureError as error:
             words.append(f"A path of action {found.action:.6g} was found that has no certificate: {error}")
             continue
+        if found.source.held:
+            words.append(
+                f"The path of action {found.action:.6g} starts on the orbit itself, {certificate.periods:.0f} periods "
+                "before its end: motion is linear nowhere near. The least action is at most that."
+            )
         branches += [
             ActivationEnergy(
                 source=label,

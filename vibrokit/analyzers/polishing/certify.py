@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.polishing.carrier import Carrier
 from vibrokit.analyzers.polishing.endings import ComesTo, Ending
 from vibrokit.analyzers.polishing.ends import End, linear_end
-from vibrokit.analyzers.polishing.heteroclinic import end_distances, solved_again, start_distances
+from vibrokit.analyzers.polishing.heteroclinic import MORE, end_distances, solved_again, start_distances
 from vibrokit.analyzers.polishing.newton import Extremum, extremal_path
 from vibrokit.results.certificate import Certificate
 
 _FARTHER = 10.0
-_MORE = 2  # periods of the orbits at either end
 
 Array = NDArray[np.float64]
 
@@ -28,12 +27,10 @@ def certify(carrier: Carrier, found: Extremum) -> Certificate:
         One of these has no solution near.
     """
     starts = start_distances(found)
-    away = np.flatnonzero(starts[:-1] >= _FARTHER * starts[0])
-    later = int(away[0]) if away.size else 0
-    nearer = solved_again(carrier, found, -later, 0)
+    nearer = solved_again(carrier, found, -_later(found), 0)
     ending = found.ending
-    after = _MORE * len(ending.end.states) if isinstance(ending, ComesTo) else 0
-    longer = solved_again(carrier, found, _MORE * len(found.source.states), after)
+    after = MORE * len(ending.end.states) if isinstance(ending, ComesTo) else 0
+    longer = solved_again(carrier, found, MORE * len(found.source.states), after)
     tighter = _tightened(carrier, found)
     periods = (len(found.points) - 2) + ending.last(found.free, carrier.piece) / carrier.piece
     return Certificate(
@@ -48,6 +45,15 @@ def certify(carrier: Carrier, found: Extremum) -> Certificate:
     )
 
 
+def _later(found: Extremum) -> int:
+    """Nodes to drop for a start ten times as far from the orbit; for one on it, two periods."""
+    if found.source.held:
+        return MORE * len(found.source.states)
+    starts = start_distances(found)
+    away = np.flatnonzero(starts[:-1] >= _FARTHER * starts[0])
+    return int(away[0]) if away.size else 0
+
+
 def _tightened(carrier: Carrier, found: Extremum) -> Extremum:
     finer = carrier.with_stepper(carrier.stepper.refined())
     ending: Ending = found.ending
@@ -58,7 +64,8 @@ def _tightened(carrier: Carrier, found: Extremum) -> Extremum:
 
 
 def _again(carrier: Carrier, end: End) -> End:
-    return linear_end(carrier, end.states[0], len(end.states) // carrier.pieces)
+    again = linear_end(carrier, end.states[0], len(end.states) // carrier.pieces)
+    return again.on_orbit() if end.held else again
 
 
 def transversality(carrier: Carrier, found: Extremum) -> float:

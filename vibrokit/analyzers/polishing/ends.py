@@ -35,6 +35,8 @@ class End:
         Of the orbit.
     pieces : int
         Nodes in a section interval.
+    held : bool
+        Whether paths start on the orbit itself, at p ≠ 0, after a finite time.
     """
 
     states: Array
@@ -43,6 +45,16 @@ class End:
     coming: Array
     multipliers: NDArray[np.complex128]
     pieces: int
+    held: bool = False
+
+    def on_orbit(self) -> End:
+        """The same orbit, left by paths that start on it: for one that motion is linear round no farther than rounding.
+
+        Such a path takes a finite time, so that it costs more than the least action, the less the longer it is.
+        """
+        size = self.states.shape[1]
+        free = np.vstack([np.zeros((size, size)), np.eye(size)])
+        return dataclasses.replace(self, leaving=np.broadcast_to(free, self.leaving.shape), held=True)
 
     def node(self, phase: int) -> int:
         """Number of the node at which a path is that has so many pieces to go from point 0 of the orbit."""

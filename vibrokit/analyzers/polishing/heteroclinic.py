@@ -15,10 +15,14 @@ from vibrokit.analyzers.polishing.endings import ComesTo
 from vibrokit.analyzers.polishing.ends import End
 from vibrokit.analyzers.polishing.newton import Extremum, extremal_path
 from vibrokit.analyzers.polishing.relaxing import relaxed
+from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: how near its source a candidate is entered
 _RADIUS = 1e-4  # of a path's extent: how near its two ends the linearised equations take over
 _CLOSER, _UNCHANGED = 4, 1e-8  # tenths of that, until the action stays, relative to itself
+_HELD = (8, 16, 32, 64, 128)  # section intervals on the orbit, where a path is begun on it
+MORE = 2
+"""Periods of its orbits by which a certified path may be made longer."""
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
@@ -44,7 +48,18 @@ def polished(carrier: Carrier, source: End, cuts: Sequence[Cut]) -> Extremum:
         first, states = _begun(carrier, source, cut.states)
         tried.append((smooth_chain(carrier, first, states, cut.last), first, cut))
     chain, first, cut = min(tried, key=lambda each: each[0].action)
-    points = relaxed(carrier, first, cut.ending, chain.points, cut.last)
+    try:
+        return _left_for_good(carrier, source, first, cut, chain.points)
+    except StructureError as error:
+        found = _left_in_time(carrier, source.on_orbit(), first, cut, chain.points)
+        if found is None:
+            raise error
+        return found
+
+
+def _left_for_good(carrier: Carrier, source: End, first: int, cut: Cut, points: Array) -> Extremum:
+    """The path that leaves in the unstable space, begun and ended so near to its two ends that it does not matter."""
+    points = relaxed(carrier, first, cut.ending, points, cut.last)
     found = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
     radius = _RADIUS * extent(found)
     found = _within(carrier, found, radius)
@@ -57,10 +72,50 @@ def polished(carrier: Carrier, source: End, cuts: Sequence[Cut]) -> Extremum:
     return found
 
 
+def _left_in_time(carrier: Carrier, source: End, first: int, cut: Cut, points: Array) -> Extremum | None:
+    """The path that starts on the orbit itself, the longest that may be made longer; None if there is none."""
+    best = None
+    size = len(source.states[0])
+    for intervals in _HELD:
+        added = intervals * carrier.pieces
+        orbit = source.states[(first - added + np.arange(added)) % len(source.states)]
+        states = np.concatenate([orbit, points[:, :size]])
+        try:
+            chain = smooth_chain(carrier, first - added, states, cut.last)
+            guess = relaxed(carrier, first - added, cut.ending, chain.points, cut.last)
+            found = extremal_path(carrier, source, first - added, cut.ending, guess, last=cut.last)
+            found = _within(carrier, found, _RADIUS * extent(found))
+            solved_again(carrier, found, MORE * len(source.states), 0)
+        except StructureError:
+            continue
+        best = found
+    return best
+
+
 def _within(carrier: Carrier, found: Extremum, radius: float) -> Extremum:
-    """The same path, begun and ended within a radius of its two ends."""
-    before, after = _missing_before(carrier, found, radius), _missing_after(carrier, found, radius)
-    return solved_again(carrier, found, before, after)
+    """The same path, begun and ended within a radius of its two ends; in parts where all at once is too much."""
+    grain, least = _grain(carrier), 0
+    while True:
+        before, after = _missing_before(carrier, found, radius), _missing_after(carrier, found, radius)
+        try:
+            return solved_again(carrier, found, before, after)
+        except StructureError:
+            if max(before, after) <= least:
+                raise
+        least = grain
+        found = _a_part(carrier, found, before // grain, after // grain)
+
+
+def _a_part(carrier: Carrier, found: Extremum, before: int, after: int) -> Extremum:
+    """The same path, longer by as much as Newton's method follows of so many section intervals before and after."""
+    grain = _grain(carrier)
+    while True:
+        before, after = int(before / 2), int(after / 2)
+        try:
+            return solved_again(carrier, found, before * grain, after * grain)
+        except StructureError:
+            if max(before, after) <= 1:
+                raise
 
 
 def solved_again(carrier: Carrier, found: Extremum, before: int, after: int) -> Extremum:
@@ -126,6 +181,8 @@ def _begun(carrier: Carrier, source: End, states: Array) -> tuple[int, Array]:
 
 def _missing_before(carrier: Carrier, found: Extremum, radius: float) -> int:
     """Nodes to add before a path for it to start nearer to the source than a radius; negative: to drop."""
+    if found.source.held:
+        return 0
     each = _grain(carrier)
     distances = start_distances(found)[::each]
     if distances[0] <= radius:
