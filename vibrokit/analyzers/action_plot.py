@@ -9,7 +9,6 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings, stepper_for
@@ -29,6 +28,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.action_plot import ActionPlotResult
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, ExitPath
+from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
 from vibrokit.results.versions import versions
 from vibrokit.scene_file import scene_data
@@ -115,7 +115,7 @@ class ActionPlot(Analyzer):
         """
         sources = checked_sources(osc, structure, self.exit, self.source, self.stepper, progress)
         began = time.perf_counter()
-        data = _section_data(structure)
+        data = Section.of(structure).data
         energies: list[ActivationEnergy] = []
         words = []
         for number, attractor in enumerate(sources):
@@ -124,12 +124,12 @@ class ActionPlot(Analyzer):
             except StructureError as error:
                 words.append(f"Attractor {attractor.label} was left out: {error}")
                 continue
-            data |= _start_data(attractor.label, found)
+            data = data.assign(_start_data(attractor.label, found))
             words.append(f"Attractor {attractor.label}, by {found.shooter.stepper!r}: {found.summary()}")
             energies += [self._energy(attractor, found, branch) for branch in found.cheapest]
         return ActionPlotResult(
             energies=tuple(energies),
-            data=xarray.Dataset(data, attrs={"region": structure.basins.region.bounds.ravel()}),
+            data=data,
             scene=scene_data(osc),
             settings=plain_settings(self),
             status=" ".join(words),
@@ -241,13 +241,6 @@ def _path(found: Search, branch: Branch) -> ExitPath:
     times: Array = unit * (int(found.outcomes.section[branch.index]) + np.arange(len(z), dtype=float) / _SAMPLES)
     step = _SAMPLES // found.shooter.exit.looks(osc) if osc.autonomous else _SAMPLES
     return ExitPath(times, z[:, :size], z[:, size : 2 * size], z[:, -1], np.arange(0, len(z), step))
-
-
-def _section_data(structure: Structure) -> dict[str, tuple[object, ...]]:
-    data: dict[str, tuple[object, ...]] = {"basin": (("cell_x", "cell_v"), structure.basins.labels)}
-    for attractor in structure.attractors:
-        data[f"points_{attractor.label}"] = ((f"visit_{attractor.label}", "state"), attractor.points)
-    return data
 
 
 def _start_data(label: int, found: Search) -> dict[str, tuple[object, ...]]:

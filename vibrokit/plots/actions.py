@@ -14,7 +14,6 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from vibrokit.plots.axes import axes_or_new, colour
-from vibrokit.plots.basins import basin_map
 
 _PARTS = 360
 _SHOWN = 10.0  # times the least action, up to which colours tell actions apart
@@ -141,31 +140,3 @@ def _least_by_angle(angle: NDArray[np.float64], action: NDArray[np.float64]) -> 
     least = np.full(_PARTS, np.inf)
     np.minimum.at(least, part, np.where(np.isfinite(action), action, np.inf))
     return 2 * np.pi * (np.arange(_PARTS) + 0.5) / _PARTS, np.where(np.isfinite(least), least, np.nan)
-
-
-def exit_paths(data: xarray.Dataset, energies: Sequence[Any], *, ax: Axes | None = None) -> list[Any]:
-    """Draw the cheapest exit paths by their points on the section, over the basins.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        ``basin``, ``points_k``, and the bounds in the attribute ``region``.
-    energies : sequence of ActivationEnergy
-    ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    list of artists
-    """
-    axes = axes_or_new(ax, 5.4, 4.6)
-    points = [data[f"points_{label}"].values for label in _labels(data, "points_")]
-    artists = basin_map(data["basin"].values, np.reshape(data.attrs["region"], (2, 2)), points, ax=axes)
-    for energy in energies:
-        if energy.path is not None:
-            place = energy.path.q[energy.path.section]
-            artists += axes.plot(
-                place[:, 0], place[:, 1], ".-", color=colour(energy.source), markersize=3, linewidth=0.7,
-                label=f"exit path {energy.source} → {energy.target}",
-            )  # fmt: skip
-    axes.legend(loc="upper left", fontsize=8)
-    return artists

@@ -153,7 +153,7 @@ def section_portrait(
     artists += _draw_saddles(axes, saddles, saddle_kinds)
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
-    add_legend(axes, ax, [*named(artists), *_cell_samples(np.asarray(labels))])
+    add_legend(axes, ax, [*named(artists), *cell_samples(np.asarray(labels))])
     return artists
 
 
@@ -181,7 +181,7 @@ def _style_of(markers: Mapping[str, Style], kinds: Sequence[str], index: int) ->
     return markers.get(kinds[index] if kinds else usual, markers[usual])
 
 
-def _cell_samples(cells: NDArray[Any]) -> list[Patch]:
+def cell_samples(cells: NDArray[Any]) -> list[Patch]:
     """Entries of the legend for cells that lead to no attractor, where there are any."""
     samples = (
         (UNSETTLED, {"facecolor": _GREY}, "not settled"),

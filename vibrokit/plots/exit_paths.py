@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.axes import add_legend, axes_or_new, colour, named, rows, span
-from vibrokit.plots.basins import _cell_samples, section_portrait
+from vibrokit.plots.basins import cell_samples, section_portrait
 
 _BEGUN = 1e-4  # of the whole action
 _MOST_STRANDS = 32  # points of an attractor above which those of a path are not joined: it is no orbit
@@ -77,7 +77,7 @@ def exit_paths(
         name = names[index] if names else f"exit path from {source}"
         dashes = _DASHES[list(sources[:index]).count(source) % len(_DASHES)]
         artists += _draw_path(axes, place, strands, index, colour(source), dashes, name)
-    _add_legend(axes, ax, [*named(artists), *_cell_samples(np.asarray(labels))])
+    _add_legend(axes, ax, [*named(artists), *cell_samples(np.asarray(labels))])
     return artists
 
 

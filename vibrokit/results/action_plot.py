@@ -6,7 +6,10 @@ import dataclasses
 from typing import Any, ClassVar
 
 from vibrokit.errors import StructureError
+from vibrokit.results.content import Content
+from vibrokit.results.path_pictures import plot_exit_paths
 from vibrokit.results.result import Result
+from vibrokit.results.section import Section
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -23,7 +26,7 @@ class ActionPlotResult(Result):
     - ``status_k``, a constant of `vibrokit.kernels.stopping`; ``target_k``, the label of where the exit leads, −1 where
       that is not known; ``exit_x_k`` and ``exit_v_k``, where the path was when it ended;
 
-    and the basin grid with the attractors' points.
+    and the section as `Section.data` lays it out.
     """
 
     kind: ClassVar[str] = "action_plot"
@@ -58,7 +61,11 @@ class ActionPlotResult(Result):
         return action_map(self.data, label, ax=ax)
 
     def plot_paths(self, ax: Any = None) -> Any:
-        """Draw the exit paths on the section, over the basins; see `vibrokit.plots.actions.exit_paths`."""
-        from vibrokit.plots.actions import exit_paths
+        """Draw the exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`."""
+        return plot_exit_paths(self.data, self.energies, ax)
 
-        return exit_paths(self.data, self.energies, ax=ax)
+    @classmethod
+    def read_extras(cls, content: Content) -> dict[str, Any]:
+        """Check what lies on the section; raises ResultFileError."""
+        Section.in_data(content.dataset)
+        return {}
