@@ -121,6 +121,7 @@ def sweep_rows(
     centres: Array,
     quadratics: Array,
     places: Array,
+    anchors: Array,
     still: Flags,
     awake: Flags,
     changed: Flags,
@@ -142,6 +143,8 @@ def sweep_rows(
         Q as (ss, st, tt), for displacements in cells.
     places : array (n, m, 2)
         Best x known of each node; improved.
+    anchors : array (n, m, 2)
+        Places that are always tried.
     still : uint8 array (n, m)
         Nodes whose V is given.
     awake : uint8 array (n, m)
@@ -172,10 +175,14 @@ def sweep_rows(
             ceiling = ceilings[i, j]
             centre, quadratic = centres[i, j], quadratics[i, j]
             found = cost(before, s, t, centre, quadratic)
-            ns, nt = inside(centre[0], n), inside(centre[1], m)
-            here = cost(before, ns, nt, centre, quadratic)
-            if here < found:
-                found, s, t = here, ns, nt
+            for tried in range(2):
+                if tried == 0:
+                    ns, nt = inside(centre[0], n), inside(centre[1], m)
+                else:
+                    ns, nt = anchors[i, j, 0], anchors[i, j, 1]
+                here = cost(before, ns, nt, centre, quadratic)
+                if here < found:
+                    found, s, t = here, ns, nt
             for near in range(2):
                 ni, nj = (i, j - 1) if near == 0 else (i - 1, j)
                 if ni < first or nj < 0 or math.isnan(centres[ni, nj, 0]):

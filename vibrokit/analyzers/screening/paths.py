@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.screening.potential import Potential
-from vibrokit.analyzers.screening.tables import in_cells, step_cost, steps_into
+from vibrokit.analyzers.screening.tables import in_cells, step_cost, steps_into, uphill
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import descend_all
 from vibrokit.oscillator import Oscillator
 
 _LONGEST = 250  # section intervals
 _HASTE = 1.1  # V against the cost of a step: a path that lingers for nothing by an unstable orbit is not wanted
+_MORE_HASTE, _MOST_HASTE = 2.0, 1e4  # where V, interpolated, has a hollow there that a path would never leave
+_PROGRESS = 1e-3  # of V, that a path has to lose in a section interval
 _CORNERS = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
 Array = NDArray[np.float64]
@@ -46,14 +48,16 @@ def follow_back(osc: Oscillator, stepper: Stepper, potential: Potential, end: Ar
     """
     grids, phases = potential.grids, potential.grids.phases
     states, costs = [end], [0.0]
-    for count in range(1, _LONGEST * round(osc.section_interval / grids.step)):
+    steps = round(osc.section_interval / grids.step)
+    haste, level = _HASTE, np.inf
+    for count in range(1, _LONGEST * steps):
         before = (phase - count) % phases
-        into = steps_into(
-            osc, stepper, states[-1][None], grids.time(before) + grids.step, grids.step, grids.boxes[before]
-        )  # fmt: skip
+        time = grids.time(before) + grids.step
+        into = steps_into(osc, stepper, states[-1][None], time, grids.step, grids.boxes[before])
         centres, forms = in_cells(grids, before, into)
-        starts = _starts(potential, before, states[-1][None], centres)
-        totals, places = descend_all(potential.values[before], starts, centres, forms, _HASTE)
+        anchors = grids.places(before, uphill(osc, stepper, states[-1][None], time, grids.step, grids.boxes[before]))
+        starts = np.concatenate([_starts(potential, before, states[-1][None], centres), anchors[:, None]], axis=1)
+        totals, places = descend_all(potential.values[before], starts, centres, forms, haste)
         left = _from_orbit(potential, before, centres[0], forms[0], float(totals[0]))
         if left is not None:
             visit, off = left
@@ -63,6 +67,9 @@ def follow_back(osc: Oscillator, stepper: Stepper, potential: Potential, end: Ar
         costs.append(float(step_cost(places - centres, forms)[0]))
         if not np.isfinite(costs[-1]):
             return None
+        if count % steps == 0:
+            haste = _HASTE if totals[0] < (1 - _PROGRESS) * level else min(haste * _MORE_HASTE, _MOST_HASTE)
+            level = float(totals[0])
         if before == 0:
             nearest = tuple(np.clip(np.rint(places[0]), 0, np.array(grids.cells) - 1).astype(int))
             if potential.given[0][nearest]:

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from vibrokit.analyzers.screening.grids import Grids
 from vibrokit.analyzers.screening.seeds import seeds
-from vibrokit.analyzers.screening.tables import step_cost, table
+from vibrokit.analyzers.screening.tables import against, step_cost, table
 from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import interpolate_all, sweep_rows
@@ -90,14 +90,16 @@ class Iteration:
         self.orbit = known.orbit
         self.given = [np.isfinite(values) for values in known.values]
         self.most = [np.full(grids.cells, unreached) for _ in known.values]
-        self.places, self.tables = [], []
+        self.places, self.anchors, self.tables = [], [], []
         for phase in range(grids.phases):
             centres, forms = table(osc, stepper, grids, phase, executor)
             most = self.most[(phase + 1) % grids.phases]
             for place in grids.places(phase, known.visits(phase)):
                 np.fmin(most, step_cost(place - centres, forms), out=most)
             self.tables.append((centres, forms))
-            self.places.append(np.clip(np.nan_to_num(centres, nan=1.0), 1.0, np.array(grids.cells) - 2.0))
+            last = np.array(grids.cells) - 2.0
+            self.places.append(np.clip(np.nan_to_num(centres, nan=1.0), 1.0, last))
+            self.anchors.append(np.clip(against(osc, stepper, grids, phase), 1.0, last))
 
         self.values = [np.minimum(*both) for both in zip(known.values, self.most, strict=True)]
 
@@ -122,7 +124,16 @@ class Iteration:
         after = (phase + 1) % self.grids.phases
         before = self.values[phase] if after != phase else self.values[phase].copy()
         still, changed = self.given[after].view(np.uint8), np.zeros(self.grids.cells, dtype=np.uint8)
-        common = (before, self.values[after], *self.tables[phase], self.places[phase], still, awake[phase], changed)
+        common = (
+            before,
+            self.values[after],
+            *self.tables[phase],
+            self.places[phase],
+            self.anchors[phase],
+            still,
+            awake[phase],
+            changed,
+        )
         tasks = [
             (*common, first, min(first + _ROWS, len(before)), reach, self.most[after], _TOLERANCE)
             for first in range(0, len(before), _ROWS)

@@ -44,7 +44,7 @@ def steps_into(
     To come to y by way of x costs ½ eᵀ C⁻¹ e, where e is the miss of y by the motion from x and C is the Gramian of
     the noise along it. It is linearised along the motion that ends at y, which came from b: e = M (b − x), so that
     Q = Mᵀ C⁻¹ M is the inverse of the Gramian of the motion backwards in time. Where b is out of the grid, as behind
-    strong damping, along the motion that starts at the place of the grid next to it.
+    strong damping, it is linearised along the motion that starts where a path against the damping would come from.
 
     Parameters
     ----------
@@ -68,9 +68,20 @@ def steps_into(
     good = (ended.status == RAN_OUT) & np.isfinite(centres).all(axis=1) & np.isfinite(forms).all(axis=(1, 2))
     out = ~good | np.any((centres < box[:, 0]) | (centres > box[:, 1]), axis=1)
     if out.any():
-        nearest = np.clip(np.where(good[:, None], centres, states)[out], box[:, 0], box[:, 1])
-        centres[out], forms[out] = _linearised(osc, stepper, nearest, states[out], time - step, step, executor)
+        starts = uphill(osc, stepper, states[out], time, step, box)
+        centres[out], forms[out] = _linearised(osc, stepper, starts, states[out], time - step, step, executor)
     return Steps(centres, forms)
+
+
+def uphill(osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float, box: Array) -> Array:
+    """Return where paths against the damping come from, one step before, kept in a box.
+
+    It is the image of a state with its velocity turned round, turned round again. Without forcing that is the way of
+    least action up a well.
+    """
+    mirror = np.array([1.0, -1.0])
+    found = carried(osc, stepper, states * mirror, time - step, step) * mirror
+    return np.clip(np.where(np.isfinite(found), found, states), box[:, 0], box[:, 1])
 
 
 def _linearised(
@@ -126,6 +137,13 @@ def table(
     )  # fmt: skip
     centres, forms = in_cells(grids, phase, steps)
     return centres.reshape(*grids.cells, 2), forms.reshape(*grids.cells, 3)
+
+
+def against(osc: Oscillator, stepper: Stepper, grids: Grids, phase: int) -> Array:
+    """Return, in cells, where paths against the damping come from in the step from a phase, shape (nx, nv, 2)."""
+    ends = grids.nodes((phase + 1) % grids.phases).reshape(-1, 2)
+    starts = uphill(osc, stepper, ends, grids.time(phase) + grids.step, grids.step, grids.boxes[phase])
+    return grids.places(phase, starts).reshape(*grids.cells, 2)
 
 
 def in_cells(grids: Grids, phase: int, steps: Steps) -> tuple[Array, Array]:
