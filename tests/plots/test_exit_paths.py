@@ -8,6 +8,9 @@ from matplotlib.figure import Figure
 from vibrokit.plots.axes import colour
 from vibrokit.plots.exit_paths import exit_paths, path_history
 from vibrokit.plots.quasi_potential import quasi_potential_map
+from vibrokit.results.energy import ActivationEnergy, ExitPath
+from vibrokit.results.path_pictures import plot_exit_paths
+from vibrokit.results.section import Section
 
 BOX = ((-1.0, 1.0), (-0.5, 0.5))
 LABELS = np.array([[0, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, -1]])
@@ -55,6 +58,29 @@ def test_a_path_from_an_orbit_of_period_four_is_four_strands():
     for first, strand in enumerate(strands):
         np.testing.assert_array_equal(strand.get_xydata(), LONG[first::4])
     assert [name for name in names(artists[-1].axes) if "exit path" in name] == ["exit path from 0"]
+
+
+def test_a_path_given_all_along_is_a_line_without_dots():
+    artists = exit_paths(LABELS, BOX, [FOUR], [LONG, -LONG], sources=[0, 0], names=["a", "b"], curves=[True, False])
+    by_name = {artist.get_label(): artist for artist in artists}
+    np.testing.assert_array_equal(by_name["a"].get_xydata(), LONG)
+    assert by_name["a"].get_marker() == ""
+    np.testing.assert_array_equal(by_name["b"].get_xydata(), -LONG[::4])
+    assert by_name["b"].get_marker() == "o"
+
+
+@pytest.mark.parametrize(("swing", "shown"), [(0.0, 41), (0.3, 5)])
+def test_paths_from_rest_are_shown_whole_and_others_on_the_section(swing, shown):
+    t = np.linspace(0.0, 4.0, 41)
+    x = np.exp(2 * (t - 4.0)) + swing * np.sin(2 * np.pi * t)
+    q = np.stack([x, np.gradient(x, t)], axis=1)
+    path = ExitPath(t, q, 0 * q, t, np.arange(0, 41, 10))
+    energy = ActivationEnergy(0, 1, 1.0, 1.0, 1.0, "least action", 0.0, path)
+    data = Section(LABELS.astype(np.int16), np.array(BOX), (FOUR[:1], FOUR[1:2])).data
+    artists = plot_exit_paths(data, [energy])
+    (line,) = [artist for artist in artists if artist.get_label().startswith("path 0 → 1")]
+    np.testing.assert_array_equal(line.get_xydata(), q if swing == 0 else q[path.section])
+    assert len(line.get_xydata()) == shown
 
 
 def test_a_path_from_chaos_is_dots():

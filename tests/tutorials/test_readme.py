@@ -12,6 +12,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit import cli
+from vibrokit.registry import Group, load
 
 REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"
@@ -55,12 +56,20 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
     if page == README:
         assert made["osc"] == vk.load_scene("hertz-0.570")
         assert [state.impacts for state in made["states"].attractors] == [0, 2]
-        assert 8e-5 < made["result"].energies[0].value < 9.5e-5  # what the README says of it: about 9e-5
-        assert "paths" in printed
+        assert made["result"].energies[0].value == pytest.approx(7.9052e-5, rel=1e-4)  # what the README says of it
+        assert "they agree" in printed
         assert float(made["Cubic"](stiffness=2.0).force(0.5, 1.0)) == 0.25
     elif page.stem == "contact-law":
         assert "False False 3/2" in printed
         assert "FAILED" not in printed
+    elif page.stem == "least-action":
+        assert (made["r"].energies[0].source, made["r"].energies[0].target) == (0, 1)
+        assert made["r"].energies[0].certificate.residual < 1e-9
+        assert "they agree" in printed
+        well = 4 * 0.05 * 0.25  # 4ζω_n times the barrier, either way
+        assert made["t"].energies == pytest.approx(np.array([[0, well], [well, 0]]), rel=1e-6)
+        touch = 2 * 0.01 * (0.5 - 0.2 - 0.18 / abs(1 - 0.57**2 + 0.02j * 0.57)) ** 2
+        assert made["touch"].energies[0].value == pytest.approx(touch, rel=1e-8)
     elif page.stem == "steppers":
         assert "RK4: steps is 0; give a whole number from 1 to 10000000." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
@@ -92,10 +101,14 @@ def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
 
 
 def test_settings_in_the_manual_are_settings():
-    words = [word for page in PAGES for line in commands(page) for word in line]
-    given = [words[i + 1].partition("=")[0] for i, word in enumerate(words) if word == "--set"]
-    assert given
-    assert set(given) <= {field.name for field in dataclasses.fields(vk.ActionPlot)}
+    lines = [line for page in PAGES for line in commands(page) if "--set" in line]
+    assert lines
+    for line in lines:
+        options = cli._parser().parse_args(line[1:])
+        given = {setting.partition("=")[0] for setting in options.set}
+        for name in options.analyzer:
+            kind = load(Group.ANALYZERS, name, vk.Analyzer)
+            assert given <= {field.name for field in dataclasses.fields(kind)}
 
 
 @pytest.mark.parametrize("page", pages_with("toml"))

@@ -229,3 +229,60 @@ def test_where_the_clear_motion_grazes(quiet):
 def test_pictures_of_the_structure(quiet, tmp_path):
     quiet.save_pictures(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(quiet.PICTURES)
+
+
+# -- 04: least action -------------------------------------------------------------------------------------------------
+
+CERTIFIED_CLEAR = 7.9052e-5  # by direct minimisation, tests/physics/reference_action.py: 7.905215e-5 ± 1e-11
+
+
+@pytest.fixture(scope="module")
+def least(run):
+    return run("04_least_action")
+
+
+def test_the_climb_out_of_a_well(least):
+    """ΔU is 4ζω_n times the barrier of x⁴/4 − x²/2, the path its relaxation run backwards."""
+    assert least.energy.value == pytest.approx(4 * 0.05 * 0.25, rel=1e-6)
+    assert least.along < 1e-6
+    heights = least.path.q[:, 0] ** 4 / 4 - least.path.q[:, 0] ** 2 / 2 + least.path.q[:, 1] ** 2 / 2
+    climbed = 4 * 0.05 * (heights + 0.25)
+    assert least.path.action == pytest.approx(climbed, abs=1e-6 * least.energy.value)
+
+
+def test_the_clear_state_is_left_at_the_certified_price(least):
+    assert least.clear.value == pytest.approx(CERTIFIED_CLEAR, rel=1e-4)
+    assert least.clear.lower <= least.clear.value <= least.clear.upper
+    assert "they agree" in least.result.status
+
+
+def test_both_paths_solve_their_equations_and_end_on_the_saddle(least):
+    for energy in least.result.energies:
+        assert energy.certificate.residual < 1e-9
+        assert energy.certificate.error < 1e-5 * energy.value
+        assert energy.path.q[-1] == pytest.approx(least.saddle.points[0], abs=1e-3)
+        assert energy.path.action[-1] == pytest.approx(energy.value, rel=1e-5)
+    assert {(energy.source, energy.target) for energy in least.result.energies} == {(0, 1), (1, 0)}
+
+
+def test_shots_are_dearer_than_the_certified_path(least):
+    whole, ring = (found.energies[0] for found in (least.shots, least.ring))
+    assert CERTIFIED_CLEAR < whole.value < ring.value
+    assert whole.value < 1.01 * CERTIFIED_CLEAR
+
+
+def test_the_price_of_a_touch(least):
+    swing = F0 / np.sqrt((OMEGA_N**2 - OMEGA**2) ** 2 + (2 * ZETA * OMEGA_N * OMEGA) ** 2)
+    exact = 2 * ZETA * OMEGA_N**3 * (0.5 - F1 / OMEGA_N**2 - swing) ** 2
+    assert least.touch.value == pytest.approx(exact, rel=1e-8)
+    assert least.by_formula == pytest.approx(exact, rel=1e-12)
+
+
+def test_what_is_left_first_and_what_lasts(least):
+    assert least.result.transitions.most_stable == 1
+    assert least.result.transitions.order_of_escapes[0].source == 0
+
+
+def test_pictures_of_the_least_action(least, tmp_path):
+    least.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(least.PICTURES)

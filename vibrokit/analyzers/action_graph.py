@@ -27,10 +27,11 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.request import pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
-_BYTES_KEPT = 84  # for each node of each phase: V, predecessor, b, Q, flags
+_BYTES_KEPT = 116  # for each node of each phase: V, its bound, places come from and tried, b, Q, flags
 _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
 _POORER = 1.9  # all grids together, in units of the finest
 _MOST_FRACTION = 64
+_FRACTIONS = (8, 16, 32, 64)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,16 +45,17 @@ class ActionGraph(Analyzer):
     which at weak damping is dearer than the whole path. V between nodes is interpolated. Round the attractor V is the
     exact quadratic form.
 
-    The error that is told is what halving the nodes along each side changed, and half of what doubling the step did.
-    Motion along a path is linearised over one step: the price over a whole period can be far off, over an eighth of it
-    it is right to some 0.2 %.
+    The error that is told is what halving the nodes along each side changed, and the larger of half of what doubling
+    the step did and of what the path costs when its steps are priced by Hamilton's equations. For motion is linearised
+    over one step: the price over a whole period can be far off, over an eighth of it it is right to some 0.2 %.
 
     Parameters
     ----------
     cells : (int, int)
         Nodes in x and in v.
-    fraction : int
-        Steps in a section interval; even.
+    fraction : int, optional
+        Steps in a section interval; even. By default 8, doubled (to 64 at most) until halving it changes no cost by
+        more than 2 %.
     source : int, optional
         Label of the attractor to leave; by default each in turn.
     exit : Exit
@@ -64,7 +66,7 @@ class ActionGraph(Analyzer):
     """
 
     cells: tuple[int, int] = (320, 320)
-    fraction: int = 8
+    fraction: int | None = None
     source: int | None = None
     exit: Exit = dataclasses.field(default_factory=LeaveBasin)
     stepper: Stepper | None = None
@@ -74,8 +76,9 @@ class ActionGraph(Analyzer):
         object.__setattr__(self, "cells", pair("ActionGraph: cells", self.cells))
         if min(self.cells) < 32:
             raise StructureError(f"ActionGraph: cells is {self.cells}; give 32 or more each way.")
-        whole("ActionGraph: fraction", self.fraction, 2, _MOST_FRACTION)
-        if self.fraction % 2:
+        if self.fraction is not None:
+            whole("ActionGraph: fraction", self.fraction, 2, _MOST_FRACTION)
+        if self.fraction is not None and self.fraction % 2:
             raise StructureError(
                 f"ActionGraph: fraction is {self.fraction}; give an even number, for the error is found by steps "
                 "twice as long."
@@ -128,22 +131,28 @@ class ActionGraph(Analyzer):
                 f"the noise has {len(osc.noise.extra_states)} states of its own, and the graph covers x and v only; "
                 "take ActionPlot."
             )
-        self._check_memory(osc)
         attractor = structure.attractor(label)
         stepper = stepper_for(osc, attractor, Flow.GRAMIAN, self.stepper)
         return screen(
-            osc, structure, attractor, self.exit, stepper, self.cells, self.fraction, progress
+            osc, structure, attractor, self.exit, stepper, self.cells, self._fractions(osc), progress
         )  # fmt: skip
 
-    def _check_memory(self, osc: Oscillator) -> None:
-        phases = 1 if osc.autonomous else self.fraction
-        nodes = self.cells[0] * self.cells[1]
-        needed = _POORER * nodes * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
-        if needed > self.memory:
+    def _fractions(self, osc: Oscillator) -> tuple[int, ...]:
+        """Those to try, as many as there is memory for."""
+        wanted = _FRACTIONS if self.fraction is None else (self.fraction,)
+        allowed = tuple(fraction for fraction in wanted if self._memory(osc, fraction) <= self.memory)
+        if not allowed:
             raise StructureError(
-                f"a graph of {self.cells[0]} × {self.cells[1]} nodes at {phases} phases needs {needed:.3g} GiB of "
-                f"memory, and {self.memory:.3g} GiB are allowed; take fewer cells, or allow more by memory."
+                f"a graph of {self.cells[0]} × {self.cells[1]} nodes at {wanted[0]} phases needs "
+                f"{self._memory(osc, wanted[0]):.3g} GiB of memory, and {self.memory:.3g} GiB are allowed; take fewer "
+                "cells, or allow more by memory."
             )
+        return allowed
+
+    def _memory(self, osc: Oscillator, fraction: int) -> float:
+        """What a graph takes, in GiB."""
+        phases = 1 if osc.autonomous else fraction
+        return _POORER * self.cells[0] * self.cells[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
 
 
 def _ways(found: Screen) -> str:

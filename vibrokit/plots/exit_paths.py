@@ -29,6 +29,7 @@ def exit_paths(
     *,
     sources: Sequence[int] = (),
     names: Sequence[str] = (),
+    curves: Sequence[bool] = (),
     saddles: Sequence[ArrayLike] = (),
     chaotic: Sequence[ArrayLike] = (),
     stable: Sequence[ArrayLike] = (),
@@ -50,6 +51,8 @@ def exit_paths(
         Label of the attractor that each path leaves: chooses its colour.
     names : sequence of str, optional
         What each path is called in the legend.
+    curves : sequence of bool, optional
+        Which paths are given all along, not by their points on the section: those have no dots.
     saddles, chaotic : sequence of array_like (count, n)
         Points of saddle orbits, and samples of chaotic sets on the boundary.
     stable : sequence of array_like (count, 2)
@@ -76,7 +79,10 @@ def exit_paths(
         strands = len(rows(points[source])) if 0 <= source < len(points) else 1
         name = names[index] if names else f"exit path from {source}"
         dashes = _DASHES[list(sources[:index]).count(source) % len(_DASHES)]
-        artists += _draw_path(axes, place, strands, index, colour(source), dashes, name)
+        whole = bool(curves) and curves[index]
+        artists += _draw_path(axes, place, 1 if whole else strands, index, colour(source), dashes, name)
+        if whole:
+            artists[-3].set_marker("")
     _add_legend(axes, ax, [*named(artists), *cell_samples(np.asarray(labels))])
     return artists
 

@@ -62,7 +62,7 @@ def quasi_potential_map(
     if highest > 0 and min(psi.shape) > 1:
         x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
         artists.append(
-            axes.contour(x, v, psi.T, levels=np.linspace(0.0, highest, _LEVELS)[1:], colors="0.25", linewidths=0.4)
+            axes.contour(x, v, psi.T, levels=np.linspace(0.0, highest, _LEVELS)[1:-1], colors="0.25", linewidths=0.4)
         )
     place = rows(points)
     artists += axes.plot(
@@ -84,9 +84,10 @@ def quasi_potential_map(
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
     phase_plane(axes)
-    axes.figure.colorbar(
+    bar = axes.figure.colorbar(
         image, ax=axes, extend="neither" if top is None else "max", label=r"quasi-potential $\Psi$ (m$^2$ s$^{-3}$)"
     )  # fmt: skip
+    bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.legend(
         handles=named(artists), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=8, frameon=False
     )  # fmt: skip

@@ -12,6 +12,8 @@ from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy, ExitPath
 from vibrokit.results.section import Section
 
+_AT_REST = 0.01  # of the extent of a path: by how much one moves at first that leaves an equilibrium
+
 
 def plot_exit_paths(data: xarray.Dataset, energies: Iterable[ActivationEnergy], ax: Any = None) -> Any:
     """Draw exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`.
@@ -28,13 +30,15 @@ def plot_exit_paths(data: xarray.Dataset, energies: Iterable[ActivationEnergy], 
 
     section = Section.in_data(data)
     drawn = with_paths(energies)
+    curves = [_from_rest(path) for _, path in drawn]
     return exit_paths(
         section.labels,
         section.bounds,
         section.points,
-        [path.q[path.section] for _, path in drawn],
+        [path.q if curve else path.q[path.section] for curve, (_, path) in zip(curves, drawn, strict=True)],
         sources=[energy.source for energy, _ in drawn],
         names=[_named(energy) for energy, _ in drawn],
+        curves=curves,
         saddles=section.saddles,
         chaotic=section.chaotic,
         stable=section.stable,
@@ -68,6 +72,14 @@ def plot_histories(energies: Iterable[ActivationEnergy], ax: Any = None) -> Any:
 def with_paths(energies: Iterable[ActivationEnergy]) -> list[tuple[ActivationEnergy, ExitPath]]:
     """Return the energies that have a path, each with it."""
     return [(energy, energy.path) for energy in energies if energy.path is not None]
+
+
+def _from_rest(path: ExitPath) -> bool:
+    """Whether a path leaves a state of rest: then all of it can be shown, and points by phase would mean nothing."""
+    if len(path.section) < 2:
+        return False
+    begun = np.ptp(path.q[: path.section[1] + 1], axis=0)
+    return bool(np.all(begun <= _AT_REST * np.ptp(path.q, axis=0)))
 
 
 def _named(energy: ActivationEnergy) -> str:

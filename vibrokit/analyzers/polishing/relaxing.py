@@ -33,10 +33,12 @@ class _Look:
 class _Relaxer:
     """Newton's method on the action as a function of the states at the nodes, damped until it descends."""
 
-    def __init__(self, carrier: Carrier, first: int, ending: Ending, last: float | None) -> None:
+    def __init__(
+        self, carrier: Carrier, first: int, target: Array, closing: Array | None, last: float | None = None
+    ) -> None:
         n = carrier.size
         self.carrier, self.first, self.last, self.n = carrier, first, last, n
-        self.target, closing = ending.closing(n)
+        self.target = target
         self.pinned = closing is None
         self.closing = np.zeros((n, n)) if closing is None else closing
 
@@ -138,12 +140,28 @@ def relaxed(carrier: Carrier, first: int, ending: Ending, points: Array, last: f
     array (nodes, 2n)
         The guess itself where it cannot be priced.
     """
-    relaxer = _Relaxer(carrier, first, ending, last)
-    n = relaxer.n
+    n = carrier.size
+    relaxer = _Relaxer(carrier, first, *ending.closing(n), last)
     look = relaxer.relax(points[:, :n], points[:-1, n:])
     if look is None:
         return points
     return np.hstack([look.states, np.vstack([look.momenta, look.carried.images[-1:, n:]])])
+
+
+def price(carrier: Carrier, first: int, points: Array) -> float:
+    """Return the least action of going from node to node, by Hamilton's equations; NaN where no momenta are found.
+
+    Parameters
+    ----------
+    carrier : Carrier
+    first : int
+        Phase of the first node, in pieces since the section.
+    points : array (nodes, 2n)
+        The states, and guesses of the momenta.
+    """
+    n = carrier.size
+    look = _Relaxer(carrier, first, np.zeros(n), None).look(points[:, :n], points[:-1, n:])
+    return float("nan") if look is None else look.action
 
 
 def _step(diagonal: Array, below: Array, slope: Array, damping: float) -> Array | None:

@@ -25,6 +25,7 @@ _NEARLY = 0.8  # of that V: a way out that costs more may owe it to the limit
 _RAISED = 3.0
 _RAISES = 6
 _STAGES = 4
+_STEP_TOLERANCE = 0.02  # of a cost: by how much doubling the step may change it
 _ZOOMS = 4
 _WORTHWHILE = 0.8  # of the area before: more does not pay another round
 _BY_STEP = 0.5  # share of what doubling the step changes that counts as error: the price is of second order at least
@@ -56,18 +57,18 @@ class Levels:
     long: Potential
     from_set: bool
 
-    def cost(self, way: Way) -> tuple[float, float]:
+    def cost(self, way: Way, linearised: float) -> tuple[float, float]:
         """Return what a way out costs, and how far this may be wrong.
 
-        The error is what halving the grid changed, and half of what doubling the step did; from a set also how V rises
-        near by.
+        The error is what halving the grid changed, and the larger of what linearising over a step is known to do and
+        half of what doubling the step did; from a set also how V rises near by.
         """
         fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
         if not np.isfinite([fine, coarse, long]).all():
             whole = way.cost(self.whole)
             return whole, whole
         blur = way.blur(self.fine) if self.from_set else 0.0
-        return fine, abs(fine - coarse) + _BY_STEP * abs(coarse - long) + blur
+        return fine, abs(fine - coarse) + max(linearised, _BY_STEP * abs(coarse - long)) + blur
 
 
 def levels(
@@ -78,10 +79,12 @@ def levels(
     inside: Callable[[Grids, int], NDArray[np.bool_]],
     stepper: Stepper,
     cells: tuple[int, int],
-    fraction: int,
+    fractions: Sequence[int],
     progress: Progress | None = None,
 ) -> Levels:
     """Find the potential of an attractor; see `Levels`.
+
+    Of the time fractions, the first is taken that no cost changes by much from when it is halved; else the last.
 
     Raises
     ------
@@ -89,45 +92,82 @@ def levels(
         No way out was reached, or the attractor is not hyperbolic.
     """
     half = (max(16, cells[0] // 2), max(16, cells[1] // 2))
-    done = iter(range(1, _STAGES + 1))
-
-    def tell() -> None:
-        if progress is not None:
-            progress(next(done), _STAGES)
-
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
+        work = _Work(osc, structure, attractor, ways, inside, stepper, executor, progress)
+        for fraction in fractions:
+            poor = work.poor(fraction, half)
+            if work.by_step(poor) <= _STEP_TOLERANCE:
+                break
+        fine, _ = work.solved(poor.coarse.grids.of(cells), poor.limit)
+        work.tell(_STAGES)
+    return Levels(poor.whole, fine, poor.coarse, poor.long, attractor.kind not in ("periodic", "equilibrium"))
 
-        def solved(grids: Grids, limit: float) -> tuple[Potential, float]:
-            for _ in range(_RAISES):
-                potential = Iteration(osc, stepper, attractor, grids, limit, executor).run()
-                costs = [way.cost(potential) for way in ways]
-                dearest = max([cost for cost in costs if np.isfinite(cost)], default=np.inf)
-                if dearest < _NEARLY * limit:
-                    return potential, dearest
-                limit *= _RAISED
-            raise StructureError(
-                f"no way out of attractor {attractor.label} was reached on the grid: the region, or the cells asked "
-                "for, leave no room for it; widen the region or take more cells."
-            )
 
-        limit = 2 * max(way.bound for way in ways)
-        grids = covering(osc, stepper, structure.basins.region, fraction, half)
-        whole, dearest = solved(grids, limit)
-        tell()
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Poor:
+    """The potentials on half as many nodes along each side, and V up to which they were found."""
+
+    whole: Potential
+    coarse: Potential
+    long: Potential
+    limit: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Work:
+    """What all levels share."""
+
+    osc: Oscillator
+    structure: Structure
+    attractor: Attractor
+    ways: Sequence[Way]
+    inside: Callable[[Grids, int], NDArray[np.bool_]]
+    stepper: Stepper
+    executor: concurrent.futures.Executor
+    progress: Progress | None
+
+    def tell(self, done: int) -> None:
+        """Say how far the work is."""
+        if self.progress is not None:
+            self.progress(done, _STAGES)
+
+    def solved(self, grids: Grids, limit: float) -> tuple[Potential, float]:
+        """Iterate on some grids, up to a V that is raised until the ways out are well below it."""
+        for _ in range(_RAISES):
+            potential = Iteration(self.osc, self.stepper, self.attractor, grids, limit, self.executor).run()
+            costs = [way.cost(potential) for way in self.ways]
+            dearest = max([cost for cost in costs if np.isfinite(cost)], default=np.inf)
+            if dearest < _NEARLY * limit:
+                return potential, dearest
+            limit *= _RAISED
+        raise StructureError(
+            f"no way out of attractor {self.attractor.label} was reached on the grid: the region, or the cells asked "
+            "for, leave no room for it; widen the region or take more cells."
+        )
+
+    def poor(self, fraction: int, cells: tuple[int, int]) -> _Poor:
+        """Find the whole potential, cut out what can be reached for little more than leaving costs, and solve there."""
+        limit = 2 * max(way.bound for way in self.ways)
+        grids = covering(self.osc, self.stepper, self.structure.basins.region, fraction, cells)
+        whole, dearest = self.solved(grids, limit)
+        self.tell(1)
         coarse = whole
         for _ in range(_ZOOMS):
             near = [values < _ROOM * dearest for values in coarse.values]
-            wanted = [mask & inside(grids, phase) for phase, mask in enumerate(near)]
-            zoomed = grids.zoomed(wanted)
+            zoomed = grids.zoomed([mask & self.inside(grids, phase) for phase, mask in enumerate(near)])
             gain = zoomed.area / grids.area
             if coarse is not whole and gain > _WORTHWHILE:
                 break
             grids = zoomed
-            coarse, dearest = solved(grids, _ROOM * dearest)
-        tell()
+            coarse, dearest = self.solved(grids, _ROOM * dearest)
+        self.tell(2)
         doubled = dataclasses.replace(grids, boxes=grids.boxes[::2], step=2 * grids.step)
-        long, _ = solved(doubled, _ROOM * dearest)
-        tell()
-        fine, _ = solved(grids.of(cells), _ROOM * dearest)
-        tell()
-    return Levels(whole, fine, coarse, long, attractor.kind not in ("periodic", "equilibrium"))
+        long, _ = self.solved(doubled, _ROOM * dearest)
+        self.tell(3)
+        return _Poor(whole, coarse, long, _ROOM * dearest)
+
+    def by_step(self, poor: _Poor) -> float:
+        """By how much, relative, halving the fraction changes the cost of any way out that is in reach."""
+        pairs = [(way.cost(poor.coarse), way.cost(poor.long)) for way in self.ways]
+        changes = [abs(long - cost) / cost for cost, long in pairs if np.isfinite([cost, long]).all() and cost > 0]
+        return max(changes, default=0.0)
