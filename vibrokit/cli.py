@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vibrokit import __version__
-from vibrokit.errors import StructureError, VibrokitError
+from vibrokit.errors import SceneError, StructureError, VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.kernels.ensemble import Progress
@@ -88,6 +88,9 @@ def _parser() -> argparse.ArgumentParser:
 
     trade = commands.add_parser("trade", parents=[scene], help="error against time on this machine")
     trade.add_argument("-o", "--output", type=Path, metavar="FILE", help="where to save the figure")
+    trade.add_argument(
+        "--source", type=int, metavar="LABEL", help="the attractor that energies are measured for (default: the first)"
+    )
     trade.set_defaults(command=_trade)
     return parser
 
@@ -263,17 +266,23 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.results.pictures import save_figure
     from vibrokit.scene_file import load_scene
     from vibrokit.trade.basins import measure_basins
+    from vibrokit.trade.energies import measure_energies
     from vibrokit.trade.steppers import measure_steppers
 
     osc = load_scene(options.scene)
     with _Bar("steppers") as bar:
         table = measure_steppers(osc, progress=bar)
-    print(table)
+    print(table, flush=True)
     try:
         with _Bar("basins") as bar:
-            print(f"\n{measure_basins(osc, progress=bar)}")
+            print(f"\n{measure_basins(osc, progress=bar)}", flush=True)
     except StructureError as error:  # what was measured so far is worth its table
         print(f"vibrokit: basins: {error}", file=sys.stderr)
+    try:
+        with _Bar("energies") as bar:
+            print(f"\n{measure_energies(osc, source=options.source, progress=bar)}")
+    except (SceneError, StructureError) as error:
+        print(f"vibrokit: energies: {error}", file=sys.stderr)
     picture = options.output or Path(f"{_stem(options.scene)}-trade.png")
     save_figure(work_precision(table.rows), picture)
     print(f"figure: {picture}")

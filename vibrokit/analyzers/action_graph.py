@@ -45,17 +45,17 @@ class ActionGraph(Analyzer):
     which at weak damping is dearer than the whole path. V between nodes is interpolated. Round the attractor V is the
     exact quadratic form.
 
-    The error that is told is what halving the nodes along each side changed, and the larger of half of what doubling
-    the step did and of what the path costs when its steps are priced by Hamilton's equations. For motion is linearised
-    over one step: the price over a whole period can be far off, over an eighth of it it is right to some 0.2 %.
+    The error that is told is what halving the nodes along each side changed, and what the path of the graph costs less
+    or more when it is brought down to a minimum of the action by Hamilton's equations: its steps are linearised, and a
+    price over a whole period can be far off by that, over an eighth of it it is right to some 0.2 %.
 
     Parameters
     ----------
     cells : (int, int)
         Nodes in x and in v.
     fraction : int, optional
-        Steps in a section interval; even. By default 8, doubled (to 64 at most) until halving it changes no cost by
-        more than 2 %.
+        Steps in a section interval; even. By default 8, doubled (to 64 at most) until linearising over a step
+        changes no price by more than 1 %.
     source : int, optional
         Label of the attractor to leave; by default each in turn.
     exit : Exit

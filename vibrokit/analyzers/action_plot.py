@@ -38,7 +38,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128  # of a path, in a section interval
 _SHARES = 4
-_MOST_POINTS = 10**8
+_MOST_PERIODS = 10**8
+_MOST_POINTS = 10**7  # some GiB of starts and outcomes
 _MOST_ROUNDS = 1000
 
 Array = NDArray[np.float64]
@@ -92,7 +93,7 @@ class ActionPlot(Analyzer):
         whole("ActionPlot: points", self.points, 4, _MOST_POINTS)
         whole("ActionPlot: rounds", self.rounds, 0, _MOST_ROUNDS)
         if self.budget is not None:
-            whole("ActionPlot: budget", self.budget, 1, _MOST_POINTS)
+            whole("ActionPlot: budget", self.budget, 1, _MOST_PERIODS)
 
     def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> ActionPlotResult:
         """Search the ways out of each attractor.

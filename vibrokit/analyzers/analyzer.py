@@ -69,6 +69,8 @@ def checked_sources(
     if not isinstance(exit, Exit):
         raise StructureError(f"exit is {shown(exit)}, which is none; give LeaveBasin() or FirstContact().")
     exit.check(osc, structure)
+    if isinstance(source, bool):
+        raise StructureError(f"source is {source}; give the label of an attractor, or None for each in turn.")
     return structure.attractors if source is None else (structure.attractor(source),)
 
 

@@ -16,6 +16,7 @@ from vibrokit.structure.orbits import Orbit
 from vibrokit.symbolic.flow_kind import Flow
 
 _PIECES = 16
+_NEUTRAL = 1e-6  # of a multiplier: so near to 1 that nothing decays
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,7 @@ def _closed(orbit: Orbit, pieces: list[_Piece]) -> LocalPotential:
         monodromy = piece.monodromy @ monodromy
         gramian = piece.monodromy @ gramian @ piece.monodromy.T + piece.gramian
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
-    if not largest < 1:
+    if not largest < 1 - _NEUTRAL:
         raise StructureError(
             f"the orbit at {tuple(orbit.point)} has a multiplier of size {largest:.6g}; only a stable one "
             "(all below 1) has a quasi-potential round it."

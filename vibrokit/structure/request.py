@@ -124,6 +124,12 @@ def check_belongs(osc: Oscillator, structure: Any) -> None:
             "the structure is that of another scene, or of this one with other numbers; give the one that "
             "find_structure returns for this oscillator."
         )
+    size = 2 + (len(osc.noise.extra_states) if osc.noise else 0)
+    if any(attractor.points.shape[1] != size for attractor in structure.attractors):
+        raise StructureError(
+            f"the structure was found without the states that the noise has of its own, so its points are not the "
+            f"{size} numbers long that this oscillator needs; find the structure of the scene with this noise."
+        )
 
 
 def _without_noise(data: Any) -> str:

@@ -33,9 +33,10 @@ _BEYOND = 32  # section intervals that a candidate is followed without noise
 _NEAR = 3.0  # times the distance to the nearest saddle: others so near are tried too
 _PIECES = (8, 16)  # in a section interval: the finer ones where the coarser ones do not converge
 _EQUAL = 1e-6  # relative difference of the actions of one path, found twice
-_SAME_NODE, _SAME_CURVE = 1e-3, 0.1  # of its extent, with forcing and without, where nodes may be anywhere along it
+_SAME = 0.05  # of its extent, at samples of the path
 _ROUNDS = 4  # how often a path is ended at an earlier touch
 _FLAT, _ALIKE = 1e-3, 0.01
+_ROUNDING = 1e-12  # of an action, which is a sum of thousands
 
 _Solved = tuple[Goal, Carrier, Extremum, ExitPath]
 
@@ -202,6 +203,7 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
         except StructureError as error:
             words.append(f"A path of action {found.action:.6g} was found that has no certificate: {error}")
             continue
+        unsure = certificate.error + _ROUNDING * found.action
         if found.source.held:
             words.append(
                 f"The path of action {found.action:.6g} starts on the orbit itself, {certificate.periods:.0f} periods "
@@ -212,8 +214,8 @@ def _certified(label: int, solved: list[_Solved]) -> tuple[tuple[ActivationEnerg
                 source=label,
                 target=target,
                 value=found.action,
-                lower=max(0.0, found.action - certificate.error),
-                upper=found.action + certificate.error,
+                lower=max(0.0, found.action - unsure),
+                upper=found.action + unsure,
                 method=METHOD,
                 residual=certificate.residual,
                 path=path,
@@ -234,9 +236,11 @@ def _same(one: _Solved, other: _Solved) -> bool:
     first, second = one[2], other[2]
     if one[0] is not other[0] or abs(first.action - second.action) > _EQUAL * first.action:
         return False
-    middle = int(np.searchsorted(np.cumsum(first.actions), 0.5 * first.action))
-    apart = np.abs((second.points - first.points[min(middle, len(first.points) - 1)]) / first.scale).max(axis=1)
-    return bool(apart.min() < (_SAME_CURVE if one[1].osc.autonomous else _SAME_NODE))
+    path, known = one[3], other[3]
+    middle = min(int(np.searchsorted(path.action, 0.5 * first.action)), len(path.t) - 1)
+    place = np.concatenate([path.q[middle], path.p[middle]])
+    apart = np.abs((np.hstack([known.q, known.p]) - place) / first.scale).max(axis=1)
+    return bool(apart.min() < _SAME)
 
 
 def _valleys(branches: Sequence[ActivationEnergy]) -> list[str]:

@@ -128,18 +128,7 @@ def smooth_chain(carrier: Carrier, first: int, states: Array, last: float | None
     StructureError
         The guess runs out of range.
     """
-    return _chain(*_Smoother(carrier, first, last).smooth(states))
-
-
-def priced_chain(carrier: Carrier, first: int, states: Array) -> Chain:
-    """Price a path as it is; arguments and errors as for `smooth_chain`."""
-    look = _Smoother(carrier, first, None).look(states)
-    if look is None:
-        raise StructureError("the path runs out of range.")
-    return _chain(states, look)
-
-
-def _chain(states: Array, look: _Look) -> Chain:
+    states, look = _Smoother(carrier, first, last).smooth(states)
     ends = np.einsum("kji,kj->ki", look.weights, look.misses)
     starts = np.einsum("kji,kj->ki", look.linear.steps, ends)
     return Chain(np.hstack([states, np.vstack([starts, ends[-1:]])]), look.action)

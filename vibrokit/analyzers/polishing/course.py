@@ -44,6 +44,8 @@ def course_of(carrier: Carrier, candidate: Candidate, periods: int) -> Course:
     StructureError
         The candidate has no length.
     """
+    if not np.isfinite(candidate.states).all():
+        raise StructureError(f"a candidate of {candidate.finder} has states that are not finite.")
     times, given = candidate.times - candidate.times[0], candidate.states
     if len(times) < 2 or not times[-1] > 0:
         raise StructureError(f"a candidate of {candidate.finder} has one state only, so there is no path to polish.")

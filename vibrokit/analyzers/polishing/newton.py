@@ -98,6 +98,8 @@ class _Pin:
     def at(cls, carrier: Carrier, points: Array, scale: Array) -> _Pin:
         """At the node that the path passes fastest: there both are best determined."""
         n = len(scale) // 2
+        if len(points) < 3:
+            raise StructureError("the guessed path is shorter than three pieces.")
         node = 1 + int(np.argmax(np.linalg.norm((points[2:] - points[:-2]) / scale, axis=1)))
         rate = carrier.rate(points[node], 0.0)
         normal = np.concatenate([-rate[n:], rate[:n]]) * scale  # ∇H = (−p′, q′)

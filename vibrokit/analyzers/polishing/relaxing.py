@@ -148,8 +148,8 @@ def relaxed(carrier: Carrier, first: int, ending: Ending, points: Array, last: f
     return np.hstack([look.states, np.vstack([look.momenta, look.carried.images[-1:, n:]])])
 
 
-def price(carrier: Carrier, first: int, points: Array) -> float:
-    """Return the least action of going from node to node, by Hamilton's equations; NaN where no momenta are found.
+def relaxed_between(carrier: Carrier, first: int, points: Array) -> tuple[Array, float]:
+    """Bring a path down to a local minimum of the action, with its first and its last state held.
 
     Parameters
     ----------
@@ -158,10 +158,16 @@ def price(carrier: Carrier, first: int, points: Array) -> float:
         Phase of the first node, in pieces since the section.
     points : array (nodes, 2n)
         The states, and guesses of the momenta.
+
+    Returns
+    -------
+    states : array (nodes, n)
+    action : float
+        NaN where the guess cannot be priced.
     """
     n = carrier.size
-    look = _Relaxer(carrier, first, np.zeros(n), None).look(points[:, :n], points[:-1, n:])
-    return float("nan") if look is None else look.action
+    look = _Relaxer(carrier, first, np.zeros(n), None).relax(points[:, :n], points[:-1, n:])
+    return (points[:, :n], float("nan")) if look is None else (look.states, look.action)
 
 
 def _step(diagonal: Array, below: Array, slope: Array, damping: float) -> Array | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,18 +58,19 @@ class _AtStop(Destination):
         self.carrier, self.position, self.sign = carrier, position, sign
 
     def distance(self, course: Course) -> float:
-        return 0.0 if np.any(self._inside(course.candidate.states) <= 0) else math.inf
+        return max(0.0, float(self._inside(course.candidate.states).min()))
 
     def cuts(self, course: Course) -> list[Cut]:
-        """End at rest at the stop, at the time of the first state beyond it or up to half a period from that.
+        """End at rest at the stop, at the time of the first state beyond it, or next to it, or half a period from that.
 
         With forcing the time of the touch matters, and a shot that comes too fast has it wrong.
         """
         candidate = course.candidate
         times, gaps = candidate.times - candidate.times[0], self._inside(candidate.states)
-        first = int(np.argmax(gaps <= 0))
+        beyond = bool(np.any(gaps <= 0))
+        first = int(np.argmax(gaps <= 0) if beyond else np.argmin(gaps))
         before = max(first - 1, 0)
-        share = gaps[before] / (gaps[before] - gaps[first]) if first else 0.0
+        share = gaps[before] / (gaps[before] - gaps[first]) if first and beyond else 1.0
         touch = max(times[before] + share * (times[first] - times[before]), 0.5 * self.carrier.piece)
         if self.carrier.osc.autonomous:
             return [self._ended(course, max(1, round(touch / self.carrier.piece)), 0, None)]

@@ -97,14 +97,13 @@ class Grids:
 
 
 def covering(osc: Oscillator, stepper: Stepper, region: Region, fraction: int, cells: tuple[int, int]) -> Grids:
-    """Return grids that cover a region of the section, and what the motion carries it to in the other phases."""
+    """Return grids that cover a region of the section, in the other phases also what the motion carries it to."""
     step = osc.section_interval / fraction
     states = region.cell_centres((_SAMPLES, _SAMPLES))
     boxes = []
     for phase in range(1 if osc.autonomous else fraction):
-        low, high = states.min(axis=0), states.max(axis=0)
-        if phase == 0:
-            low, high = region.bounds.T
+        low = np.minimum(states.min(axis=0), region.bounds[:, 0])
+        high = np.maximum(states.max(axis=0), region.bounds[:, 1])
         room = _MARGIN * (high - low)
         boxes.append(np.stack([low - room, high + room], axis=1))
         ended = run_ensemble(osc, Flow.STATE, stepper, states, 1, start_time=phase * step, interval=step)

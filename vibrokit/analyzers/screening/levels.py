@@ -10,8 +10,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.candidate import Candidate
 from vibrokit.analyzers.screening.grids import Grids, covering
 from vibrokit.analyzers.screening.potential import Iteration, Potential
+from vibrokit.analyzers.screening.ways_followed import different, follow
 from vibrokit.analyzers.screening.ways_out import Way
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Progress
@@ -25,9 +27,10 @@ _NEARLY = 0.8  # of that V: a way out that costs more may owe it to the limit
 _RAISED = 3.0
 _RAISES = 6
 _STAGES = 4
-_STEP_TOLERANCE = 0.02  # of a cost: by how much doubling the step may change it
+_STEP_TOLERANCE = 0.01  # of a cost: by how much linearising over a step may change it
 _ZOOMS = 4
 _WORTHWHILE = 0.8  # of the area before: more does not pay another round
+_BY_PATH = 1.1  # of the difference from a path, which ends where it is held and so is not quite the cheapest
 _BY_STEP = 0.5  # share of what doubling the step changes that counts as error: the price is of second order at least
 
 Array = NDArray[np.float64]
@@ -35,7 +38,7 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Levels:
-    """A potential, and two poorer ones.
+    """A potential, and poorer ones.
 
     Attributes
     ----------
@@ -57,18 +60,25 @@ class Levels:
     long: Potential
     from_set: bool
 
-    def cost(self, way: Way, linearised: float) -> tuple[float, float]:
+    def paths(self, osc: Oscillator, stepper: Stepper, way: Way, source: int) -> list[Candidate]:
+        """Return the different paths to a way out, the cheapest first."""
+        own = (self.fine, self.coarse) if np.isfinite(way.cost(self.fine)) else (self.whole,)
+        found = [one for potential in own for one in follow(osc, stepper, potential, way, source)]
+        return [one.candidate for one in different(found)]
+
+    def cost(self, way: Way, path: float) -> tuple[float, float]:
         """Return what a way out costs, and how far this may be wrong.
 
-        The error is what halving the grid changed, and the larger of what linearising over a step is known to do and
-        half of what doubling the step did; from a set also how V rises near by.
+        The error is what halving the grid changed and the difference from a path's action by Hamilton's equations; or,
+        if no path was found, half of what doubling the step changed; from a set also how V rises near by.
         """
         fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
         if not np.isfinite([fine, coarse, long]).all():
             whole = way.cost(self.whole)
             return whole, whole
         blur = way.blur(self.fine) if self.from_set else 0.0
-        return fine, abs(fine - coarse) + max(linearised, _BY_STEP * abs(coarse - long)) + blur
+        by_time = _BY_PATH * abs(path - fine) if np.isfinite(path) else _BY_STEP * abs(coarse - long)
+        return fine, abs(fine - coarse) + by_time + blur
 
 
 def levels(
@@ -84,7 +94,7 @@ def levels(
 ) -> Levels:
     """Find the potential of an attractor; see `Levels`.
 
-    Of the time fractions, the first is taken that no cost changes by much from when it is halved; else the last.
+    The first of the time fractions is taken with which linearising over a step changes no price by much; else the last.
 
     Raises
     ------
@@ -94,9 +104,10 @@ def levels(
     half = (max(16, cells[0] // 2), max(16, cells[1] // 2))
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
         work = _Work(osc, structure, attractor, ways, inside, stepper, executor, progress)
+        silent = dataclasses.replace(work, progress=None)
         for fraction in fractions:
-            poor = work.poor(fraction, half)
-            if work.by_step(poor) <= _STEP_TOLERANCE:
+            poor = (work if fraction == fractions[0] else silent).poor(fraction, half)
+            if fraction == fractions[-1] or work.linearising(poor) <= _STEP_TOLERANCE:
                 break
         fine, _ = work.solved(poor.coarse.grids.of(cells), poor.limit)
         work.tell(_STAGES)
@@ -166,8 +177,8 @@ class _Work:
         self.tell(3)
         return _Poor(whole, coarse, long, _ROOM * dearest)
 
-    def by_step(self, poor: _Poor) -> float:
-        """By how much, relative, halving the fraction changes the cost of any way out that is in reach."""
-        pairs = [(way.cost(poor.coarse), way.cost(poor.long)) for way in self.ways]
-        changes = [abs(long - cost) / cost for cost, long in pairs if np.isfinite([cost, long]).all() and cost > 0]
-        return max(changes, default=0.0)
+    def linearising(self, poor: _Poor) -> float:
+        """By how much, relative, linearising over a step changes the price of any way out that is in reach."""
+        label = self.attractor.label
+        found = [one for way in self.ways for one in follow(self.osc, self.stepper, poor.coarse, way, label)]
+        return max((one.linearising for one in found), default=0.0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.screening.potential import Potential
-from vibrokit.analyzers.screening.tables import carried, in_cells, steps_into
+from vibrokit.analyzers.screening.tables import in_cells, steps_into
 from vibrokit.analyzers.screening.ways_out import Tip, Way
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import descend_all
@@ -45,18 +45,15 @@ class Touching(Way):
         """The least cost over all times and speeds."""
         return self._best(potential)[0]
 
-    def tip(self, potential: Potential) -> Tip:
-        """The state at the phase before, and the one at the phase after the touch."""
-        _, phase, place, touch, part = self._best(potential)
-        grids = potential.grids
-        rest = grids.step * (1 - part)
-        at = grids.time(phase) + grids.step * part
-        beyond = carried(self.osc, self.stepper, touch[None], at, rest) if part < 1 else touch[None]
-        return Tip(grids.states(phase, place), phase, beyond[:, :2])
+    def tips(self, potential: Potential) -> list[Tip]:
+        """The state at the phase before, and the touch, which comes up to a step of time later."""
+        _, phase, place, touch = self._best(potential)
+        return [Tip(potential.grids.states(phase, place), phase, touch[None])]
 
-    def _best(self, potential: Potential) -> tuple[float, int, Array, Array, float]:
+    def _best(self, potential: Potential) -> tuple[float, int, Array, Array]:
+        """Least cost, phase of the step that it takes, place where that begins, and state at the touch."""
         grids = potential.grids
-        best: tuple[float, int, Array, Array, float] = (np.inf, 0, np.ones(2), np.ones(2), 1.0)
+        best: tuple[float, int, Array, Array] = (np.inf, 0, np.ones(2), np.ones(2))
         for phase in range(grids.phases):
             speeds = np.linspace(grids.boxes[phase, 1, 0], grids.boxes[phase, 1, 1], _SPEEDS * grids.cells[1])
             states = np.column_stack([np.full(len(speeds), self.wall), speeds])
@@ -69,7 +66,7 @@ class Touching(Way):
                 costs, places = descend_all(potential.values[phase], centres[:, None].copy(), centres, forms, 1.0)
                 index = int(np.argmin(costs))
                 if costs[index] < best[0]:
-                    best = (float(costs[index]), phase, places[index], states[index], look / _LOOKS)
+                    best = (float(costs[index]), phase, places[index], states[index])
         return best
 
 

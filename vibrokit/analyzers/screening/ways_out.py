@@ -20,7 +20,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.sharing import agreeing
 from vibrokit.structure.orbits import section_derivative
 
-_BEYOND = 1.5  # cells from a saddle to where paths over it are begun
+_BEYOND = (1.5, 3.0)  # cells from a saddle to where paths over it are begun
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,8 @@ class Way(ABC):
         return 0.0
 
     @abstractmethod
-    def tip(self, potential: Potential) -> Tip:
-        """Return from where the cheapest path is followed back."""
+    def tips(self, potential: Potential) -> list[Tip]:
+        """Return from where paths are followed back."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -95,13 +95,14 @@ class Places(Way):
         """How V rises near the cheapest state."""
         return potential.blur(0, self.states[_first(potential.at(0, self.states))])
 
-    def tip(self, potential: Potential) -> Tip:
-        """The cheapest state, or one just beyond a saddle, where V no longer falls."""
+    def tips(self, potential: Potential) -> list[Tip]:
+        """The cheapest state, or some just beyond a saddle, where V no longer falls."""
         if self.direction is None:
-            return Tip(self.states[_first(potential.at(0, self.states))])
-        step = self.direction / np.max(np.abs(self.direction) / potential.grids.spacing(0)) * _BEYOND
-        tips = self.states[0] + np.array([step, -step])
-        return Tip(tips[_first(-potential.at(0, tips))])
+            return [Tip(self.states[_first(potential.at(0, self.states))])]
+        step = self.direction / np.max(np.abs(self.direction) / potential.grids.spacing(0))
+        sides = np.array([step, -step])
+        side = sides[_first(-potential.at(0, self.states[0] + _BEYOND[0] * sides))]
+        return [Tip(self.states[0] + beyond * side) for beyond in _BEYOND]
 
 
 def ways_to_leave(osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:

@@ -1,0 +1,200 @@
+"""Least action at the extremes: energies against exact ones, what the bounds say, and what was refused.
+
+    python tests/benchmarks/action_extremes.py [WORDS …] [--limit 300] [--full] [--list] [--out FILE]
+
+Takes the scenes of `tests/extremes/scenes_of_action.py` whose names have all the words, one by one, each in a process
+of its own that is ended at the limit, and prints the rows of a list-table. A row marked WRONG has an exact energy
+outside its bounds and no word of it in the status.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+import vibrokit as vk
+from tests.extremes.scenes_of_action import ActionScene, scenes
+from vibrokit.errors import VibrokitError
+
+HEADER = (
+    "scene",
+    "from → to",
+    "energy [bounds]",
+    "exact",
+    "relative error",
+    "residual",
+    "graph",
+    "CPU seconds",
+    "what was said",
+)
+AGREED = "they agree"
+ROUNDING = 1e-9  # relative: an exact energy so near a bound is not outside it
+
+
+def structure_of(scene: ActionScene, full: bool) -> vk.Structure:
+    if full:
+        return vk.find_structure(scene.oscillator, region=scene.region)
+    return vk.find_structure(scene.oscillator, region=scene.region, cells=(50, 50), starts=(8, 8), manifolds=False)
+
+
+def analyzer(full: bool, **changes) -> vk.LeastAction:
+    if full:
+        return vk.LeastAction(**changes)
+    return vk.LeastAction(plot=vk.ActionPlot(points=3000), graph=vk.ActionGraph(cells=(120, 120)), **changes)
+
+
+def exact_energies(scene: ActionScene, structure: vk.Structure) -> dict[int, float]:
+    """By label; the scene has them by growing x."""
+    if len(scene.exact) != len(structure.attractors):
+        return {}
+    by_place = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
+    return {attractor.label: exact for attractor, exact in zip(by_place, scene.exact, strict=True)}
+
+
+class Told:
+    """Progress, to the standard error, for a run that is ended at the limit."""
+
+    def __init__(self) -> None:
+        self.percent = -1
+
+    def __call__(self, done: int, total: int) -> None:
+        percent = 100 * done // max(1, total)
+        if percent != self.percent:
+            self.percent = percent
+            print(f"{percent} % of the least action done", file=sys.stderr, flush=True)
+
+
+def least(scene: ActionScene, structure: vk.Structure, full: bool, exact: dict[int, float], **changes) -> list[dict]:
+    """Run, and return one row for each energy; one with a reason only where there is none."""
+    began = time.process_time()
+    try:
+        result = analyzer(full, **changes).run(scene.oscillator, structure, progress=Told())
+    except VibrokitError as refusal:
+        return [{"said": f"{type(refusal).__name__}: {refusal}", "seconds": time.process_time() - began}]
+    seconds, said = time.process_time() - began, result.status
+    graphs = {key: graph_words(said, key) for key in {(e.source, e.target) for e in result.energies}}
+    rows = [
+        {
+            "way": f"{e.source} → {e.target if e.target >= 0 else 'stop'}",
+            "value": e.value,
+            "bounds": [e.lower, e.upper],
+            "method": e.method,
+            "exact": exact.get(e.source),
+            "residual": e.residual,
+            "graph": graphs[e.source, e.target],
+            "said": said,
+            "seconds": seconds,
+        }
+        for e in result.energies
+    ]
+    return rows or [{"said": said, "seconds": seconds}]
+
+
+def graph_words(status: str, key: tuple[int, int]) -> str:
+    """Return the graph's value and error, out of the sentence that compares it."""
+    source, target = key
+    _, found, after = status.partition(f"From {source} to {target if target >= 0 else 'the exit'}:")
+    for opening in ("the graph has ", "the graph's "):
+        _, here, value = after.partition(opening) if found else ("", "", "")
+        if here:
+            return " ".join(value.split()[:3]).rstrip(",;")
+    return ""
+
+
+def rows_of(scene: ActionScene, full: bool) -> list[dict]:
+    began = time.process_time()
+    try:
+        structure = structure_of(scene, full)
+    except VibrokitError as refusal:
+        return [{"said": f"structure, {type(refusal).__name__}: {refusal}", "seconds": time.process_time() - began}]
+    found = f"[{len(structure.attractors)} attractors, {len(structure.saddles)} saddles] "
+    print(f"{scene.name}: {found}{time.process_time() - began:.1f} s. {structure.status}", file=sys.stderr, flush=True)
+    if scene.contact is None:
+        rows = least(scene, structure, full, exact_energies(scene, structure))
+    else:
+        first = {attractor.label: scene.contact for attractor in structure.attractors if not attractor.impacts}
+        rows = least(scene, structure, full, first, exit=vk.FirstContact())
+    for row in rows:
+        row["said"] = found + row["said"]
+    return rows
+
+
+def limited(name: str, full: bool, limit: float) -> list[dict]:
+    """Run a scene in a process of its own, so many seconds at most."""
+    command = [sys.executable, __file__, "--scene", name, *(["--full"] if full else [])]
+    began = time.perf_counter()
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+    except subprocess.TimeoutExpired as ended:
+        last = ((ended.stderr or b"").decode().splitlines() or ["no structure yet"])[-1]
+        return [{"said": f"ended after {limit:g} s: {last}", "seconds": time.perf_counter() - began}]
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no words"])[-1]
+        return [{"said": f"CRASH ({done.returncode}): {last}", "seconds": time.perf_counter() - began}]
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def verdict(row: dict) -> str:
+    exact = row.get("exact")
+    if exact is None:
+        return ""
+    low, high = row["bounds"]
+    if low > exact * (1 + ROUNDING) or high < exact * (1 - ROUNDING):
+        return "WRONG " if not row["said"].count("cheaper way out") else "wrong, and said so "
+    return ""
+
+
+def cells_of(name: str, row: dict) -> tuple[str, ...]:
+    if "value" not in row:
+        return name, "", "", "", "", "", "", f"{row['seconds']:.0f}", row["said"]
+    value, (low, high), exact = row["value"], row["bounds"], row["exact"]
+    return (
+        name,
+        row["way"],
+        f"{verdict(row)}{value:.9g} [{low:.9g}, {high:.9g}], {row['method']}",
+        "" if exact is None else f"{exact:.9g}",
+        "" if not exact else f"{value / exact - 1:.1e}",
+        f"{row['residual']:.0e}",
+        row["graph"],
+        f"{row['seconds']:.0f}",
+        "agreed" if AGREED in row["said"] and len(row["said"]) < 400 else row["said"],
+    )
+
+
+def print_row(cells: tuple[str, ...]) -> None:
+    for number, cell in enumerate(cells):
+        print(f"   {'*' if number == 0 else ' '} - {' '.join(cell.split())}", flush=True)
+
+
+def main(words: list[str], limit: float, full: bool, out: str | None) -> None:
+    print(".. list-table::\n   :header-rows: 1\n")
+    print_row(HEADER)
+    for scene in scenes():
+        if all(word in scene.name for word in words):
+            rows = limited(scene.name, full, limit)
+            if out is not None:
+                with Path(out).open("a") as record:
+                    record.write(json.dumps({"scene": scene.name, "rows": rows}) + "\n")
+            for row in rows:
+                print_row(cells_of(scene.name, row))
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("words", nargs="*")
+    options.add_argument("--limit", type=float, default=300.0)
+    options.add_argument("--full", action="store_true", help="default settings throughout")
+    options.add_argument("--list", action="store_true")
+    options.add_argument("--out", help="file to which each scene's rows are added as JSON")
+    options.add_argument("--scene", help=argparse.SUPPRESS)
+    given = options.parse_args()
+    if given.list:
+        print("\n".join(scene.name for scene in scenes()))
+    elif given.scene:
+        (chosen,) = (scene for scene in scenes() if scene.name == given.scene)
+        print(json.dumps(rows_of(chosen, given.full)))
+    else:
+        main(given.words, given.limit, given.full, given.out)

@@ -1,0 +1,95 @@
+"""Least action at the extremes: exact energies where they are certified, bounds that hold them, and words where not."""
+
+import pytest
+
+import vibrokit as vk
+from tests.extremes.scenes_of_action import damped_wells, first_contact, pressed_wells, tilted_wells
+
+EXACT = 1e-6  # relative, of certified energies
+CERTIFIED = 1e-9  # residual
+PLOT = vk.ActionPlot(points=2000)
+
+
+def by_name(scenes, *names):
+    known = {scene.name: scene for scene in scenes}
+    return [pytest.param(known[name], id=name) for name in names]
+
+
+def structure_of(scene):
+    return vk.find_structure(scene.oscillator, region=scene.region, cells=(40, 40), starts=(8, 8), manifolds=False)
+
+
+def exact_energies(scene, structure):
+    """By label; the scene has them by growing x."""
+    assert len(structure.attractors) == len(scene.exact)
+    by_place = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
+    return {attractor.label: exact for attractor, exact in zip(by_place, scene.exact, strict=True)}
+
+
+MILD = [
+    *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 0.1, 1.0, 2.0))),
+    *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
+    *by_name(pressed_wells("linear"), "pressed well, linear, k=1, zeta=0.05"),
+    *by_name(tilted_wells(), *(f"tilted well, {d:g} from its fold" for d in (1e-2, 1e-3))),
+]
+STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05")
+
+
+def energies_of(scene):
+    """Energies, each with its exact value, and the status."""
+    structure = structure_of(scene)
+    exact = exact_energies(scene, structure)
+    result = vk.LeastAction(plot=PLOT, graph=vk.ActionGraph(cells=(64, 64))).run(scene.oscillator, structure)
+    assert {energy.source for energy in result.energies} == set(exact)
+    return [(energy, exact[energy.source]) for energy in result.energies], result.status
+
+
+def check_certified(energy, exact):
+    assert energy.residual <= CERTIFIED
+    assert energy.value == pytest.approx(exact, rel=EXACT)
+    check_bounds(energy, exact)
+
+
+def check_bounds(energy, exact):
+    assert energy.lower * (1 - EXACT) <= exact <= energy.upper * (1 + EXACT)
+
+
+@pytest.mark.parametrize("scene", MILD)
+def test_wells_cost_four_zeta_times_their_barriers(scene):
+    for energy, exact in energies_of(scene)[0]:
+        assert energy.certificate is not None
+        check_certified(energy, exact)
+
+
+@pytest.mark.parametrize("scene", STIFF)
+def test_wells_at_a_stiff_stop_are_certified_or_said_not_to_be(scene):
+    energies, status = energies_of(scene)
+    for energy, exact in energies:
+        if energy.certificate is None:
+            assert f"From {energy.source} to {energy.target}: no path was polished" in status
+            check_bounds(energy, exact)
+        else:
+            check_certified(energy, exact)
+
+
+@pytest.mark.parametrize(
+    "scene", by_name(first_contact("hertz"), *(f"first contact, hertz, gap {d:g}" for d in (1e-2, 1e-4, 1e-6)))
+)
+def test_the_first_contact_of_an_orbit_near_grazing(scene):
+    structure = vk.find_structure(
+        scene.oscillator, region=scene.region, cells=(16, 16), starts=(4, 4), saddles=False, manifolds=False
+    )
+    clear = next(attractor for attractor in structure.attractors if not attractor.impacts)
+    exits = vk.FirstContact("right")
+    result = vk.LeastAction(plot=PLOT, graph=None, source=clear.label, exit=exits).run(scene.oscillator, structure)
+    (energy,) = result.energies
+    check_certified(energy, scene.contact)
+
+
+@pytest.mark.xfail(reason="The graph's error estimate is too small at strong damping: 2.014 ± 0.011 for an exact 2.")
+def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
+    (scene,) = (scene for scene in damped_wells() if scene.name == "double well, zeta=2")
+    structure = structure_of(scene)
+    exact = exact_energies(scene, structure)
+    for energy in vk.ActionGraph(cells=(120, 120)).run(scene.oscillator, structure).energies:
+        assert energy.lower <= exact[energy.source] <= energy.upper

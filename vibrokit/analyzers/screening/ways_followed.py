@@ -1,0 +1,93 @@
+"""Ways followed: the paths by which a graph reaches a way out, made smooth and priced by Hamilton's equations."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.candidate import Candidate
+from vibrokit.analyzers.polishing.carrier import Carrier
+from vibrokit.analyzers.polishing.chain import smooth_chain
+from vibrokit.analyzers.polishing.relaxing import relaxed_between
+from vibrokit.analyzers.screening.paths import follow_back
+from vibrokit.analyzers.screening.potential import Potential
+from vibrokit.analyzers.screening.ways_out import Tip, Way
+from vibrokit.errors import StructureError
+from vibrokit.kernels.choice import single_stepper
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.symbolic.flow_kind import Flow
+
+FINDER = "graph"
+_SHORTEST = 3
+_ALIKE = 1e-3  # relative difference of prices of paths that are taken for one
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WayFollowed:
+    """A path to a way out, brought down to a local minimum of the action.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        Its action is what Hamilton's equations price it at, so that, but for the quadratic form that it starts in, it
+        bounds the least action from above.
+    quadratic : float
+        Its price as the graph has it, its steps linearised.
+    """
+
+    candidate: Candidate
+    quadratic: float
+
+    @property
+    def linearising(self) -> float:
+        """By how much, relative, linearising over a step changed the price."""
+        return abs(self.quadratic - self.candidate.action) / self.candidate.action
+
+
+def follow(osc: Oscillator, stepper: Stepper, potential: Potential, way: Way, source: int) -> list[WayFollowed]:
+    """Return the different paths that a potential has to a way out, the cheapest first."""
+    found: list[WayFollowed] = []
+    if np.isfinite(way.cost(potential)):
+        for tip in way.tips(potential):
+            one = _one(osc, stepper, potential, way, tip, source)
+            found += [] if one is None else [one]
+    return different(found)
+
+
+def different(found: Iterable[WayFollowed]) -> list[WayFollowed]:
+    """Return each path once, the cheapest first."""
+    kept: list[WayFollowed] = []
+    for one in sorted(found, key=lambda each: each.candidate.action):
+        action = one.candidate.action
+        if not any(abs(action - other.candidate.action) <= _ALIKE * action for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _one(
+    osc: Oscillator, stepper: Stepper, potential: Potential, way: Way, tip: Tip, source: int
+) -> WayFollowed | None:
+    path = follow_back(osc, stepper, potential, tip.state, tip.phase)
+    if path is None or len(path.states) < _SHORTEST:
+        return None
+    pieces = round(osc.section_interval / potential.grids.step)
+    carrier = Carrier(osc, single_stepper(osc, Flow.HAMILTONIAN_VARIATIONAL), pieces)
+    try:
+        chain = smooth_chain(carrier, 0, path.states)
+    except StructureError:
+        return None
+    states, action = relaxed_between(carrier, 0, chain.points)
+    if not np.isfinite(action):
+        return None
+    head = float(path.level[0])
+    if len(tip.beyond):
+        head += max(0.0, way.cost(potential) - float(potential.at(tip.phase, tip.state[None])[0]))
+    states = np.concatenate([states, tip.beyond])
+    times: Array = potential.grids.step * np.arange(len(states), dtype=float)
+    return WayFollowed(Candidate(source, way.target, times, states, head + action, FINDER), head + chain.action)
