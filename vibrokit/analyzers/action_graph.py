@@ -132,7 +132,7 @@ class ActionGraph(Analyzer):
                 "take ActionPlot."
             )
         attractor = structure.attractor(label)
-        stepper = stepper_for(osc, attractor, Flow.GRAMIAN, self.stepper)
+        stepper = stepper_for(self.exit.scene(osc), attractor, Flow.GRAMIAN, self.stepper)
         return screen(
             osc, structure, attractor, self.exit, stepper, self.cells, self._fractions(osc), progress
         )  # fmt: skip

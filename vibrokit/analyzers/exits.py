@@ -57,6 +57,10 @@ class Exit(ABC):
         """Return what a path of least action from the attractor `home` may end on, and what is left out, in words."""
 
     @abstractmethod
+    def scene(self, osc: Oscillator) -> Oscillator:
+        """Return the scene as far as paths know it before they leave."""
+
+    @abstractmethod
     def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
         """Return what a graph has to reach, from where its paths are followed back."""
 
@@ -110,6 +114,10 @@ class LeaveBasin(Exit):
             SaddleGoal(number, tuple(dict.fromkeys(label for label in saddle.leads_to if label != home)), saddle)
             for number, saddle in named
         ), words
+
+    def scene(self, osc: Oscillator) -> Oscillator:
+        """The scene as it is."""
+        return osc
 
     def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
         """The saddles on the basin's boundary, and basins that none leads to."""
@@ -166,9 +174,13 @@ class FirstContact(Exit):
         """The stops."""
         return tuple(TouchGoal(-1, (-1,), side, position) for side, position in self.walls(osc).items()), ()
 
+    def scene(self, osc: Oscillator) -> Oscillator:
+        """The scene without the stops that count, which nothing knows of before it touches."""
+        return dataclasses.replace(osc, barriers=tuple(b for b in osc.barriers if b.side not in self.walls(osc)))
+
     def ways(self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper) -> list[Way]:
         """The stops, at whatever time."""
-        return ways_to_touch(osc, attractor, self.walls(osc).values(), stepper)
+        return ways_to_touch(self.scene(osc), attractor, self.walls(osc).values(), stepper)
 
     def within(
         self, osc: Oscillator, structure: Structure, attractor: Attractor, stepper: Stepper, grids: Grids, phase: int

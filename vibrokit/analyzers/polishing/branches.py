@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 
@@ -162,6 +163,7 @@ def polish_all(
         said += [] if found else [_failed(candidate, failures)]
         if progress is not None:
             progress(done, len(candidates))
+    solved += _the_rest(work, candidates, solved)
     branches, unsure = _certified(label, solved)
     return Polished(branches, (*said, *unsure, *_valleys(branches)))
 
@@ -189,6 +191,17 @@ def _polish_one(work: _Goals, candidate: Candidate) -> tuple[list[_Solved], list
     except StructureError as error:
         failures.append(str(error))
     return found, failures or ["it comes to no goal."]
+
+
+def _the_rest(work: _Goals, candidates: Sequence[Candidate], solved: list[_Solved]) -> list[_Solved]:
+    """Paths to goals that no candidate came to, tried from the cheapest one."""
+    found: list[_Solved] = []
+    reached = [each[0] for each in solved]
+    for number, goal in enumerate(work.goals):
+        if candidates and goal not in reached:
+            with contextlib.suppress(StructureError):
+                found.append(work.solve(number, min(candidates, key=lambda each: each.action)))
+    return found
 
 
 def _failed(candidate: Candidate, failures: list[str]) -> str:

@@ -16,6 +16,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _SAMPLES = 60  # along each side of the region that is carried through the phases
 _MARGIN = 0.04  # of the width, on each side
 _ROOM = 0.1
+_WIDER, _EDGE = 0.3, 3  # of the width; nodes
 _ROOM_IN_CELLS = 3
 
 Array = NDArray[np.float64]
@@ -82,6 +83,16 @@ class Grids:
     def of(self, cells: tuple[int, int]) -> Grids:
         """Return grids that cover the same with another number of nodes."""
         return dataclasses.replace(self, cells=cells)
+
+    def widened(self, wanted: list[Mask]) -> Grids:
+        """Return grids that reach farther on each side that some of the nodes lie at; the same grids if none do."""
+        boxes = self.boxes.copy()
+        for phase, mask in enumerate(wanted):
+            more = _WIDER * np.diff(self.boxes[phase], axis=1)[:, 0]
+            for axis, edge in enumerate((mask, mask.T)):
+                boxes[phase, axis, 0] -= more[axis] * bool(edge[:_EDGE].any())
+                boxes[phase, axis, 1] += more[axis] * bool(edge[-_EDGE:].any())
+        return self if np.array_equal(boxes, self.boxes) else dataclasses.replace(self, boxes=boxes)
 
     def zoomed(self, wanted: list[Mask]) -> Grids:
         """Return grids that cover some of the nodes of each phase, with room round them."""

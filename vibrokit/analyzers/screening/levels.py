@@ -29,8 +29,9 @@ _RAISES = 6
 _STAGES = 4
 _STEP_TOLERANCE = 0.01  # of a cost: by how much linearising over a step may change it
 _ZOOMS = 4
+_WIDENINGS = 6
 _WORTHWHILE = 0.8  # of the area before: more does not pay another round
-_BY_PATH = 1.1  # of the difference from a path, which ends where it is held and so is not quite the cheapest
+_BY_PATH = 2.0  # times the difference from a path, which has an excess of its own: its end is held
 _BY_STEP = 0.5  # share of what doubling the step changes that counts as error: the price is of second order at least
 
 Array = NDArray[np.float64]
@@ -161,6 +162,13 @@ class _Work:
         limit = 2 * max(way.bound for way in self.ways)
         grids = covering(self.osc, self.stepper, self.structure.basins.region, fraction, cells)
         whole, dearest = self.solved(grids, limit)
+        for _ in range(_WIDENINGS):
+            low = [values < dearest for values in whole.values]
+            wider = grids.widened([mask & self.inside(grids, phase) for phase, mask in enumerate(low)])
+            if wider is grids:
+                break
+            grids = wider
+            whole, dearest = self.solved(grids, 2 * dearest)
         self.tell(1)
         coarse = whole
         for _ in range(_ZOOMS):

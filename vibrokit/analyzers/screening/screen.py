@@ -85,13 +85,14 @@ def screen(
     def inside(grids: Grids, phase: int) -> NDArray[np.bool_]:
         return exit.within(osc, structure, attractor, stepper, grids, phase)
 
-    found = levels(osc, structure, attractor, ways, inside, stepper, cells, fractions, progress)
+    scene = exit.scene(osc)
+    found = levels(scene, structure, attractor, ways, inside, stepper, cells, fractions, progress)
     barriers: dict[int, tuple[float, float]] = {}
     targets: dict[int, tuple[float, float]] = {}
     saddles: dict[int, int] = {}
     candidates, words = [], []
     for way in sorted(ways, key=lambda way: way.cost(found.fine)):
-        paths = found.paths(osc, stepper, way, attractor.label)
+        paths = found.paths(scene, stepper, way, attractor.label)
         cost = found.cost(way, paths[0].action if paths else float("nan"))
         if not np.isfinite(cost).all():
             continue
