@@ -25,7 +25,7 @@ def well(damping):
 
 
 @functools.cache
-def screened(damping, cells=(320, 320), fraction=8):
+def screened(damping, cells=(320, 320), fraction=None):
     return vk.ActionGraph(cells=cells, fraction=fraction).search(*well(damping), 0)
 
 
@@ -82,7 +82,7 @@ def test_the_error_told_shrinks_with_the_steps():
 def test_candidates_lead_from_the_attractor_over_the_exit_and_polish_to_the_barrier(damping):
     osc, structure = well(damping)
     found = screened(damping, (160, 160), 16)
-    (candidate,) = found.candidates
+    candidate, *_ = found.candidates
     assert (candidate.source, candidate.target, candidate.finder) == (0, 1, "graph")
     assert candidate.action == pytest.approx(4 * damping * BARRIER, rel=0.05)
     np.testing.assert_allclose(np.diff(candidate.times), osc.section_interval / 16, rtol=1e-9)
@@ -149,7 +149,7 @@ def test_first_touch_of_the_linear_scene(damping, natural):
 @pytest.mark.parametrize("damping", [0.05, 0.5])
 def test_a_candidate_of_a_touch_touches_and_polishes(damping):
     osc, structure, clear, found = touching(damping)
-    (candidate,) = found.candidates
+    candidate, *_ = found.candidates
     assert candidate.states[:, 0].max() >= STOP
     orbit = steady(damping, 1.0) * np.exp(1j * FREQUENCY * candidate.times[0])
     assert math.hypot(*(candidate.states[0] - [orbit.real, (1j * FREQUENCY * orbit).real])) < 0.1

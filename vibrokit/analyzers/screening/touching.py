@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable
 
 import numpy as np
+import scipy.optimize
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.screening.potential import Potential
@@ -18,6 +19,8 @@ from vibrokit.results.attractor import Attractor
 
 _LOOKS = 8  # between two phases
 _SPEEDS = 2  # for each node in v
+_ITERATIONS = 60  # in search of the cheapest among them
+_SHORTEST = 0.01  # of a step: what is shorter is no step
 
 Array = NDArray[np.float64]
 
@@ -53,21 +56,44 @@ class Touching(Way):
     def _best(self, potential: Potential) -> tuple[float, int, Array, Array]:
         """Least cost, phase of the step that it takes, place where that begins, and state at the touch."""
         grids = potential.grids
-        best: tuple[float, int, Array, Array] = (np.inf, 0, np.ones(2), np.ones(2))
+        best = (np.inf, 0, grids.step, 0.0)
         for phase in range(grids.phases):
             speeds = np.linspace(grids.boxes[phase, 1, 0], grids.boxes[phase, 1, 1], _SPEEDS * grids.cells[1])
-            states = np.column_stack([np.full(len(speeds), self.wall), speeds])
             for look in range(1, _LOOKS + 1):
                 step = grids.step * look / _LOOKS
-                into = steps_into(
-                    self.osc, self.stepper, states, grids.time(phase) + step, step, grids.boxes[phase]
-                )  # fmt: skip
-                centres, forms = in_cells(grids, phase, into)
-                costs, places = descend_all(potential.values[phase], centres[:, None].copy(), centres, forms, 1.0)
+                costs, _ = self._costs(potential, phase, step, speeds)
                 index = int(np.argmin(costs))
                 if costs[index] < best[0]:
-                    best = (float(costs[index]), phase, places[index], states[index])
-        return best
+                    best = (float(costs[index]), phase, step, float(speeds[index]))
+        cost, phase, step, speed = best
+        if np.isfinite(cost):
+            cost, step, speed = self._refined(potential, phase, step, speed)
+        _, places = self._costs(potential, phase, step, np.array([speed]))
+        return cost, phase, places[0], np.array([self.wall, speed])
+
+    def _refined(self, potential: Potential, phase: int, step: float, speed: float) -> tuple[float, float, float]:
+        """Return cost, time and speed of the cheapest touch near one."""
+        grids = potential.grids
+        apart = np.array([grids.step / _LOOKS, grids.spacing(phase)[1] / _SPEEDS])
+
+        def cost(shifts: Array) -> float:
+            when, fast = np.array([step, speed]) + shifts * apart
+            inside = _SHORTEST * grids.step <= when <= grids.step
+            return float(self._costs(potential, phase, when, np.array([fast]))[0][0]) if inside else np.inf
+
+        begin = np.array([(0.0, 0.0), (-0.5, 0.5), (0.5, 0.5)])
+        options = {"initial_simplex": begin, "maxiter": _ITERATIONS, "xatol": 1e-3, "fatol": 0.0}
+        found = scipy.optimize.minimize(cost, begin[0], method="Nelder-Mead", options=options)
+        step, speed = np.array([step, speed]) + found.x * apart
+        return float(found.fun), float(step), float(speed)
+
+    def _costs(self, potential: Potential, phase: int, step: float, speeds: Array) -> tuple[Array, Array]:
+        """What it costs to be at the stop some time after a phase, by speed, and from which places."""
+        grids = potential.grids
+        states = np.column_stack([np.full(len(speeds), self.wall), speeds])
+        into = steps_into(self.osc, self.stepper, states, grids.time(phase) + step, step, grids.boxes[phase])
+        centres, forms = in_cells(grids, phase, into)
+        return descend_all(potential.values[phase], centres[:, None].copy(), centres, forms, 1.0)
 
 
 def ways_to_touch(osc: Oscillator, attractor: Attractor, walls: Iterable[float], stepper: Stepper) -> list[Way]:
