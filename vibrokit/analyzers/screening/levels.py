@@ -63,7 +63,7 @@ class Levels:
 
     def paths(self, osc: Oscillator, stepper: Stepper, way: Way, source: int) -> list[Candidate]:
         """Return the different paths to a way out, the cheapest first."""
-        own = (self.fine, self.coarse) if np.isfinite(way.cost(self.fine)) else (self.whole,)
+        own = (self.fine, self.coarse, self.whole, self.long) if np.isfinite(way.cost(self.fine)) else (self.whole,)
         found = [one for potential in own for one in follow(osc, stepper, potential, way, source)]
         return [one.candidate for one in different(found)]
 

@@ -23,7 +23,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 FINDER = "graph"
 _SHORTEST = 3
-_ALIKE = 1e-3  # relative difference of prices of paths that are taken for one
+_ALIKE = 1e-4  # relative difference of prices of paths that are taken for one
 
 Array = NDArray[np.float64]
 
