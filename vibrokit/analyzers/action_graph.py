@@ -65,7 +65,7 @@ class ActionGraph(Analyzer):
         Most memory to take (GiB).
     """
 
-    cells: tuple[int, int] = (320, 320)
+    cells: tuple[int, int] = (360, 360)
     fraction: int | None = None
     source: int | None = None
     exit: Exit = dataclasses.field(default_factory=LeaveBasin)

@@ -22,7 +22,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
 
-_ROOM = 1.5  # V up to which paths are followed, over the dearest way out
+_ROOM = 1.2  # V up to which paths are followed, over the dearest way out
 _NEARLY = 0.8  # of that V: a way out that costs more may owe it to the limit
 _RAISED = 3.0
 _RAISES = 6
@@ -63,7 +63,7 @@ class Levels:
 
     def paths(self, osc: Oscillator, stepper: Stepper, way: Way, source: int) -> list[Candidate]:
         """Return the different paths to a way out, the cheapest first."""
-        own = (self.fine, self.coarse, self.whole, self.long) if np.isfinite(way.cost(self.fine)) else (self.whole,)
+        own = (self.fine, self.coarse) if np.isfinite(way.cost(self.fine)) else (self.whole,)
         found = [one for potential in own for one in follow(osc, stepper, potential, way, source)]
         return [one.candidate for one in different(found)]
 
