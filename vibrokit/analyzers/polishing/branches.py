@@ -36,6 +36,7 @@ _PIECES = (8, 16)  # in a section interval: the finer ones where the coarser one
 _EQUAL = 1e-6  # relative difference of the actions of one path, found twice
 _SAME = 0.05  # of its extent, at samples of the path
 _ROUNDS = 4  # how often a path is ended at an earlier touch
+_WORTH = 1.25  # times the least action known
 _FLAT, _ALIKE = 1e-3, 0.01
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands
 
@@ -156,13 +157,20 @@ def polish_all(
     point, period = _start(attractor, orbit)
     work = _Goals(osc, goals, point, period, stepper)
     solved: list[_Solved] = []
-    said = list(words)
+    said, left = list(words), 0
     for done, candidate in enumerate(sorted(candidates, key=lambda each: each.action), start=1):
+        if _too_dear(candidate, solved):
+            left += 1
+            continue
         found, failures = _polish_one(work, candidate)
         solved += [each for each in found if not any(_same(each, known) for known in solved)]
         said += [] if found else [_failed(candidate, failures)]
         if progress is not None:
             progress(done, len(candidates))
+    if left:
+        said.append(
+            f"{left} candidates for attractor {label} cost over {_WORTH:g} times the least and were not polished."
+        )
     solved += _the_rest(work, candidates, solved)
     branches, unsure = _certified(label, solved)
     return Polished(branches, (*said, *unsure, *_valleys(branches)))
@@ -202,6 +210,12 @@ def _the_rest(work: _Goals, candidates: Sequence[Candidate], solved: list[_Solve
             with contextlib.suppress(StructureError):
                 found.append(work.solve(number, min(candidates, key=lambda each: each.action)))
     return found
+
+
+def _too_dear(candidate: Candidate, solved: list[_Solved]) -> bool:
+    """Whether a path to the same target is known that costs far less."""
+    known = [found.action for goal, _, found, _ in solved if candidate.target in goal.targets]
+    return bool(known) and candidate.action > _WORTH * min(known)
 
 
 def _failed(candidate: Candidate, failures: list[str]) -> str:

@@ -23,7 +23,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
 
 _ROOM = 1.2  # V up to which paths are followed, over the dearest way out
-_NEARLY = 0.8  # of that V: a way out that costs more may owe it to the limit
+_NEARLY = 0.95  # of that V: a way out that costs more may owe it to the limit
 _RAISED = 3.0
 _RAISES = 6
 _STAGES = 4
