@@ -103,6 +103,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     small = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
     trade = measure_steppers(small, ladders=LADDERS[:1], **SETTINGS)
     monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc, progress: trade)
+    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source, progress: "energies")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
     assert str(trade) in capsys.readouterr().out

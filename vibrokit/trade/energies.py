@@ -40,7 +40,7 @@ PLOTS = (
 GRAPHS = (
     *(ActionGraph(cells=(80, 80), fraction=fraction) for fraction in (4, 8, 16)),
     *(ActionGraph(cells=(160, 160), fraction=fraction) for fraction in (4, 8, 16)),
-    *(ActionGraph(cells=(320, 320), fraction=fraction) for fraction in (4, 16)),
+    *(ActionGraph(cells=(360, 360), fraction=fraction) for fraction in (4, 16)),
     ActionGraph(),
 )
 STEPS = (256, 1024)

@@ -129,7 +129,9 @@ def straight(osc: Oscillator, stepper: Stepper, attractor: Attractor, states: Ar
     """Return the quadratic price of going from the attractor to the cheapest of some states in one section interval."""
     images, _, gramians = forward(osc, stepper, attractor.points[:1, :2], 0.0, osc.section_interval)
     miss = states - images[0]
-    return float(np.min(0.5 * np.einsum("ni,ij,nj->n", miss, np.linalg.inv(gramians[0]), miss)))
+    found = float(np.min(0.5 * np.einsum("ni,ij,nj->n", miss, np.linalg.pinv(gramians[0]), miss)))
+    free = float(osc.natural_frequency**3 * np.min(np.sum((miss * [1.0, 1 / osc.natural_frequency]) ** 2, axis=1)))
+    return found if np.isfinite(found) and found > 0 else free  # pressed against a stiff stop noise moves nothing
 
 
 def home(
