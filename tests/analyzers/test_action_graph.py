@@ -70,9 +70,11 @@ def test_the_error_told_is_true_as_steps_refine(damping, fraction):
     assert abs(value - 4 * damping * BARRIER) <= error
 
 
-def test_the_error_told_shrinks_with_the_steps():
-    errors = [screened(0.3, (160, 160), fraction).targets[1][1] for fraction in (8, 16, 32)]
-    assert errors[2] < 0.25 * errors[1] < 0.25 * errors[0]
+def test_the_error_told_shrinks_with_cells_and_steps():
+    errors = [
+        screened(0.3, (40 * fraction // 4, 40 * fraction // 4), fraction).targets[1][1] for fraction in (8, 16, 32)
+    ]
+    assert errors[2] < 0.5 * errors[1] < 0.25 * errors[0]
 
 
 # --- paths
