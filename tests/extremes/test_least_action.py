@@ -86,7 +86,6 @@ def test_the_first_contact_of_an_orbit_near_grazing(scene):
     check_certified(energy, scene.contact)
 
 
-@pytest.mark.xfail(reason="The graph's error estimate is too small at strong damping: 2.014 ± 0.011 for an exact 2.")
 def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
     (scene,) = (scene for scene in damped_wells() if scene.name == "double well, zeta=2")
     structure = structure_of(scene)
