@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import vibrokit as vk
 from vibrokit.analyzers.action_plot import ActionPlot
-from vibrokit.cli import main
+from vibrokit.analyzers.settings import configured, setting
+from vibrokit.cli import main, parsed
 
 PLOT = ["--analyzer", "action-plot"]
 QUICK = ["--cells", "50", "--set", "points=200", *PLOT]
@@ -113,12 +115,33 @@ def test_list(capsys):
         assert name in out
 
 
+def test_settings_reach_the_parts_of_an_analyzer():
+    given = dict(setting(text) for text in ("graph.cells=48,64", "plot=none", "orbits=2", "source=1"))
+    made = configured(vk.LeastAction, given)
+    assert made == vk.LeastAction(graph=vk.ActionGraph(cells=(48, 64)), plot=None, orbits=2, source=1)
+
+
+@pytest.mark.parametrize("place", [1, 3])
+def test_the_scene_may_come_after_the_analyzers(place):
+    words = ["run", "--analyzer", "action-plot"]
+    words.insert(place, "double-well")
+    options = parsed(words)
+    assert (options.scene, options.analyzer) == ("double-well", ["action-plot"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["run", "herz-0.570"], "hertz-0.570"),
         (["run", "double-well", *PLOT, "--set", "ponts=3"], "points"),
         (["run", "double-well", *PLOT, "--set", "points"], "FIELD=NUMBER"),
+        (["run", "double-well", *PLOT, "--set", "points=many"], "FIELD=NUMBER"),
+        (["run", "double-well", "--set", "points=300"], "write plot.points"),
+        (["run", "double-well", "--set", "exits=3"], "the nearest is 'exit'"),
+        (["run", "double-well", "--set", "graph.cell=3"], "the nearest is 'cells'"),
+        (["run", "double-well", "--set", "grph.cells=3,3"], "the nearest is 'graph'"),
+        (["run", "double-well", "--set", "orbits.cells=3"], "no part 'orbits'"),
+        (["run", "double-well", "--set", "graph.cells=3"], "two whole numbers"),
         (["run", "double-well", *PLOT, "--cells", "1"], "--cells"),
         (["run", "double-well", *PLOT, "--stepper", "rk5:3"], "rk4"),
         (["run", "double-well", *PLOT, "--stepper", "rk4:few"], "rk4:few"),

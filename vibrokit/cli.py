@@ -25,7 +25,7 @@ _PATIENCE = 2.0  # seconds after which progress is shown
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status: 0, 1 where a check failed, 2 where the input is wrong."""
-    options = _parser().parse_args(arguments)
+    options = parsed(arguments)
     try:
         status = int(options.command(options) or 0)
         sys.stdout.flush()
@@ -41,6 +41,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
+def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Read the arguments of the command line."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if "analyzer" in options and options.scene is None:  # the last of the analyzers' names is the scene's
+        if len(options.analyzer) < 2:
+            parser.error("the following arguments are required: scene")
+        options.scene = options.analyzer.pop()
+    return options
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="vibrokit",
@@ -48,10 +59,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"vibrokit {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    which = "a bundled scene, such as hertz-0.570, or a TOML file"
     scene = argparse.ArgumentParser(add_help=False)
-    scene.add_argument("scene", help="a bundled scene, such as hertz-0.570, or a TOML file")
+    scene.add_argument("scene", help=which)
 
-    run = commands.add_parser("run", parents=[scene], help="find steady states and their activation energies")
+    run = commands.add_parser("run", help="find steady states and their activation energies")
+    run.add_argument("scene", nargs="?", help=which)
     run.add_argument(
         "--analyzer",
         nargs="*",
@@ -62,7 +75,13 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--exit", metavar="EXIT", help="leave-basin (default) or first-contact[:SIDE], what counts as leaving"
     )
-    run.add_argument("--set", action="append", default=[], metavar="FIELD=NUMBER", help="a setting of the analyzer")
+    run.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="FIELD=NUMBER",
+        help="a setting of the analyzer, or of a part of it, such as graph.cells=240,240",
+    )
     run.add_argument("--stepper", metavar="NAME[:NUMBER]", help="rk4:STEPS, order8:TOLERANCE or free-flight:TOLERANCE")
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
     run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
@@ -99,6 +118,7 @@ def _run(options: argparse.Namespace) -> None:
     from vibrokit import report
     from vibrokit.analyzers.analyzer import Analyzer
     from vibrokit.analyzers.named import named_exit
+    from vibrokit.analyzers.settings import configured, setting
     from vibrokit.kernels.named import named_stepper
     from vibrokit.registry import Group, load
     from vibrokit.results.pictures import checked_picture
@@ -113,13 +133,13 @@ def _run(options: argparse.Namespace) -> None:
         checked_picture(options.figure)
     osc = load_scene(options.scene)
     kinds = [load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer]
-    settings = _settings(options.set)
+    settings = dict(setting(text) for text in options.set)
     stepper = None if options.stepper is None else named_stepper(options.stepper)
     if stepper is not None:
         settings["stepper"] = stepper
     if options.exit is not None:
         settings["exit"] = named_exit(options.exit)
-    analyzers = [kind(**_known(kind, settings)) for kind in kinds]
+    analyzers = [configured(kind, settings) for kind in kinds]
     cells = (_cells(options.cells),) * 2
     with _Bar("basins") as bar:
         structure = find_structure(osc, cells=cells, stepper=stepper, rng=options.seed, progress=bar)
@@ -157,32 +177,6 @@ def _keep(options: argparse.Namespace, structure: Structure, results: dict[str, 
         _save_figure(found, figure)
         print(f"figure: {figure}")
     print(f"{seconds:.1f} s")
-
-
-def _settings(words: list[str]) -> dict[str, Any]:
-    settings: dict[str, Any] = {}
-    for word in words:
-        field, equals, text = word.partition("=")
-        try:
-            number = float(text)
-            settings[field] = int(text) if text.lstrip("+-").isdigit() else number
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise VibrokitError(f"--set {word}: write FIELD=NUMBER, such as points=40000.")
-    return settings
-
-
-def _known(kind: type, settings: dict[str, Any]) -> dict[str, Any]:
-    import dataclasses
-
-    from vibrokit.errors import UnknownNameError, nearest
-
-    fields = [field.name for field in dataclasses.fields(kind)]
-    for name in settings:
-        if name not in fields:
-            raise UnknownNameError(f"{kind.__name__} has no setting {name!r}{nearest(name, fields)}")
-    return settings
 
 
 def _cells(count: int) -> int:

@@ -45,7 +45,7 @@ def _multiplier(value: complex) -> str:
 
 def analysis(name: str, result: Result) -> str:
     """Return all that an analyzer found: energies, branches that compete, and what follows in the long run."""
-    tables = [f"{name}: {result.status}", ""]
+    tables = [f"{name}:", result.status, ""]
     if result.energies:
         tables += [energy_table(result.energies), ""]
     if isinstance(result, LeastActionResult):
@@ -60,10 +60,9 @@ def energy_table(energies: Iterable[ActivationEnergy]) -> str:
     """Return activation energies, a line each; the residual is the size of the momentum at the exit."""
     rows = [("from → to", "saddle", "ΔU", "lower", "upper", "residual", "method")]
     for e in energies:
-        exit_to = str(e.target) if e.target >= 0 else "–"
         saddle = str(e.saddle) if e.saddle >= 0 else "–"
         numbers = f"{e.value:.10g}", f"{e.lower:.6g}", f"{e.upper:.6g}", f"{e.residual:.2g}"
-        rows.append((f"{e.source} → {exit_to}", saddle, *numbers, e.method))
+        rows.append((e.exit, saddle, *numbers, e.method))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(f"{text:<{width}}" for text, width in zip(row, widths, strict=True)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)

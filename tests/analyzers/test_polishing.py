@@ -23,8 +23,8 @@ def scene():
     return well(DAMPING)
 
 
-def guess(path, action=9.0):
-    """A candidate along states (count, 2)."""
+def guess(path, action=0.33):
+    """A candidate along states (count, 2), said to cost a tenth more than the path does at the usual damping."""
     states = np.asarray(path, dtype=float)
     return Candidate(0, 1, PIECE * np.arange(len(states)), states, action, "guess")
 
@@ -71,6 +71,17 @@ def test_two_guesses_of_one_path_are_one_branch(scene):
     both = polish_all(*scene, 0, (guess(straight()), guess(spiral())), vk.LeaveBasin())
     assert len(both.branches) == 1
     assert both.words == ()
+
+
+def test_a_guess_far_dearer_than_a_known_path_is_left_out_and_counted(scene):
+    seen = []
+    candidates = (guess(spiral(), 1.0), guess(straight()))
+    polished = polish_all(*scene, 0, candidates, vk.LeaveBasin(), None, lambda *part: seen.append(part))
+    assert only(polished).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
+    assert polished.words == (
+        "Attractor 0: 1 of 2 candidates cost over 1.25 times the least path known and were not polished.",
+    )
+    assert seen == [(1, 2), (2, 2)]
 
 
 NOWHERE = {

@@ -1,5 +1,6 @@
 """Least action at the extremes: exact energies where they are certified, bounds that hold them, and words where not."""
 
+import numpy as np
 import pytest
 
 import vibrokit as vk
@@ -26,6 +27,11 @@ def exact_energies(scene, structure):
     return {attractor.label: exact for attractor, exact in zip(by_place, scene.exact, strict=True)}
 
 
+def is_inside(attractor, structure):
+    bounds = structure.basins.region.bounds
+    return np.all((attractor.points[:, :2] >= bounds[:, 0]) & (attractor.points[:, :2] <= bounds[:, 1]))
+
+
 MILD = [
     *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 0.1, 1.0, 2.0))),
     *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
@@ -40,7 +46,12 @@ def energies_of(scene):
     structure = structure_of(scene)
     exact = exact_energies(scene, structure)
     result = vk.LeastAction(plot=PLOT, graph=vk.ActionGraph(cells=(64, 64))).run(scene.oscillator, structure)
-    assert {energy.source for energy in result.energies} == set(exact)
+    assert {energy.source for energy in result.energies} == {
+        attractor.label for attractor in structure.attractors if is_inside(attractor, structure)
+    }
+    for label in set(exact) - {energy.source for energy in result.energies}:
+        assert f"attractor {label} lies outside the region of the structure" in result.status
+        assert f"Attractor {label}: no way out was found." in result.status
     return [(energy, exact[energy.source]) for energy in result.energies], result.status
 
 

@@ -1,10 +1,10 @@
 """Every snippet of the README and the manual does what it says."""
 
-import dataclasses
 import re
 import runpy
 import shlex
 import tomllib
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit import cli
+from vibrokit.analyzers.settings import configured, setting
 from vibrokit.registry import Group, load
 
 REPOSITORY = Path(__file__).parents[2]
@@ -97,18 +98,18 @@ def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
         assert cli.main(words) == 0
         assert capsys.readouterr().out
     else:
-        assert callable(cli._parser().parse_args(words).command)
+        assert callable(cli.parsed(words).command)
 
 
 def test_settings_in_the_manual_are_settings():
     lines = [line for page in PAGES for line in commands(page) if "--set" in line]
     assert lines
     for line in lines:
-        options = cli._parser().parse_args(line[1:])
-        given = {setting.partition("=")[0] for setting in options.set}
+        options = cli.parsed(line[1:])
+        given = dict(setting(text) for text in options.set)
         for name in options.analyzer:
-            kind = load(Group.ANALYZERS, name, vk.Analyzer)
-            assert given <= {field.name for field in dataclasses.fields(kind)}
+            made = configured(load(Group.ANALYZERS, name, vk.Analyzer), given)
+            assert all(value == attrgetter(key)(made) for key, value in given.items())
 
 
 @pytest.mark.parametrize("page", pages_with("toml"))

@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 
 from vibrokit.analyzers.agreement import energies_of
-from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings, stepper_for
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, each_searched, plain_settings, stepper_for
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.screening.screen import Screen, screen
 from vibrokit.errors import SceneError, StructureError, shown
@@ -18,6 +18,7 @@ from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.action_graph import ActionGraphResult
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.quasi_potential import QuasiPotential
 from vibrokit.results.section import Section
@@ -102,15 +103,14 @@ class ActionGraph(Analyzer):
         """
         sources = checked_sources(osc, structure, self.exit, self.source, self.stepper, progress)
         began = time.perf_counter()
-        section = Section.of(structure)
-        data, words = section.data, []
+        data = Section.of(structure).data
         energies: list[ActivationEnergy] = []
-        for number, attractor in enumerate(sources):
-            try:
-                found = self.search(osc, structure, attractor.label, part_of(progress, number, len(sources)))
-            except StructureError as error:
-                words.append(f"Attractor {attractor.label} was left out: {error}")
-                continue
+        words: list[str] = []
+
+        def search_one(attractor: Attractor, part: Progress | None) -> Screen:
+            return self.search(osc, structure, attractor.label, part)
+
+        for attractor, found in each_searched(sources, search_one, words, progress):
             energies += energies_of(found).values()
             data = data.merge(arrays_of(found))
             words += [f"Attractor {attractor.label}, by {found.stepper!r}: {_ways(found)}.", *found.words]
@@ -119,7 +119,7 @@ class ActionGraph(Analyzer):
             data=data,
             scene=scene_data(osc),
             settings=plain_settings(self),
-            status=" ".join(words),
+            status="\n".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
         )
@@ -160,6 +160,7 @@ def _ways(found: Screen) -> str:
 
 
 def arrays_of(found: Screen) -> xarray.Dataset:
+    """Return the potential on the section, the barriers and the cheapest path, by flat names."""
     label, potential = found.source, found.potential
     values = np.where(potential.values[0] < potential.unreached, potential.values[0], np.nan)
     data = QuasiPotential(label, values, potential.grids.boxes[0]).data

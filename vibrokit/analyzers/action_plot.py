@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings, stepper_for
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, each_searched, plain_settings, stepper_for
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.quasi_potential import local_potential, potential_along
 from vibrokit.analyzers.shooting.branches import Branch, sampled
@@ -118,13 +118,12 @@ class ActionPlot(Analyzer):
         began = time.perf_counter()
         data = Section.of(structure).data
         energies: list[ActivationEnergy] = []
-        words = []
-        for number, attractor in enumerate(sources):
-            try:
-                found = self.search(osc, structure, attractor.label, part_of(progress, number, len(sources)))
-            except StructureError as error:
-                words.append(f"Attractor {attractor.label} was left out: {error}")
-                continue
+        words: list[str] = []
+
+        def search_one(attractor: Attractor, part: Progress | None) -> Search:
+            return self.search(osc, structure, attractor.label, part)
+
+        for attractor, found in each_searched(sources, search_one, words, progress):
             data = data.assign(_start_data(attractor.label, found))
             words.append(f"Attractor {attractor.label}, by {found.shooter.stepper!r}: {found.summary()}")
             energies += [self._energy(attractor, found, branch) for branch in found.cheapest]
@@ -133,7 +132,7 @@ class ActionPlot(Analyzer):
             data=data,
             scene=scene_data(osc),
             settings=plain_settings(self),
-            status=" ".join(words),
+            status="\n".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
         )
@@ -160,7 +159,7 @@ class ActionPlot(Analyzer):
             The attractor is no periodic orbit or equilibrium, is not hyperbolic, or counts as out by itself.
         """
         attractor = structure.attractor(label)
-        if attractor.kind not in ("periodic", "equilibrium"):
+        if not attractor.is_fixed:
             raise StructureError(
                 f"it is {attractor.kind}; an action plot starts round a point of an orbit or an equilibrium."
             )

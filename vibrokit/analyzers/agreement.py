@@ -60,7 +60,7 @@ def agreed(
                 f"{_from(attractor, target)} no path was polished; the graph's {_priced(graph)} is all there is."
             )
         elif path is not None and graph is not None:
-            energies.append(_bracket(path, graph) if _is_set(attractor) else _bounded(path, graph))
+            energies.append(_bounded(path, graph) if attractor.is_fixed else _bracket(path, graph))
             words.append(f"{_from(attractor, target)} {_compared(attractor, path, graph)}")
         elif path is not None:
             energies.append(path)
@@ -83,7 +83,7 @@ def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnerg
 
 
 def _compared(attractor: Attractor, path: ActivationEnergy, graph: ActivationEnergy) -> str:
-    if _is_set(attractor):
+    if not attractor.is_fixed:
         return f"a path from an orbit inside costs {path.value:.6g}, and the graph has {_priced(graph)}: a bracket."
     if graph.upper < path.value:
         return (
@@ -95,10 +95,6 @@ def _compared(attractor: Attractor, path: ActivationEnergy, graph: ActivationEne
             f"the graph has {_priced(graph)}, more than the {path.value:.6g} of the path: its grid is too coarse here."
         )
     return f"the graph has {_priced(graph)}, and the path polished {path.value:.6g}: they agree."
-
-
-def _is_set(attractor: Attractor) -> bool:
-    return attractor.kind not in ("periodic", "equilibrium")
 
 
 def _from(attractor: Attractor, target: int) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
 
 from vibrokit.analyzers.exits import Exit
 from vibrokit.errors import SceneError, StructureError, shown
@@ -20,6 +21,8 @@ from vibrokit.structure.request import check_belongs, check_means
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 5
+
+Found = TypeVar("Found")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +85,7 @@ def stepper_for(osc: Oscillator, attractor: Attractor, flow: Flow, stepper: Step
     if stepper is not None:
         return stepper
     chosen = tried = ensemble_stepper(osc, flow)
-    if attractor.kind not in ("periodic", "equilibrium"):
+    if not attractor.is_fixed:
         return chosen
     for _ in range(_FINER):
         try:
@@ -100,6 +103,22 @@ def part_of(progress: Progress | None, number: int, count: int) -> Progress | No
         return None
     grain = 1000
     return lambda done, total: progress(number * grain + grain * done // max(1, total), count * grain)
+
+
+def each_searched(
+    sources: Sequence[Attractor],
+    search: Callable[[Attractor, Progress | None], Found],
+    words: list[str],
+    progress: Progress | None,
+) -> Iterator[tuple[Attractor, Found]]:
+    """Search from each attractor in turn; of those that cannot be searched from, the reason is added to the words."""
+    for number, attractor in enumerate(sources):
+        try:
+            found = search(attractor, part_of(progress, number, len(sources)))
+        except StructureError as error:
+            words.append(f"Attractor {attractor.label} was left out: {error}")
+        else:
+            yield attractor, found
 
 
 def plain_settings(analyzer: Any) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import xarray
 from vibrokit.analyzers.action_graph import ActionGraph, arrays_of
 from vibrokit.analyzers.action_plot import ActionPlot
 from vibrokit.analyzers.agreement import agreed, energies_of, least_of
-from vibrokit.analyzers.analyzer import Analyzer, checked_sources, part_of, plain_settings
+from vibrokit.analyzers.analyzer import Analyzer, checked_sources, each_searched, part_of, plain_settings
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.polishing.branches import polish_all
 from vibrokit.analyzers.screening.screen import Screen
@@ -33,7 +33,6 @@ from vibrokit.structure.orbits import Orbit
 from vibrokit.structure.request import whole
 from vibrokit.symbolic.flow_kind import Flow
 
-_ORBITS = ("periodic", "equilibrium")
 _STAGES = 3
 _MOST_ORBITS = 1000
 
@@ -103,17 +102,16 @@ class LeastAction(Analyzer):
         energies: list[ActivationEnergy] = []
         branches: list[ActivationEnergy] = []
         words: list[str] = []
-        for number, attractor in enumerate(sources):
-            try:
-                left = self._leave(osc, structure, attractor, part_of(progress, number, len(sources)))
-            except StructureError as error:
-                words.append(f"Attractor {attractor.label} was left out: {error}")
-                continue
+
+        def leave(attractor: Attractor, part: Progress | None) -> _Left:
+            return self._leave(osc, structure, attractor, part)
+
+        for attractor, left in each_searched(sources, leave, words, progress):
             agreement, said = agreed(attractor, least_of(left.branches), left.screened)
             energies += agreement
             branches += left.branches
             data = data if left.data is None else data.merge(left.data)
-            words += [*left.words, *_summary(attractor, left.branches), *said]
+            words += [*left.words, *_summary(attractor, left), *said]
         labels = [attractor.label for attractor in structure.attractors]
         all_left = self.source is None and all(energy.target >= 0 for energy in energies)
         return LeastActionResult(
@@ -121,7 +119,7 @@ class LeastAction(Analyzer):
             data=data,
             scene=scene_data(osc),
             settings=plain_settings(self),
-            status=" ".join(words),
+            status="\n".join(words),
             seconds=time.perf_counter() - began,
             versions=versions(),
             branches=tuple(branches),
@@ -130,14 +128,13 @@ class LeastAction(Analyzer):
 
     def _leave(self, osc: Oscillator, structure: Structure, attractor: Attractor, progress: Progress | None) -> _Left:
         label = attractor.label
-        orbit_like = attractor.kind in _ORBITS
-        if orbit_like and self.exit.beyond(osc, attractor.orbit).any():
+        if attractor.is_fixed and self.exit.beyond(osc, attractor.orbit).any():
             polished = polish_all(osc, structure, label, (), self.exit, self.stepper)
             return _Left(polished.branches, polished.words)
         words: list[str] = []
         screened = self._screened(osc, structure, label, words, part_of(progress, 0, _STAGES))
         candidates = [] if screened is None else list(screened.candidates)
-        if self.plot is not None and orbit_like:
+        if self.plot is not None and attractor.is_fixed:
             plot = dataclasses.replace(self.plot, exit=self.exit, source=None)
             try:
                 candidates += plot.search(osc, structure, label, part_of(progress, 1, _STAGES)).candidates
@@ -145,7 +142,7 @@ class LeastAction(Analyzer):
                 if screened is None:
                     raise
                 words.append(f"Attractor {label}, without an action plot: {error}")
-        orbits = (None,) if orbit_like else self._orbits_inside(osc, attractor, words)
+        orbits = (None,) if attractor.is_fixed else self._orbits_inside(osc, attractor, words)
         last = part_of(progress, 2, _STAGES)
         branches: list[ActivationEnergy] = []
         for number, orbit in enumerate(orbits):
@@ -204,10 +201,10 @@ def _one_of(name: str, value: Any, kind: type) -> None:
         raise StructureError(f"LeastAction: {name} is {shown(value)}; give {kind.__name__}(), or None to do without.")
 
 
-def _summary(attractor: Attractor, branches: tuple[ActivationEnergy, ...]) -> list[str]:
+def _summary(attractor: Attractor, left: _Left) -> list[str]:
     """How many ways out there are, and what the least costs."""
-    if not branches:
-        return []
-    best, count = branches[0], len(branches)
+    if not left.branches:
+        return [] if left.screened else [f"Attractor {attractor.label}: no way out was found."]
+    best, count = left.branches[0], len(left.branches)
     ways = f"{count} ways out were polished, the least of" if count > 1 else "one way out was polished, of"
     return [f"Attractor {attractor.label}: {ways} action {best.value:.6g}, residual {best.residual:.1e}."]

@@ -127,6 +127,7 @@ def sweep_rows(
     changed: Flags,
     first: int,
     last: int,
+    order: int,
     reach: int,
     ceilings: Array,
     tolerance: float,
@@ -154,6 +155,8 @@ def sweep_rows(
     first, last : int
         Rows to do: first ≤ i < last. Neighbours' places are taken from these only, so that the result does not depend
         on who does the others.
+    order : int
+        1 from the first row and column to the last, −1 the other way round; the places of neighbours done are tried.
     reach : int
         Nodes (cells to each side) among which a cheaper one is looked for; 0 to follow known places only.
     ceilings : array (n, m)
@@ -163,8 +166,10 @@ def sweep_rows(
     """
     n, m = before.shape
     looked = 0
-    for i in range(first, last):
-        for j in range(m):
+    for row in range(last - first):
+        i = first + row if order > 0 else last - 1 - row
+        for column in range(m):
+            j = column if order > 0 else m - 1 - column
             changed[i, j] = 0
             if still[i, j] or math.isnan(centres[i, j, 0]):
                 continue
@@ -184,8 +189,8 @@ def sweep_rows(
                 if here < found:
                     found, s, t = here, ns, nt
             for near in range(2):
-                ni, nj = (i, j - 1) if near == 0 else (i - 1, j)
-                if ni < first or nj < 0 or math.isnan(centres[ni, nj, 0]):
+                ni, nj = (i, j - order) if near == 0 else (i - order, j)
+                if not (first <= ni < last and 0 <= nj < m) or math.isnan(centres[ni, nj, 0]):
                     continue
                 ns, nt = places[ni, nj, 0], places[ni, nj, 1]
                 here = cost(before, ns, nt, centre, quadratic)

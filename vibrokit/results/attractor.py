@@ -88,3 +88,11 @@ class Attractor:
     def repeats(self) -> bool:
         """Whether it is an orbit or an equilibrium: points, multipliers and residual are those of one."""
         return self.kind in ("periodic", "equilibrium", "limit cycle")
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether its points are fixed by a power of the section map, and motion is linearised round each of them.
+
+        So are those of a periodic orbit and of an equilibrium; a limit cycle may be shifted in time.
+        """
+        return self.kind in ("periodic", "equilibrium")

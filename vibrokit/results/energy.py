@@ -42,7 +42,7 @@ class ActivationEnergy:
     Attributes
     ----------
     source, target : int
-        Labels of the attractor that is left and of the one that is reached.
+        Labels of the attractor that is left and of the one that is reached; −1 for a target that is none, as a touch.
     value : float
         ΔU, in units of action (m² s⁻³).
     lower, upper : float
@@ -67,3 +67,8 @@ class ActivationEnergy:
     path: ExitPath | None = dataclasses.field(default=None, repr=False)
     saddle: int = -1
     certificate: Certificate | None = None
+
+    @property
+    def exit(self) -> str:
+        """In words: from where to where."""
+        return f"{self.source} → {self.target if self.target >= 0 else 'exit'}"

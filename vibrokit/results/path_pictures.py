@@ -84,8 +84,7 @@ def _from_rest(path: ExitPath) -> bool:
 
 def _named(energy: ActivationEnergy) -> str:
     """A path as pictures name it."""
-    end = energy.target if energy.target >= 0 else "exit"
-    return f"path {energy.source} → {end}, $\\Delta U$ = {_in_tex(energy.value)} m$^2$ s$^{{-3}}$"
+    return f"path {energy.exit}, $\\Delta U$ = {_in_tex(energy.value)} m$^2$ s$^{{-3}}$"
 
 
 def _in_tex(value: float) -> str:

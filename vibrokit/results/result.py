@@ -31,7 +31,7 @@ class Result(ABC):
     settings : dict
         Configuration of the analyzer.
     status : str
-        What was found and what was not, as sentences.
+        What was found and what was not, as sentences, a line for each matter.
     seconds : float
         Time that it took.
     versions : dict
@@ -58,8 +58,8 @@ class Result(ABC):
     seed: int | None = None
 
     def __repr__(self) -> str:
-        energies = ", ".join(f"{e.source} → {e.target}: {e.value:.6g}" for e in self.energies)
-        return f"<{type(self).__name__}: ΔU {energies or 'none'}. {self.status}>"
+        energies = ", ".join(f"{e.exit}: {e.value:.6g}" for e in self.energies)
+        return f"<{type(self).__name__}: ΔU {energies or 'none'}. {' '.join(self.status.splitlines())}>"
 
     @abstractmethod
     def plot(self, ax: Any = None) -> Any:

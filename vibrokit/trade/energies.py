@@ -47,7 +47,6 @@ STEPS = (256, 1024)
 TOLERANCES = tuple(10.0**-k for k in range(4, 13, 2))
 _FINEST = 1e-13
 _CELLS = (100, 100)  # of the basins, as exits are confirmed by where they settle
-_ORBITS = ("periodic", "equilibrium")
 _SAME = 1e-3  # relative difference of the actions of one path by different steppers
 
 
@@ -162,7 +161,7 @@ def _reference(
 
 def _orbit_of(attractors: Sequence[Attractor]) -> Attractor:
     for attractor in attractors:
-        if attractor.kind in _ORBITS:
+        if attractor.is_fixed:
             return attractor
     kinds = ", ".join(f"{attractor.label} is {attractor.kind}" for attractor in attractors)
     raise StructureError(f"the stages are measured on exits from an orbit or an equilibrium, and {kinds}.")

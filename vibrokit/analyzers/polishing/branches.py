@@ -161,15 +161,16 @@ def polish_all(
     for done, candidate in enumerate(sorted(candidates, key=lambda each: each.action), start=1):
         if _too_dear(candidate, solved):
             left += 1
-            continue
-        found, failures = _polish_one(work, candidate)
-        solved += [each for each in found if not any(_same(each, known) for known in solved)]
-        said += [] if found else [_failed(candidate, failures)]
+        else:
+            found, failures = _polish_one(work, candidate)
+            solved += [each for each in found if not any(_same(each, known) for known in solved)]
+            said += [] if found else [_failed(candidate, failures)]
         if progress is not None:
             progress(done, len(candidates))
     if left:
         said.append(
-            f"{left} candidates for attractor {label} cost over {_WORTH:g} times the least and were not polished."
+            f"Attractor {label}: {left} of {len(candidates)} candidates cost over {_WORTH:g} times the least path "
+            "known and were not polished."
         )
     solved += _the_rest(work, candidates, solved)
     branches, unsure = _certified(label, solved)
@@ -179,7 +180,7 @@ def polish_all(
 def _start(attractor: Attractor, orbit: Orbit | None) -> tuple[np.ndarray, int]:
     if orbit is not None:
         return orbit.point, orbit.period
-    if attractor.kind not in ("periodic", "equilibrium"):
+    if not attractor.is_fixed:
         raise StructureError(
             f"attractor {attractor.label} is {attractor.kind}, and a path is polished from an orbit or an equilibrium; "
             "give an unstable orbit inside it."

@@ -112,7 +112,7 @@ def levels(
                 break
         fine, _ = work.solved(poor.coarse.grids.of(cells), poor.limit)
         work.tell(_STAGES)
-    return Levels(poor.whole, fine, poor.coarse, poor.long, attractor.kind not in ("periodic", "equilibrium"))
+    return Levels(poor.whole, fine, poor.coarse, poor.long, not attractor.is_fixed)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

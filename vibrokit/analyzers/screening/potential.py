@@ -104,22 +104,36 @@ class Iteration:
         self.values = [np.minimum(*both) for both in zip(known.values, self.most, strict=True)]
 
     def run(self) -> Potential:
-        """Sweep, period by period, until V no longer changes."""
-        steps = self.steps
-        phases = self.grids.phases
-        awake = [np.ones(self.grids.cells, dtype=np.uint8) for _ in range(phases)]
-        before = self._level()
+        """Sweep, period by period, until V no longer changes, even where every node is looked at once more."""
+        awake = self._all()
+        before, rested = self._level(), np.inf
         for period in range(_MOST_PERIODS):
-            look = period % _LOOK_EVERY == 0 and period < _LOOK_EVERY * _LOOKS
-            changes = sum(self._sweep(step % phases, awake, _REACH if look else 0) for step in range(steps))
+            changes = self._period(period, awake)
             if period % _LOOK_EVERY == _LOOK_EVERY - 1:
                 level = self._level()
                 if changes == 0 or abs(before - level) <= _SETTLED * level:
-                    break
+                    if abs(rested - level) <= _SETTLED * level:
+                        break
+                    rested, awake = level, self._all()
                 before = level
         return Potential(self.grids, self.values, self.places, self.tables, self.given, self.orbit, self.unreached)
 
-    def _sweep(self, phase: int, awake: list[Flags], reach: int) -> int:
+    def _all(self) -> list[Flags]:
+        return [np.ones(self.grids.cells, dtype=np.uint8) for _ in range(self.grids.phases)]
+
+    def _period(self, period: int, awake: list[Flags]) -> int:
+        """Sweep over all phases; return how many nodes changed.
+
+        Nodes learn from neighbours that are done before them in the same piece of work. So the order of nodes and the
+        rows where pieces begin change from period to period, lest what is known on one side of a row stays there.
+        """
+        turn = (period + period // _LOOK_EVERY) % 4
+        order, begin = (1, -1)[turn % 2], -(turn // 2) * _ROWS // 2
+        look = period % _LOOK_EVERY == 0 and period < _LOOK_EVERY * _LOOKS
+        reach = _REACH if look else 0
+        return sum(self._sweep(step % self.grids.phases, awake, order, begin, reach) for step in range(self.steps))
+
+    def _sweep(self, phase: int, awake: list[Flags], order: int, begin: int, reach: int) -> int:
         """Carry V one step of time on; return how many nodes changed."""
         after = (phase + 1) % self.grids.phases
         before = self.values[phase] if after != phase else self.values[phase].copy()
@@ -134,9 +148,10 @@ class Iteration:
             awake[phase],
             changed,
         )
+        rows = len(before)
         tasks = [
-            (*common, first, min(first + _ROWS, len(before)), reach, self.most[after], _TOLERANCE)
-            for first in range(0, len(before), _ROWS)
+            (*common, max(0, first), min(first + _ROWS, rows), order, reach, self.most[after], _TOLERANCE)
+            for first in range(begin, rows, _ROWS)
         ]
         for _ in carry(sweep_rows, tasks, self.executor):
             pass

@@ -20,8 +20,6 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
 
-_FINDER = "graph"
-
 Array = NDArray[np.float64]
 
 

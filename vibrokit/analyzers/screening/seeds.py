@@ -58,7 +58,7 @@ def seeds(osc: Oscillator, stepper: Stepper, attractor: Attractor, grids: Grids)
     StructureError
         The attractor is not hyperbolic.
     """
-    if attractor.kind in ("periodic", "equilibrium"):
+    if attractor.is_fixed:
         return _ellipses(osc, stepper, attractor, grids)
     points = attractor.points[:, :2] if attractor.kind != "limit cycle" else _filled(attractor.orbit, grids)
     known = []

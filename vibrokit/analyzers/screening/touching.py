@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import weakref
 from collections.abc import Iterable
 
 import numpy as np
@@ -10,7 +11,7 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.screening.potential import Potential
-from vibrokit.analyzers.screening.tables import in_cells, steps_into
+from vibrokit.analyzers.screening.tables import in_cells, steps_into, uphill
 from vibrokit.analyzers.screening.ways_out import Tip, Way
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.sweeps import descend_all
@@ -43,6 +44,9 @@ class Touching(Way):
     osc: Oscillator
     stepper: Stepper
     wall: float
+    _known: weakref.WeakKeyDictionary[Potential, tuple[float, int, Array, Array]] = dataclasses.field(
+        default_factory=weakref.WeakKeyDictionary, repr=False
+    )
 
     def cost(self, potential: Potential) -> float:
         """The least cost over all times and speeds."""
@@ -55,6 +59,11 @@ class Touching(Way):
 
     def _best(self, potential: Potential) -> tuple[float, int, Array, Array]:
         """Least cost, phase of the step that it takes, place where that begins, and state at the touch."""
+        if potential not in self._known:
+            self._known[potential] = self._searched(potential)
+        return self._known[potential]
+
+    def _searched(self, potential: Potential) -> tuple[float, int, Array, Array]:
         grids = potential.grids
         best = (np.inf, 0, grids.step, 0.0)
         for phase in range(grids.phases):
@@ -91,9 +100,10 @@ class Touching(Way):
         """What it costs to be at the stop some time after a phase, by speed, and from which places."""
         grids = potential.grids
         states = np.column_stack([np.full(len(speeds), self.wall), speeds])
-        into = steps_into(self.osc, self.stepper, states, grids.time(phase) + step, step, grids.boxes[phase])
-        centres, forms = in_cells(grids, phase, into)
-        return descend_all(potential.values[phase], centres[:, None].copy(), centres, forms, 1.0)
+        ended = (states, grids.time(phase) + step, step, grids.boxes[phase])
+        centres, forms = in_cells(grids, phase, steps_into(self.osc, self.stepper, *ended))
+        against = grids.places(phase, uphill(self.osc, self.stepper, *ended))
+        return descend_all(potential.values[phase], np.stack([centres, against], axis=1), centres, forms, 1.0)
 
 
 def ways_to_touch(osc: Oscillator, attractor: Attractor, walls: Iterable[float], stepper: Stepper) -> list[Way]:

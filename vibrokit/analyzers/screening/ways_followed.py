@@ -21,7 +21,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 
-FINDER = "graph"
+_FINDER = "graph"
 _SHORTEST = 3
 _ALIKE = 1e-4  # relative difference of prices of paths that are taken for one
 
@@ -90,4 +90,4 @@ def _one(
         head += max(0.0, way.cost(potential) - float(potential.at(tip.phase, tip.state[None])[0]))
     states = np.concatenate([states, tip.beyond])
     times: Array = potential.grids.step * np.arange(len(states), dtype=float)
-    return WayFollowed(Candidate(source, way.target, times, states, head + action, FINDER), head + chain.action)
+    return WayFollowed(Candidate(source, way.target, times, states, head + action, _FINDER), head + chain.action)
