@@ -7,6 +7,14 @@ from scipy.integrate import simpson, solve_ivp
 import vibrokit as vk
 from vibrokit.analyzers.candidate import Candidate
 from vibrokit.analyzers.polishing.branches import polish_all
+from vibrokit.analyzers.polishing.carrier import Carrier
+from vibrokit.analyzers.polishing.certify import certify
+from vibrokit.analyzers.polishing.course import course_of
+from vibrokit.analyzers.polishing.ends import linear_end
+from vibrokit.analyzers.polishing.heteroclinic import polished, solved_again
+from vibrokit.errors import StructureError
+from vibrokit.kernels.choice import single_stepper
+from vibrokit.symbolic.flow_kind import Flow
 
 DAMPING = 0.3
 PIECE = 2 * np.pi / 8  # of a candidate; ω_n = 1
@@ -45,8 +53,8 @@ def spiral(turns=3, growth=0.25):
     return states
 
 
-def only(polished):
-    (branch,) = polished.branches
+def only(found):
+    (branch,) = found.branches
     return branch
 
 
@@ -76,9 +84,9 @@ def test_two_guesses_of_one_path_are_one_branch(scene):
 def test_a_guess_far_dearer_than_a_known_path_is_left_out_and_counted(scene):
     seen = []
     candidates = (guess(spiral(), 1.0), guess(straight()))
-    polished = polish_all(*scene, 0, candidates, vk.LeaveBasin(), None, lambda *part: seen.append(part))
-    assert only(polished).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
-    assert polished.words == (
+    found = polish_all(*scene, 0, candidates, vk.LeaveBasin(), None, lambda *part: seen.append(part))
+    assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
+    assert found.words == (
         "Attractor 0: 1 of 2 candidates cost over 1.25 times the least path known and were not polished.",
     )
     assert seen == [(1, 2), (2, 2)]
@@ -95,25 +103,25 @@ NOWHERE = {
 @pytest.mark.parametrize("path", NOWHERE.values(), ids=NOWHERE)
 def test_a_guess_that_leads_nowhere_yields_words_or_the_truth(scene, path):
     """There is one way out only: a number can be that of the barrier, and none other."""
-    polished = polish_all(*scene, 0, (guess(path, 0.123),), vk.LeaveBasin())
-    if polished.branches:
-        assert only(polished).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
+    found = polish_all(*scene, 0, (guess(path, 0.123),), vk.LeaveBasin())
+    if found.branches:
+        assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
     else:
-        (words,) = polished.words
+        (words,) = found.words
         assert words.startswith("A candidate of the guess with action 0.123 led to no path: ")
         assert words.endswith(".")
 
 
 @pytest.mark.parametrize("path", [NOWHERE["one state"], NOWHERE["not finite"]], ids=["one state", "not finite"])
 def test_no_number_comes_of_no_path(scene, path):
-    polished = polish_all(*scene, 0, (guess(path),), vk.LeaveBasin())
-    assert polished.branches == ()
-    assert len(polished.words) == 1
+    found = polish_all(*scene, 0, (guess(path),), vk.LeaveBasin())
+    assert found.branches == ()
+    assert len(found.words) == 1
 
 
 def test_no_candidate_no_word(scene):
-    polished = polish_all(*scene, 0, (), vk.LeaveBasin())
-    assert (polished.branches, polished.words) == ((), ())
+    found = polish_all(*scene, 0, (), vk.LeaveBasin())
+    assert (found.branches, found.words) == ((), ())
 
 
 def test_progress_counts_candidates(scene):
@@ -175,3 +183,37 @@ def test_the_action_is_what_the_noise_pays(path):
     assert 0 <= path.action[0] < 1e-5 * path.action[-1]
     assert np.all(np.diff(path.action) >= 0)
     assert path.action[-1] == pytest.approx(4 * DAMPING * BARRIER, rel=1e-5)
+
+
+# --- paths that begin on the orbit itself, in a finite time
+
+
+@pytest.fixture(scope="module")
+def held(scene):
+    osc, structure = scene
+    (goal,), _ = vk.LeaveBasin().goals(osc, structure, 0)
+    carrier = Carrier(goal.scene(osc), single_stepper(osc, Flow.HAMILTONIAN_VARIATIONAL))
+    source = linear_end(carrier, structure.attractor(0).points[0], 1).on_orbit()
+    cuts = goal.destination(carrier).cuts(course_of(carrier, guess(straight()), 32))
+    return carrier, polished(carrier, source, cuts)
+
+
+def test_less_time_costs_more(held):
+    carrier, found = held
+    exact = 4 * DAMPING * BARRIER
+    assert found.points[0, :2] == pytest.approx([-1.0, 0.0], abs=1e-12)
+    costs = [solved_again(carrier, found, added, 0).action for added in (-16, -8, 0, 16, 32)]
+    assert np.all(np.diff(costs) < 0)
+    assert exact < costs[-1] < (1 + 1e-4) * exact
+
+
+def test_its_certificate_says_what_time_costs(held):
+    proof = certify(*held)
+    assert proof.by_start > 0 > proof.by_length
+    assert abs(proof.by_stepper) < 1e-9
+
+
+def test_none_is_made_shorter_than_it_is(held):
+    carrier, found = held
+    with pytest.raises(StructureError, match="cannot be made"):
+        solved_again(carrier, found, -len(found.points), 0)

@@ -167,6 +167,11 @@ def carry(
     progress: Progress | None = None,
 ) -> Iterator[Any]:
     """Yield ``work(*task)`` for each task, in order; on Ctrl-C nothing more is begun."""
+    if executor is None and len(tasks) == 1:  # starting a thread takes longer than most tasks that are alone
+        yield work(*tasks[0])
+        if progress is not None:
+            progress(1, 1)
+        return
     pool = executor or futures.ThreadPoolExecutor(max_workers=os.cpu_count())
     pending = [pool.submit(work, *task) for task in tasks]
     try:

@@ -278,8 +278,9 @@ def _valleys(branches: Sequence[ActivationEnergy]) -> list[str]:
         best = branches[0]
         alike = [branch.value for branch in branches[1:] if branch.value <= (1 + _ALIKE) * best.value]
         if alike:
+            ways = "1 more way out costs" if len(alike) == 1 else f"{len(alike)} more ways out cost"
             words.append(
-                f"Attractor {best.source}: {len(alike)} more ways out cost at most {100 * _ALIKE:g} % more than the "
+                f"Attractor {best.source}: {ways} at most {100 * _ALIKE:g} % more than the "
                 f"least, {best.value:.6g}: {', '.join(f'{value:.6g}' for value in alike)}."
             )
         angle = 1.0 if best.certificate is None else best.certificate.transversality

@@ -46,9 +46,9 @@ def certify(carrier: Carrier, found: Extremum) -> Certificate:
 
 
 def _later(found: Extremum) -> int:
-    """Nodes to drop for a start ten times as far from the orbit; for one on it, two periods."""
+    """Nodes to drop for a start ten times as far from the orbit; for one on it, two periods, or half of the path."""
     if found.source.held:
-        return MORE * len(found.source.states)
+        return min(MORE * len(found.source.states), len(found.points) // 2)
     starts = start_distances(found)
     away = np.flatnonzero(starts[:-1] >= _FARTHER * starts[0])
     return int(away[0]) if away.size else 0

@@ -23,6 +23,7 @@ _CLOSER, _UNCHANGED = 4, 1e-8  # tenths of that, until the action stays, relativ
 _HELD = (8, 16, 32, 64, 128)  # section intervals on the orbit, where a path is begun on it
 MORE = 2
 """Periods of its orbits by which a certified path may be made longer."""
+_FEWEST = 2  # nodes of a path
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
@@ -121,6 +122,8 @@ def _a_part(carrier: Carrier, found: Extremum, before: int, after: int) -> Extre
 def solved_again(carrier: Carrier, found: Extremum, before: int, after: int) -> Extremum:
     """Solve for the same path, made longer (or shorter, if negative) by so many nodes before and after."""
     points, first, ending = found.points, found.first, found.ending
+    if len(points) + min(before, 0) + min(after, 0) < _FEWEST:
+        raise StructureError(f"a path of {len(points)} nodes cannot be made {-min(before, 0) - min(after, 0)} shorter.")
     if before > 0:
         points = np.concatenate([found.source.before(points[0], first, before), points])
     elif before < 0:

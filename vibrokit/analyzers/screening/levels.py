@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.candidate import Candidate
 from vibrokit.analyzers.screening.grids import Grids, covering
 from vibrokit.analyzers.screening.potential import Iteration, Potential
-from vibrokit.analyzers.screening.ways_followed import different, follow
+from vibrokit.analyzers.screening.ways_followed import Follower, different
 from vibrokit.analyzers.screening.ways_out import Way
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Progress
@@ -53,6 +53,7 @@ class Levels:
         The same with steps twice as long as well.
     from_set : bool
         Whether the attractor is no orbit, but a set that is some cells thick on the grid.
+    follower : Follower
     """
 
     whole: Potential
@@ -60,11 +61,12 @@ class Levels:
     coarse: Potential
     long: Potential
     from_set: bool
+    follower: Follower
 
-    def paths(self, osc: Oscillator, stepper: Stepper, way: Way, source: int) -> list[Candidate]:
+    def paths(self, way: Way) -> list[Candidate]:
         """Return the different paths to a way out, the cheapest first."""
         own = (self.fine, self.coarse) if np.isfinite(way.cost(self.fine)) else (self.whole,)
-        found = [one for potential in own for one in follow(osc, stepper, potential, way, source)]
+        found = [one for potential in own for one in self.follower.follow(potential, way)]
         return [one.candidate for one in different(found)]
 
     def cost(self, way: Way, path: float) -> tuple[float, float]:
@@ -104,7 +106,8 @@ def levels(
     """
     half = (max(16, cells[0] // 2), max(16, cells[1] // 2))
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
-        work = _Work(osc, structure, attractor, ways, inside, stepper, executor, progress)
+        follower = Follower(osc, stepper, attractor.label)
+        work = _Work(osc, structure, attractor, ways, inside, stepper, executor, follower, progress)
         silent = dataclasses.replace(work, progress=None)
         for fraction in fractions:
             poor = (work if fraction == fractions[0] else silent).poor(fraction, half)
@@ -112,7 +115,7 @@ def levels(
                 break
         fine, _ = work.solved(poor.coarse.grids.of(cells), poor.limit)
         work.tell(_STAGES)
-    return Levels(poor.whole, fine, poor.coarse, poor.long, not attractor.is_fixed)
+    return Levels(poor.whole, fine, poor.coarse, poor.long, not attractor.is_fixed, follower)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -136,6 +139,7 @@ class _Work:
     inside: Callable[[Grids, int], NDArray[np.bool_]]
     stepper: Stepper
     executor: concurrent.futures.Executor
+    follower: Follower
     progress: Progress | None
 
     def tell(self, done: int) -> None:
@@ -187,6 +191,5 @@ class _Work:
 
     def linearising(self, poor: _Poor) -> float:
         """By how much, relative, linearising over a step changes the price of any way out that is in reach."""
-        label = self.attractor.label
-        found = [one for way in self.ways for one in follow(self.osc, self.stepper, poor.coarse, way, label)]
+        found = [one for way in self.ways for one in self.follower.follow(poor.coarse, way)]
         return max((one.linearising for one in found), default=0.0)

@@ -90,7 +90,7 @@ def screen(
     saddles: dict[int, int] = {}
     candidates, words = [], []
     for way in sorted(ways, key=lambda way: way.cost(found.fine)):
-        paths = found.paths(scene, stepper, way, attractor.label)
+        paths = found.paths(way)
         cost = found.cost(way, paths[0].action if paths else float("nan"))
         if not np.isfinite(cost).all():
             continue

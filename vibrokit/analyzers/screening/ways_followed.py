@@ -50,14 +50,24 @@ class WayFollowed:
         return abs(self.quadratic - self.candidate.action) / self.candidate.action
 
 
-def follow(osc: Oscillator, stepper: Stepper, potential: Potential, way: Way, source: int) -> list[WayFollowed]:
-    """Return the different paths that a potential has to a way out, the cheapest first."""
-    found: list[WayFollowed] = []
-    if np.isfinite(way.cost(potential)):
-        for tip in way.tips(potential):
-            one = _one(osc, stepper, potential, way, tip, source)
-            found += [] if one is None else [one]
-    return different(found)
+class Follower:
+    """Follows paths from an attractor to ways out, on each potential once."""
+
+    def __init__(self, osc: Oscillator, stepper: Stepper, source: int) -> None:
+        self.osc, self.stepper, self.source = osc, stepper, source
+        self._known: dict[tuple[Potential, Way], list[WayFollowed]] = {}
+
+    def follow(self, potential: Potential, way: Way) -> list[WayFollowed]:
+        """Return the different paths that a potential has to a way out, the cheapest first."""
+        if (potential, way) not in self._known:
+            self._known[potential, way] = self._followed(potential, way)
+        return self._known[potential, way]
+
+    def _followed(self, potential: Potential, way: Way) -> list[WayFollowed]:
+        if not np.isfinite(way.cost(potential)):
+            return []
+        found = [_one(self.osc, self.stepper, potential, way, tip, self.source) for tip in way.tips(potential)]
+        return different(one for one in found if one is not None)
 
 
 def different(found: Iterable[WayFollowed]) -> list[WayFollowed]:
