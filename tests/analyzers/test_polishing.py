@@ -11,7 +11,7 @@ from vibrokit.analyzers.polishing.carrier import Carrier
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.course import course_of
 from vibrokit.analyzers.polishing.ends import linear_end
-from vibrokit.analyzers.polishing.heteroclinic import polished, solved_again
+from vibrokit.analyzers.polishing.heteroclinic import Polisher, solved_again
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.symbolic.flow_kind import Flow
@@ -195,7 +195,7 @@ def held(scene):
     carrier = Carrier(goal.scene(osc), single_stepper(osc, Flow.HAMILTONIAN_VARIATIONAL))
     source = linear_end(carrier, structure.attractor(0).points[0], 1).on_orbit()
     cuts = goal.destination(carrier).cuts(course_of(carrier, guess(straight()), 32))
-    return carrier, polished(carrier, source, cuts)
+    return carrier, Polisher(carrier, source).polished(cuts)
 
 
 def test_less_time_costs_more(held):

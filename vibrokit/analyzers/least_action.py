@@ -35,6 +35,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _STAGES = 3
 _MOST_ORBITS = 1000
+_ALIKE = 1e-5  # relative difference of the actions of paths that differ by where in a set they begin
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,7 +151,7 @@ class LeastAction(Analyzer):
             polished = polish_all(osc, structure, label, candidates, self.exit, self.stepper, part, orbit=orbit)
             branches += polished.branches
             words += polished.words
-        branches.sort(key=lambda branch: branch.value)
+        branches = branches if attractor.is_fixed else _once(branches)
         if screened is None:
             return _Left(tuple(branches), tuple(dict.fromkeys(words)))
         return _Left(tuple(branches), tuple(dict.fromkeys(words)), energies_of(screened), arrays_of(screened))
@@ -199,6 +200,19 @@ class _Left:
 def _one_of(name: str, value: Any, kind: type) -> None:
     if value is not None and not isinstance(value, kind):
         raise StructureError(f"LeastAction: {name} is {shown(value)}; give {kind.__name__}(), or None to do without.")
+
+
+def _once(branches: list[ActivationEnergy]) -> list[ActivationEnergy]:
+    """The branches, cheapest first; of those that differ by the orbit they begin on only, the cheapest."""
+    kept: list[ActivationEnergy] = []
+    for branch in sorted(branches, key=lambda branch: branch.value):
+        if not any(
+            (branch.target, branch.saddle) == (other.target, other.saddle)
+            and branch.value <= (1 + _ALIKE) * other.value
+            for other in kept
+        ):
+            kept.append(branch)
+    return kept
 
 
 def _summary(attractor: Attractor, left: _Left) -> list[str]:

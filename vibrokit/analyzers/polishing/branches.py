@@ -14,8 +14,8 @@ from vibrokit.analyzers.polishing.carrier import Carrier
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.course import course_of
 from vibrokit.analyzers.polishing.destinations import Destination, Goal
-from vibrokit.analyzers.polishing.ends import End, linear_end
-from vibrokit.analyzers.polishing.heteroclinic import polished
+from vibrokit.analyzers.polishing.ends import linear_end
+from vibrokit.analyzers.polishing.heteroclinic import Polisher
 from vibrokit.analyzers.polishing.newton import Extremum
 from vibrokit.analyzers.polishing.trace import traced
 from vibrokit.errors import StructureError
@@ -64,24 +64,24 @@ class _Goals:
 
     def __init__(self, osc: Oscillator, goals: Sequence[Goal], point: np.ndarray, period: int, stepper: Stepper | None):
         self.osc, self.goals, self.point, self.period, self.stepper = osc, goals, point, period, stepper
-        self._known: dict[tuple[int, int], tuple[Carrier, End, Destination]] = {}
+        self._known: dict[tuple[int, int], tuple[Polisher, Destination]] = {}
 
-    def prepared(self, number: int, pieces: int) -> tuple[Carrier, End, Destination]:
-        """Carrier, linearised source and destination of a goal."""
+    def prepared(self, number: int, pieces: int) -> tuple[Polisher, Destination]:
+        """What polishes paths to a goal, and the goal as their destination."""
         if (number, pieces) not in self._known:
             scene = self.goals[number].scene(self.osc)
             stepper = self.stepper or single_stepper(scene, Flow.HAMILTONIAN_VARIATIONAL)
             carrier = Carrier(scene, stepper, pieces)
             source = linear_end(carrier, self.point, self.period)
-            self._known[number, pieces] = carrier, source, self.goals[number].destination(carrier)
+            self._known[number, pieces] = Polisher(carrier, source), self.goals[number].destination(carrier)
         return self._known[number, pieces]
 
     def near(self, candidate: Candidate) -> list[int]:
         """The goals that a candidate comes near, the nearest first."""
         distances = []
         for number in range(len(self.goals)):
-            carrier, _, destination = self.prepared(number, _PIECES[0])
-            distances.append(destination.distance(course_of(carrier, candidate, _BEYOND)))
+            polisher, destination = self.prepared(number, _PIECES[0])
+            distances.append(destination.distance(course_of(polisher.carrier, candidate, _BEYOND)))
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
         return [number for number in order if distances[number] <= _NEAR * distances[order[0]]]
 
@@ -95,9 +95,10 @@ class _Goals:
         raise failure
 
     def _solve(self, number: int, candidate: Candidate, pieces: int) -> _Solved:
-        carrier, source, destination = self.prepared(number, pieces)
+        polisher, destination = self.prepared(number, pieces)
+        carrier = polisher.carrier
         for _ in range(_ROUNDS):
-            found = polished(carrier, source, destination.cuts(course_of(carrier, candidate, _BEYOND)))
+            found = polisher.polished(destination.cuts(course_of(carrier, candidate, _BEYOND)))
             if not found.action > 0:
                 raise StructureError(f"the path it leads to has the action {found.action:.3g}, so it does not leave.")
             path = traced(carrier, found)

@@ -20,6 +20,8 @@ from vibrokit.errors import StructureError
 _NEAR = 1e-3  # of a path's extent: how near its source a candidate is entered
 _RADIUS = 1e-4  # of a path's extent: how near its two ends the linearised equations take over
 _CLOSER, _UNCHANGED = 4, 1e-8  # tenths of that, until the action stays, relative to itself
+_ENOUGH = 1e-6  # the same for a path begun on its orbit, made twice as long
+_LOOKS = 24  # of Newton's method for a path that is known but for its ends
 _HELD = (8, 16, 32, 64, 128)  # section intervals on the orbit, where a path is begun on it
 MORE = 2
 """Periods of its orbits by which a certified path may be made longer."""
@@ -29,39 +31,57 @@ _MOST_ADDED = 1000  # section intervals before a candidate that starts far from 
 Array = NDArray[np.float64]
 
 
-def polished(carrier: Carrier, source: End, cuts: Sequence[Cut]) -> Extremum:
-    """Polish a candidate: smoothed as a chain, relaxed to a minimum of the action, solved for by Newton's method.
+class Polisher:
+    """Polishes candidates that leave one orbit: each path that some of them lead to is followed to its ends once."""
 
-    Parameters
-    ----------
-    carrier : Carrier
-    source : End
-    cuts : sequence of Cut
-        The candidate ended in several ways, of which the cheapest is taken once they are smoothed.
+    def __init__(self, carrier: Carrier, source: End) -> None:
+        self.carrier, self.source = carrier, source
+        self._known: dict[tuple[int, int, str], Extremum | StructureError] = {}
 
-    Raises
-    ------
-    StructureError
-        No extremal path was found near it.
-    """
-    tried = []
-    for cut in cuts:
-        first, states = _begun(carrier, source, cut.states)
-        tried.append((smooth_chain(carrier, first, states, cut.last), first, cut))
-    chain, first, cut = min(tried, key=lambda each: each[0].action)
-    try:
-        return _left_for_good(carrier, source, first, cut, chain.points)
-    except StructureError as error:
-        found = _left_in_time(carrier, source.on_orbit(), first, cut, chain.points)
-        if found is None:
-            raise error
+    def polished(self, cuts: Sequence[Cut]) -> Extremum:
+        """Polish a candidate: smoothed as a chain, relaxed to a minimum of the action, solved for by Newton's method.
+
+        Parameters
+        ----------
+        cuts : sequence of Cut
+            The candidate ended in several ways, of which the cheapest is taken once they are smoothed.
+
+        Raises
+        ------
+        StructureError
+            No extremal path was found near it.
+        """
+        carrier, source = self.carrier, self.source
+        tried = []
+        for cut in cuts:
+            first, states = _begun(carrier, source, cut.states)
+            tried.append((smooth_chain(carrier, first, states, cut.last), first, cut))
+        chain, first, cut = min(tried, key=lambda each: each[0].action)
+        try:
+            points = relaxed(carrier, first, cut.ending, chain.points, cut.last)
+            begun = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
+        except StructureError as error:
+            return _left_in_time(carrier, source, first, cut, chain.points, error)
+        key = source.node(first), len(begun.points), f"{begun.action:.9e}"
+        if key not in self._known:
+            try:
+                self._known[key] = self._followed(begun, first, cut, chain.points)
+            except StructureError as error:
+                self._known[key] = error
+        found = self._known[key]
+        if isinstance(found, StructureError):
+            raise found
         return found
 
+    def _followed(self, begun: Extremum, first: int, cut: Cut, points: Array) -> Extremum:
+        try:
+            return _left_for_good(self.carrier, begun)
+        except StructureError as error:
+            return _left_in_time(self.carrier, self.source, first, cut, points, error)
 
-def _left_for_good(carrier: Carrier, source: End, first: int, cut: Cut, points: Array) -> Extremum:
+
+def _left_for_good(carrier: Carrier, found: Extremum) -> Extremum:
     """The path that leaves in the unstable space, begun and ended so near to its two ends that it does not matter."""
-    points = relaxed(carrier, first, cut.ending, points, cut.last)
-    found = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
     radius = _RADIUS * extent(found)
     found = _within(carrier, found, radius)
     for _ in range(_CLOSER):
@@ -73,14 +93,16 @@ def _left_for_good(carrier: Carrier, source: End, first: int, cut: Cut, points: 
     return found
 
 
-def _left_in_time(carrier: Carrier, source: End, first: int, cut: Cut, points: Array) -> Extremum | None:
-    """The path that starts on the orbit itself, the longest that may be made longer; None if there is none."""
+def _left_in_time(
+    carrier: Carrier, orbit: End, first: int, cut: Cut, points: Array, failure: StructureError
+) -> Extremum:
+    """The path that starts on the orbit itself, so long that it costs no more than a longer one; else the failure."""
     best = None
-    size = len(source.states[0])
+    source, size = orbit.on_orbit(), len(orbit.states[0])
     for intervals in _HELD:
         added = intervals * carrier.pieces
-        orbit = source.states[(first - added + np.arange(added)) % len(source.states)]
-        states = np.concatenate([orbit, points[:, :size]])
+        held = source.states[(first - added + np.arange(added)) % len(source.states)]
+        states = np.concatenate([held, points[:, :size]])
         try:
             chain = smooth_chain(carrier, first - added, states, cut.last)
             guess = relaxed(carrier, first - added, cut.ending, chain.points, cut.last)
@@ -88,8 +110,14 @@ def _left_in_time(carrier: Carrier, source: End, first: int, cut: Cut, points: A
             found = _within(carrier, found, _RADIUS * extent(found))
             solved_again(carrier, found, MORE * len(source.states), 0)
         except StructureError:
+            if best is not None:
+                break
             continue
+        if best is not None and abs(found.action - best.action) <= _ENOUGH * best.action:
+            break
         best = found
+    if best is None:
+        raise failure
     return best
 
 
@@ -135,7 +163,7 @@ def solved_again(carrier: Carrier, found: Extremum, before: int, after: int) -> 
             points = points[:after]
         ending = ComesTo(ending.end, ending.phase + after)
     last = ending.last(found.free, carrier.piece)
-    return extremal_path(carrier, found.source, first - before, ending, points, last=last)
+    return extremal_path(carrier, found.source, first - before, ending, points, last=last, looks=_LOOKS)
 
 
 def extent(found: Extremum) -> float:

@@ -15,7 +15,8 @@ from vibrokit.analyzers.polishing.endings import ComesTo, Ending, normals_of
 from vibrokit.analyzers.polishing.ends import End
 from vibrokit.errors import StructureError
 
-_ITERATIONS = 60
+_LOOKS = 200  # of Newton's method
+_HOPELESS = 5.0  # misfit, relative to the path's size, of a guess that is nothing like a path
 _EXACT = 1e-13
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _LEAST_SHARE = 1e-4
@@ -184,13 +185,11 @@ class _Matching:
         side = size + len(free)
         return scipy.sparse.csc_array((values, (places, others)), shape=(side, side))
 
-    def solve(self, points: Array, last: float) -> Extremum:
+    def solve(self, points: Array, last: float, looks: int) -> Extremum:
         """Newton's method, each step as long as the one after it would be shorter (Deuflhard's natural test)."""
         free = np.concatenate([self.ending.free(last), np.zeros(int(self.pin is not None))])
         look = self.look(points, free)
-        for _ in range(_ITERATIONS):
-            if not look.largest > _EXACT or not math.isfinite(look.largest):
-                break
+        while looks > 0 and _EXACT < look.largest <= _HOPELESS:
             try:
                 factors = scipy.sparse.linalg.splu(self.derivatives(points, free, look))
             except RuntimeError:  # singular: the path's guess is nothing like a path
@@ -200,6 +199,7 @@ class _Matching:
             while share > _LEAST_SHARE:
                 moved = self._moved(points, free, share * step)
                 tried = self.look(*moved)
+                looks -= 1
                 if math.isfinite(tried.largest):
                     ahead = float(np.linalg.norm(factors.solve(tried.misfits)))
                     if ahead <= (1 - share / 4) * length or tried.largest < _EXACT:
@@ -222,7 +222,14 @@ class _Matching:
 
 
 def extremal_path(
-    carrier: Carrier, source: End, first: int, ending: Ending, points: Array, *, last: float | None = None
+    carrier: Carrier,
+    source: End,
+    first: int,
+    ending: Ending,
+    points: Array,
+    *,
+    last: float | None = None,
+    looks: int = _LOOKS,
 ) -> Extremum:
     """Solve for the path by multiple shooting: continuity, n conditions at the source, the ending's conditions.
 
@@ -242,6 +249,8 @@ def extremal_path(
         Guess of (q, p), a piece apart.
     last : float, optional
         Guess of the length of the last piece (s), where that is free.
+    looks : int
+        How often the misfits are found at most.
 
     Raises
     ------
@@ -249,7 +258,7 @@ def extremal_path(
         It did not converge.
     """
     matching = _Matching(carrier, source, first, ending, points)
-    found = matching.solve(points, carrier.piece if last is None else last)
+    found = matching.solve(points, carrier.piece if last is None else last, looks)
     if not found.residual <= _ACCEPTED:
         raise StructureError(
             f"Newton's method found no extremal path near the guess: the misfit stays at {found.residual:.1e}, "

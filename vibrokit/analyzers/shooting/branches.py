@@ -54,7 +54,8 @@ class Branch:
             for here, there in zip(self.middle, other.whole, strict=True)
             if len(there)
         ]
-        return bool(np.median(np.concatenate(gaps)) <= _APART)
+        near = np.concatenate(gaps) if gaps else np.empty(0)
+        return bool(near.size and np.median(near) <= _APART)
 
 
 def branches_of(shooter: Shooter, outcomes: Outcomes, ranked: Iterable[int], worth: float) -> tuple[Branch, ...]:
@@ -101,6 +102,7 @@ def _branch(shooter: Shooter, outcomes: Outcomes, index: int) -> Branch:
     path = sampled(shooter, outcomes, index, fine)
     share = path[:, -1] / path[-1, -1]
     inside = (share >= _MIDDLE[0]) & (share <= _MIDDLE[1])
+    inside[np.argmin(np.abs(share - 0.5))] = True  # behind strong damping all is paid between two states
     phase = np.zeros(len(path)) if osc.autonomous else np.arange(len(path)) % fine
     phases = range(1 if osc.autonomous else fine)
     whole = tuple(path[phase == number, :2] for number in phases)
