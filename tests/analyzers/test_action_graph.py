@@ -237,3 +237,34 @@ def test_progress_grows_to_its_end():
     SMALL.run(*well(0.05), progress=lambda done, total: seen.append(done / total))
     assert seen == sorted(seen)
     assert seen[-1] == 1
+
+
+# --- three wells: two ways out of the middle one, the one far cheaper
+
+RESTS = (-1.6, -1.0, 0.0, 0.4, 0.7)  # zeros of the force: wells and hilltops in turn
+
+
+@functools.cache
+def three_wells():
+    formula = "*".join(f"(x - ({rest}))" for rest in RESTS)
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(f"4*{formula}"), noise=vk.WhiteNoise(1e-4)
+    )
+    structure = vk.find_structure(osc, region=((-2.2, 1.2), (-1.5, 1.5)), cells=(80, 80), manifolds=False)
+    return osc, structure
+
+
+def barrier_between(bottom, top):
+    potential = np.polynomial.Polynomial.fromroots(RESTS).integ() * 4
+    return potential(top) - potential(bottom)
+
+
+def test_a_cheap_way_out_is_priced_as_well_as_a_dear_one():
+    osc, structure = three_wells()
+    left, middle, right = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
+    exact = {left.label: 0.2 * barrier_between(0.0, -1.0), right.label: 0.2 * barrier_between(0.0, 0.4)}
+    assert exact[left.label] > 12 * exact[right.label]
+    found = vk.ActionGraph(cells=(160, 160)).search(osc, structure, middle.label)
+    for target, value in exact.items():
+        assert found.targets[target][0] == pytest.approx(value, rel=0.02)
+        assert abs(found.targets[target][0] - value) <= found.targets[target][1]

@@ -45,7 +45,9 @@ def energies_of(scene):
     """Energies, each with its exact value, and the status."""
     structure = structure_of(scene)
     exact = exact_energies(scene, structure)
-    result = vk.LeastAction(plot=PLOT, graph=vk.ActionGraph(cells=(64, 64), fraction=8)).run(scene.oscillator, structure)
+    result = vk.LeastAction(plot=PLOT, graph=vk.ActionGraph(cells=(64, 64), fraction=8)).run(
+        scene.oscillator, structure
+    )
     assert {energy.source for energy in result.energies} == {
         attractor.label for attractor in structure.attractors if is_inside(attractor, structure)
     }

@@ -75,13 +75,22 @@ class Levels:
         The error is what halving the grid changed and the difference from a path's action by Hamilton's equations; or,
         if no path was found, half of what doubling the step changed; from a set also how V rises near by.
         """
-        fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
+        fine, coarse, long = self._costs(way)
         if not np.isfinite([fine, coarse, long]).all():
             whole = way.cost(self.whole)
             return whole, whole
         blur = way.blur(self.fine) if self.from_set else 0.0
         by_time = _BY_PATH * abs(path - fine) if np.isfinite(path) else _BY_STEP * abs(coarse - long)
         return fine, abs(fine - coarse) + by_time + blur
+
+    def change(self, way: Way) -> float:
+        """By how much halving the grid and doubling the step changed the cost; infinite where that is not known."""
+        fine, coarse, long = self._costs(way)
+        found = abs(fine - coarse) + _BY_STEP * abs(coarse - long)
+        return found if np.isfinite(found) else np.inf
+
+    def _costs(self, way: Way) -> tuple[float, float, float]:
+        return way.cost(self.fine), way.cost(self.coarse), way.cost(self.long)
 
 
 def levels(
@@ -97,7 +106,8 @@ def levels(
 ) -> Levels:
     """Find the potential of an attractor; see `Levels`.
 
-    The first of the time fractions is taken with which linearising over a step changes no price by much; else the last.
+    The first of the time fractions is taken with which linearising over a step changes no price by much; but none
+    from which on shorter steps take V farther from the price of its paths, for want of cells.
 
     Raises
     ------
@@ -108,11 +118,15 @@ def levels(
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
         follower = Follower(osc, stepper, attractor.label)
         work = _Work(osc, structure, attractor, ways, inside, stepper, executor, follower, progress)
+        poor = work.poor(fractions[0], half)
         silent = dataclasses.replace(work, progress=None)
-        for fraction in fractions:
-            poor = (work if fraction == fractions[0] else silent).poor(fraction, half)
-            if fraction == fractions[-1] or work.linearising(poor) <= _STEP_TOLERANCE:
+        for fraction in fractions[1:]:
+            if work.linearising(poor) <= _STEP_TOLERANCE:
                 break
+            shorter = silent.poor(fraction, half)
+            if work.excess(shorter) > max(work.excess(poor), _STEP_TOLERANCE):  # each step adds an error of the cells
+                break
+            poor = shorter
         fine, _ = work.solved(poor.coarse.grids.of(cells), poor.limit)
         work.tell(_STAGES)
     return Levels(poor.whole, fine, poor.coarse, poor.long, not attractor.is_fixed, follower)
@@ -193,3 +207,8 @@ class _Work:
         """By how much, relative, linearising over a step changes the price of any way out that is in reach."""
         found = [one for way in self.ways for one in self.follower.follow(poor.coarse, way)]
         return max((one.linearising for one in found), default=0.0)
+
+    def excess(self, poor: _Poor) -> float:
+        """By how much, relative, V at the ways out differs from the price of a path that it leads along."""
+        pairs = [(way.cost(poor.coarse), self.follower.follow(poor.coarse, way)) for way in self.ways]
+        return max((abs(cost / found[0].candidate.action - 1) for cost, found in pairs if found), default=0.0)

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.analyzer import part_of
 from vibrokit.analyzers.candidate import Candidate
 from vibrokit.analyzers.exits import Exit
 from vibrokit.analyzers.screening.grids import Grids
-from vibrokit.analyzers.screening.levels import levels
+from vibrokit.analyzers.screening.levels import Levels, levels
 from vibrokit.analyzers.screening.potential import Potential
+from vibrokit.analyzers.screening.ways_out import Way
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
+
+_FAR_LESS = 0.25  # of the dearest way out
+_TURNS = 4
 
 Array = NDArray[np.float64]
 
@@ -84,14 +89,18 @@ def screen(
         return exit.within(osc, structure, attractor, stepper, grids, phase)
 
     scene = exit.scene(osc)
-    found = levels(scene, structure, attractor, ways, inside, stepper, cells, fractions, progress)
+
+    def solved(some: Sequence[Way], part: Progress | None) -> Levels:
+        return levels(scene, structure, attractor, some, inside, stepper, cells, fractions, part)
+
+    known = _on_grids_of_their_own(ways, solved, progress)
     barriers: dict[int, tuple[float, float]] = {}
     targets: dict[int, tuple[float, float]] = {}
     saddles: dict[int, int] = {}
     candidates, words = [], []
-    for way in sorted(ways, key=lambda way: way.cost(found.fine)):
-        paths = found.paths(way)
-        cost = found.cost(way, paths[0].action if paths else float("nan"))
+    for way in sorted(ways, key=lambda way: way.cost(known[way].fine)):
+        paths = known[way].paths(way)
+        cost = known[way].cost(way, paths[0].action if paths else float("nan"))
         if not np.isfinite(cost).all():
             continue
         if way.saddle >= 0:
@@ -103,4 +112,31 @@ def screen(
             words.append(f"The path of the graph to attractor {way.target} could not be followed back.")
     if not targets:
         raise StructureError(f"the grid reaches no way out of attractor {attractor.label}; widen the region.")
-    return Screen(attractor.label, barriers, targets, tuple(candidates), saddles, found.fine, stepper, tuple(words))
+    widest = known[max(ways, key=lambda way: known[way].fine.unreached)].fine
+    return Screen(attractor.label, barriers, targets, tuple(candidates), saddles, widest, stepper, tuple(words))
+
+
+def _on_grids_of_their_own(
+    ways: Sequence[Way], solved: Callable[[Sequence[Way], Progress | None], Levels], progress: Progress | None
+) -> dict[Way, Levels]:
+    """By way out, the potential on a grid that reaches little farther than that way needs.
+
+    A grid that holds the dearest way out has few cells for one that costs far less. So those that do are looked at
+    again without the others.
+    """
+    known = dict.fromkeys(ways, solved(ways, part_of(progress, 0, _TURNS)))
+    for turn in range(1, _TURNS):
+        costs = {way: way.cost(known[way].fine) for way in ways}
+        dearest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
+        ways = [way for way in ways if 0 < costs[way] < _FAR_LESS * dearest]
+        if not ways:
+            break
+        try:
+            closer = solved(ways, part_of(progress, turn, _TURNS))
+        except StructureError:  # too near to the attractor for any grid
+            break
+        ways = [way for way in ways if closer.change(way) < known[way].change(way)]
+        known.update(dict.fromkeys(ways, closer))
+    if progress is not None:
+        progress(1, 1)
+    return known
