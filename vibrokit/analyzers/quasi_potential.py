@@ -143,7 +143,7 @@ def _closed(orbit: Orbit, pieces: list[_Piece]) -> LocalPotential:
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
     if not largest < 1 - _NEUTRAL:
         raise StructureError(
-            f"the orbit at {tuple(orbit.point)} has a multiplier of size {largest:.6g}; only a stable one "
+            f"the orbit at {tuple(orbit.point.tolist())} has a multiplier of size {largest:.6g}; only a stable one "
             "(all below 1) has a quasi-potential round it."
         )
     return LocalPotential(monodromy, gramian, scipy.linalg.solve_discrete_lyapunov(monodromy, gramian))

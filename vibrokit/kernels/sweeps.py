@@ -1,9 +1,9 @@
 """Value iteration with continuous predecessors: what one step of time does to a function on a grid.
 
-V_after(y) = min over x of V_before(x) + ½ (x − b)ᵀ Q (x − b), where b(y) and Q(y) are given for every node y of the
-grid after, and x is any point of the grid before. Places are in units of cells, so that nodes are whole numbers; V is
-interpolated by quadratic pieces whose curvature is what neighbouring nodes agree on (Min & Gibou, J. Comput. Phys. 225,
-300, 2007): exact for quadratic forms, and linear across the ridges where two ways of coming are equally cheap.
+V_after(y) = min over x of V_before(x) + ½ |R (x − b)|², where b(y) and the triangular R(y) are given for every node y
+of the grid after, and x is any point of the grid before. Places are in units of cells, so that nodes are whole numbers;
+V is interpolated by quadratic pieces whose curvature is what neighbouring nodes agree on (Min & Gibou, J. Comput. Phys.
+225, 300, 2007): exact for quadratic forms, and linear across the ridges where two ways of coming are equally cheap.
 """
 
 import math
@@ -51,11 +51,17 @@ def interpolate(values: Array, s: float, t: float) -> tuple[float, float, float,
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def cost(before: Array, s: float, t: float, centre: Array, quadratic: Array) -> float:
-    """Return what it costs to come by a point of the grid before."""
+def paid(s: float, t: float, centre: Array, root: Array) -> float:
+    """Return ½ |R (x − b)|², a sum of squares, so that it cannot come out negative however long and thin R is."""
     ds, dt = s - centre[0], t - centre[1]
-    paid = 0.5 * (quadratic[0] * ds * ds + 2.0 * quadratic[1] * ds * dt + quadratic[2] * dt * dt)
-    return interpolate(before, s, t)[0] + paid
+    first, second = root[0] * ds + root[1] * dt, root[2] * dt
+    return 0.5 * (first * first + second * second)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def cost(before: Array, s: float, t: float, centre: Array, root: Array) -> float:
+    """Return what it costs to come by a point of the grid before."""
+    return interpolate(before, s, t)[0] + paid(s, t, centre, root)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -65,27 +71,30 @@ def inside(value: float, count: int) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def descend(before: Array, s: float, t: float, centre: Array, quadratic: Array) -> tuple[float, float, float]:
+def descend(before: Array, s: float, t: float, centre: Array, root: Array) -> tuple[float, float, float]:
     """Return the local minimum near a point by Newton's method, as (cost, s, t)."""
     found = math.inf
-    a, b, c = quadratic[0], quadratic[1], quadratic[2]
+    a, b, c = root[0] * root[0], root[0] * root[1], root[1] * root[1] + root[2] * root[2]
     for _ in range(_NEWTON):
         value, gs, gt, hss, hst, htt = interpolate(before, s, t)
+        found = value + paid(s, t, centre, root)
         ds, dt = s - centre[0], t - centre[1]
-        found = value + 0.5 * (a * ds * ds + 2.0 * b * ds * dt + c * dt * dt)
-        gs += a * ds + b * dt
-        gt += b * ds + c * dt
+        first = root[0] * ds + root[1] * dt
+        gs += root[0] * first
+        gt += root[1] * first + root[2] * root[2] * dt
         hss, hst, htt = hss + a, hst + b, htt + c
-        if not (hss > 0.1 * a and htt > 0.1 * c and hss * htt - hst * hst > 0.01 * (a * c - b * b)):
+        if not (hss > 0.1 * a and htt > 0.1 * c and hss * htt - hst * hst > 0.01 * a * root[2] * root[2]):
             hss, hst, htt = a, b, c
-        det = hss * htt - hst * hst
+            det = a * root[2] * root[2]
+        else:
+            det = hss * htt - hst * hst
         step_s, step_t = (hst * gt - htt * gs) / det, (hst * gs - hss * gt) / det
         if abs(step_s) < _NEAR and abs(step_t) < _NEAR:
             return found, s, t
         moved = False
         for _ in range(_HALVINGS):
             new_s, new_t = inside(s + step_s, before.shape[0]), inside(t + step_t, before.shape[1])
-            if cost(before, new_s, new_t, centre, quadratic) < found:
+            if cost(before, new_s, new_t, centre, root) < found:
                 moved = True
                 break
             step_s *= 0.3
@@ -93,22 +102,20 @@ def descend(before: Array, s: float, t: float, centre: Array, quadratic: Array) 
         if not moved:
             return found, s, t
         s, t = new_s, new_t
-    return cost(before, s, t, centre, quadratic), s, t
+    return cost(before, s, t, centre, root), s, t
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def best_node(before: Array, centre: Array, quadratic: Array, most: float, reach: int) -> tuple[float, int, int]:
+def best_node(before: Array, centre: Array, root: Array, most: float, reach: int) -> tuple[float, int, int]:
     """Return the cheapest node within reach that costs less than `most`, as (cost, i, j); i is −1 if none does."""
-    a, b, c = quadratic[0], quadratic[1], quadratic[2]
-    det = a * c - b * b
-    room = 2.0 * max(most, 0.0)
-    wide, high = min(math.sqrt(room * c / det), reach), min(math.sqrt(room * a / det), reach)
+    far = math.sqrt(2.0 * max(most, 0.0))
+    wide = min(far * math.hypot(root[1] / root[2], 1.0) / root[0], reach)
+    high = min(far / root[2], reach)
     found, at_i, at_j = most, -1, -1
     n, m = before.shape
     for i in range(max(1, math.ceil(centre[0] - wide)), min(n - 2, math.floor(centre[0] + wide)) + 1):
         for j in range(max(1, math.ceil(centre[1] - high)), min(m - 2, math.floor(centre[1] + high)) + 1):
-            ds, dt = i - centre[0], j - centre[1]
-            here = before[i, j] + 0.5 * (a * ds * ds + 2.0 * b * ds * dt + c * dt * dt)
+            here = before[i, j] + paid(i, j, centre, root)
             if here < found:
                 found, at_i, at_j = here, i, j
     return found, at_i, at_j
@@ -119,7 +126,7 @@ def sweep_rows(
     before: Array,
     after: Array,
     centres: Array,
-    quadratics: Array,
+    roots: Array,
     places: Array,
     anchors: Array,
     still: Flags,
@@ -140,8 +147,8 @@ def sweep_rows(
         V on the two grids.
     centres : array (n, m, 2)
         b of each node of the grid after, in cells of the grid before; NaN where there is none.
-    quadratics : array (n, m, 3)
-        Q as (ss, st, tt), for displacements in cells.
+    roots : array (n, m, 3)
+        R as (ss, st, tt), for displacements in cells.
     places : array (n, m, 2)
         Best x known of each node; improved.
     anchors : array (n, m, 2)
@@ -178,14 +185,14 @@ def sweep_rows(
                 continue
             looked += 1
             ceiling = ceilings[i, j]
-            centre, quadratic = centres[i, j], quadratics[i, j]
-            found = cost(before, s, t, centre, quadratic)
+            centre, root = centres[i, j], roots[i, j]
+            found = cost(before, s, t, centre, root)
             for tried in range(2):
                 if tried == 0:
                     ns, nt = inside(centre[0], n), inside(centre[1], m)
                 else:
                     ns, nt = anchors[i, j, 0], anchors[i, j, 1]
-                here = cost(before, ns, nt, centre, quadratic)
+                here = cost(before, ns, nt, centre, root)
                 if here < found:
                     found, s, t = here, ns, nt
             for near in range(2):
@@ -193,15 +200,15 @@ def sweep_rows(
                 if not (first <= ni < last and 0 <= nj < m) or math.isnan(centres[ni, nj, 0]):
                     continue
                 ns, nt = places[ni, nj, 0], places[ni, nj, 1]
-                here = cost(before, ns, nt, centre, quadratic)
+                here = cost(before, ns, nt, centre, root)
                 if here < found:
                     found, s, t = here, ns, nt
             if reach > 0:
-                here, ni, nj = best_node(before, centre, quadratic, min(found, ceiling), reach)
+                here, ni, nj = best_node(before, centre, root, min(found, ceiling), reach)
                 if ni >= 0 and here < found:
                     found, s, t = here, float(ni), float(nj)
             if found < ceiling:
-                found, s, t = descend(before, s, t, centre, quadratic)
+                found, s, t = descend(before, s, t, centre, root)
             places[i, j, 0], places[i, j, 1] = s, t
             found = min(found, ceiling)
             if abs(found - after[i, j]) > tolerance * after[i, j]:
@@ -223,7 +230,7 @@ def interpolate_all(values: Array, places: Array) -> Array:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def descend_all(before: Array, starts: Array, centres: Array, quadratics: Array, weight: float) -> tuple[Array, Array]:
+def descend_all(before: Array, starts: Array, centres: Array, roots: Array, weight: float) -> tuple[Array, Array]:
     """Return the least cost to come to some points, and the places come from.
 
     Parameters
@@ -232,7 +239,7 @@ def descend_all(before: Array, starts: Array, centres: Array, quadratics: Array,
     starts : array (count, tries, 2)
         Places from which each descent begins; the best is kept.
     centres : array (count, 2)
-    quadratics : array (count, 3)
+    roots : array (count, 3)
     weight : float
         Of V against the cost of the step; above 1, ways along which V falls faster are preferred.
 
@@ -247,13 +254,13 @@ def descend_all(before: Array, starts: Array, centres: Array, quadratics: Array,
     for k in range(len(starts)):
         if math.isnan(centres[k, 0]):
             continue
-        quadratic = quadratics[k] / weight
+        root = roots[k] / math.sqrt(weight)
         least = math.inf
         for start in range(starts.shape[1]):
             s, t = inside(starts[k, start, 0], n), inside(starts[k, start, 1], m)
-            found, s, t = descend(before, s, t, centres[k], quadratic)
+            found, s, t = descend(before, s, t, centres[k], root)
             if found < least:
                 least = found
                 places[k, 0], places[k, 1] = s, t
-        costs[k] = cost(before, places[k, 0], places[k, 1], centres[k], quadratics[k])
+        costs[k] = cost(before, places[k, 0], places[k, 1], centres[k], roots[k])
     return costs, places

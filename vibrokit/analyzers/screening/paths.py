@@ -54,17 +54,17 @@ def follow_back(osc: Oscillator, stepper: Stepper, potential: Potential, end: Ar
         before = (phase - count) % phases
         time = grids.time(before) + grids.step
         into = steps_into(osc, stepper, states[-1][None], time, grids.step, grids.boxes[before])
-        centres, forms = in_cells(grids, before, into)
+        centres, roots = in_cells(grids, before, into)
         anchors = grids.places(before, uphill(osc, stepper, states[-1][None], time, grids.step, grids.boxes[before]))
         starts = np.concatenate([_starts(potential, before, states[-1][None], centres), anchors[:, None]], axis=1)
-        totals, places = descend_all(potential.values[before], starts, centres, forms, haste)
-        left = _from_orbit(potential, before, centres[0], forms[0], float(totals[0]))
+        totals, places = descend_all(potential.values[before], starts, centres, roots, haste)
+        left = _from_orbit(potential, before, centres[0], roots[0], float(totals[0]))
         if left is not None:
             visit, off = left
             orbit = potential.orbit[visit - before : visit + 1]
             return _path(0.0, [*orbit, *states[::-1]], [*np.zeros(before), off, *costs[:0:-1]])
         states.append(grids.states(before, places[0]))
-        costs.append(float(step_cost(places - centres, forms)[0]))
+        costs.append(float(step_cost(places - centres, roots)[0]))
         if not np.isfinite(costs[-1]):
             return None
         if count % steps == 0:
@@ -93,11 +93,11 @@ def _starts(potential: Potential, before: int, states: Array, centres: Array) ->
 
 
 def _from_orbit(
-    potential: Potential, before: int, centre: Array, form: Array, total: float
+    potential: Potential, before: int, centre: Array, root: Array, total: float
 ) -> tuple[int, float] | None:
     """Where along the orbit a step leaves it for less than coming by any other state costs, and for how much."""
     visits = np.arange(before, len(potential.orbit), potential.grids.phases)
-    costs = step_cost(potential.grids.places(before, potential.orbit[visits]) - centre, form)
+    costs = step_cost(potential.grids.places(before, potential.orbit[visits]) - centre, root)
     if not len(visits) or not costs.min() <= total:
         return None
     best = int(np.argmin(costs))

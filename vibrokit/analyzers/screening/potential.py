@@ -92,11 +92,11 @@ class Iteration:
         self.most = [np.full(grids.cells, unreached) for _ in known.values]
         self.places, self.anchors, self.tables = [], [], []
         for phase in range(grids.phases):
-            centres, forms = table(osc, stepper, grids, phase, executor)
+            centres, roots = table(osc, stepper, grids, phase, executor)
             most = self.most[(phase + 1) % grids.phases]
             for place in grids.places(phase, known.visits(phase)):
-                np.fmin(most, step_cost(place - centres, forms), out=most)
-            self.tables.append((centres, forms))
+                np.fmin(most, step_cost(place - centres, roots), out=most)
+            self.tables.append((centres, roots))
             last = np.array(grids.cells) - 2.0
             self.places.append(np.clip(np.nan_to_num(centres, nan=1.0), 1.0, last))
             self.anchors.append(np.clip(against(osc, stepper, grids, phase), 1.0, last))

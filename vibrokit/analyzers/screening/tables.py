@@ -17,23 +17,26 @@ from vibrokit.symbolic.flow_kind import Flow
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+_ROUNDING = 1e-14  # of a variance: what of it is known
 Executor = concurrent.futures.Executor | None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Steps:
-    """Costs ½ (x − b)ᵀ Q (x − b) of coming from x, one time step before.
+    """Costs ½ |R (x − b)|² of coming from x, one time step before.
 
     Attributes
     ----------
     centres : array (count, 2)
         b: from where the motion leads here by itself, or would if it were linear; NaN where there is none.
-    forms : array (count, 2, 2)
-        Q.
+    roots : array (count, 3)
+        R as (00, 01, 11), upper triangular. It is kept, not RᵀR, of which rounding leaves nothing where it is long and
+        thin, as in a stiff stop.
     """
 
     centres: Array
-    forms: Array
+    roots: Array
 
 
 def steps_into(
@@ -43,7 +46,7 @@ def steps_into(
 
     To come to y by way of x costs ½ eᵀ C⁻¹ e, where e is the miss of y by the motion from x and C is the Gramian of
     the noise along it. It is linearised along the motion that ends at y, which came from b: e = M (b − x), so that
-    Q = Mᵀ C⁻¹ M is the inverse of the Gramian of the motion backwards in time. Where b is out of the grid, as behind
+    RᵀR = Mᵀ C⁻¹ M is the inverse of the Gramian of the motion backwards in time. Where b is out of the grid, as behind
     strong damping, it is linearised along the motion that starts where a path against the damping would come from.
 
     Parameters
@@ -64,13 +67,13 @@ def steps_into(
         osc, Flow.GRAMIAN_REVERSED, stepper, starts, 1, start_time=-time, interval=step, executor=executor
     )
     centres = ended.states[:, :2] * mirror
-    forms = _inverse(ended.states[:, 2:] * np.array([1.0, -1.0, 1.0]))
-    good = (ended.status == RAN_OUT) & np.isfinite(centres).all(axis=1) & np.isfinite(forms).all(axis=(1, 2))
+    roots = _root_of_inverse(ended.states[:, 2:] * np.array([1.0, -1.0, 1.0]))
+    good = (ended.status == RAN_OUT) & np.isfinite(centres).all(axis=1) & np.isfinite(roots).all(axis=1)
     out = ~good | np.any((centres < box[:, 0]) | (centres > box[:, 1]), axis=1)
     if out.any():
         starts = uphill(osc, stepper, states[out], time, step, box)
-        centres[out], forms[out] = _linearised(osc, stepper, starts, states[out], time - step, step, executor)
-    return Steps(centres, forms)
+        centres[out], roots[out] = _linearised(osc, stepper, starts, states[out], time - step, step, executor)
+    return Steps(centres, roots)
 
 
 def uphill(osc: Oscillator, stepper: Stepper, states: Array, time: float, step: float, box: Array) -> Array:
@@ -89,15 +92,18 @@ def _linearised(
 ) -> tuple[Array, Array]:
     """Linearise along the motion from some states."""
     images, slopes, gramians = forward(osc, stepper, starts, time, step, executor)
+    root = _root_of_inverse(gramians.reshape(-1, 4)[:, [0, 1, 3]])
     with np.errstate(all="ignore"):
         det = np.linalg.det(slopes)
-        sound = np.isfinite(images).all(axis=1) & np.isfinite(gramians).all(axis=(1, 2)) & (np.abs(det) > 1e-12)
-    centres, forms = np.full_like(starts, np.nan), np.full((len(starts), 2, 2), np.nan)
+        sound = np.isfinite(images).all(axis=1) & np.isfinite(root).all(axis=1) & (np.abs(det) > 1e-12)
+    centres, roots = np.full_like(starts, np.nan), np.full((len(starts), 3), np.nan)
     back = np.linalg.solve(slopes[sound], (ends - images)[sound][..., None])[..., 0]
     centres[sound] = starts[sound] + back
-    pulled = np.linalg.solve(gramians[sound], slopes[sound])
-    forms[sound] = slopes[sound].transpose(0, 2, 1) @ pulled
-    return centres, forms
+    upper = np.zeros((int(sound.sum()), 2, 2))
+    upper[:, 0, 0], upper[:, 0, 1], upper[:, 1, 1] = root[sound].T
+    triangular: Array = np.asarray(np.linalg.qr(upper @ slopes[sound], mode="r"), dtype=np.float64)
+    roots[sound] = triangular.reshape(-1, 4)[:, [0, 1, 3]]
+    return centres, _positive(roots)
 
 
 def forward(
@@ -117,26 +123,34 @@ def forward(
     return ended[:, :2], slopes[:, 2:].reshape(-1, 2, 2), gramians
 
 
-def _inverse(triangles: Array) -> Array:
-    """Inverses of symmetric matrices given as (00, 01, 11); NaN where they are not positive definite."""
+def _root_of_inverse(triangles: Array) -> Array:
+    """R with RᵀR = C⁻¹ for symmetric C given as (00, 01, 11), as (00, 01, 11); NaN where C is not positive definite."""
     a, b, c = triangles.T
     with np.errstate(all="ignore"):
-        det = a * c - b * b
-        det = np.where((a > 0) & (det > 0), det, np.nan)
-        return np.stack([c / det, -b / det, -b / det, a / det], axis=1).reshape(-1, 2, 2)
+        left = a - b * (b / c)
+        left = np.sqrt(np.where((a > 0) & (c > 0) & (left > _ROUNDING * a), left, np.nan))
+        return np.stack([1 / left, -b / c / left, 1 / np.sqrt(c)], axis=1)
+
+
+def _positive(roots: Array) -> Array:
+    """The same forms with a positive diagonal, and none where a form is degenerate."""
+    with np.errstate(all="ignore"):
+        roots = roots * np.stack([np.sign(roots[:, 0]), np.sign(roots[:, 0]), np.sign(roots[:, 2])], axis=1)
+    roots[~((roots[:, 0] > 0) & (roots[:, 2] > 0))] = np.nan
+    return roots
 
 
 def table(
     osc: Oscillator, stepper: Stepper, grids: Grids, phase: int, executor: Executor = None
 ) -> tuple[Array, Array]:
-    """Return b and Q of the step from a phase to the next, in cells: shapes (nx, nv, 2) and (nx, nv, 3)."""
+    """Return b and R of the step from a phase to the next, in cells: shapes (nx, nv, 2) and (nx, nv, 3)."""
     after = (phase + 1) % grids.phases
     steps = steps_into(
         osc, stepper, grids.nodes(after).reshape(-1, 2), grids.time(phase) + grids.step, grids.step,
         grids.boxes[phase], executor,
     )  # fmt: skip
-    centres, forms = in_cells(grids, phase, steps)
-    return centres.reshape(*grids.cells, 2), forms.reshape(*grids.cells, 3)
+    centres, roots = in_cells(grids, phase, steps)
+    return centres.reshape(*grids.cells, 2), roots.reshape(*grids.cells, 3)
 
 
 def against(osc: Oscillator, stepper: Stepper, grids: Grids, phase: int) -> Array:
@@ -147,19 +161,17 @@ def against(osc: Oscillator, stepper: Stepper, grids: Grids, phase: int) -> Arra
 
 
 def in_cells(grids: Grids, phase: int, steps: Steps) -> tuple[Array, Array]:
-    """Return b (count, 2) and Q (count, 3: ss, st, tt) in cells of the grid at the start of the step."""
+    """Return b (count, 2) and R (count, 3: ss, st, tt) in cells of the grid at the start of the step."""
     wide, high = grids.spacing(phase)
-    scale = np.array([wide * wide, wide * high, high * high])
-    forms = np.stack([steps.forms[:, 0, 0], steps.forms[:, 0, 1], steps.forms[:, 1, 1]], axis=1) * scale
-    return grids.places(phase, steps.centres), forms
+    centres = grids.places(phase, steps.centres)
+    centres[np.isnan(steps.roots).any(axis=1)] = np.nan
+    return centres, steps.roots * np.array([wide, high, high])
 
 
-def step_cost(miss: Array, forms: Array) -> Array:
-    """Return ½ (x − b)ᵀ Q (x − b) for x − b of shape (…, 2) and Q as `in_cells` has them, shape (…, 3)."""
-    cost: Array = (
-        0.5 * (forms[..., 0] * miss[..., 0] ** 2 + forms[..., 2] * miss[..., 1] ** 2)
-        + forms[..., 1] * miss[..., 0] * miss[..., 1]
-    )
+def step_cost(miss: Array, roots: Array) -> Array:
+    """Return ½ |R (x − b)|² for x − b of shape (…, 2) and R as `in_cells` has them, shape (…, 3)."""
+    first = roots[..., 0] * miss[..., 0] + roots[..., 1] * miss[..., 1]
+    cost: Array = 0.5 * (first**2 + (roots[..., 2] * miss[..., 1]) ** 2)
     return cost
 
 

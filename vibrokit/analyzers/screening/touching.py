@@ -101,9 +101,9 @@ class Touching(Way):
         grids = potential.grids
         states = np.column_stack([np.full(len(speeds), self.wall), speeds])
         ended = (states, grids.time(phase) + step, step, grids.boxes[phase])
-        centres, forms = in_cells(grids, phase, steps_into(self.osc, self.stepper, *ended))
+        centres, roots = in_cells(grids, phase, steps_into(self.osc, self.stepper, *ended))
         against = grids.places(phase, uphill(self.osc, self.stepper, *ended))
-        return descend_all(potential.values[phase], np.stack([centres, against], axis=1), centres, forms, 1.0)
+        return descend_all(potential.values[phase], np.stack([centres, against], axis=1), centres, roots, 1.0)
 
 
 def ways_to_touch(osc: Oscillator, attractor: Attractor, walls: Iterable[float], stepper: Stepper) -> list[Way]:
