@@ -10,6 +10,7 @@ from vibrokit.results.energy import ActivationEnergy
 
 _GRAPH = "graph"
 _BRACKET = "least action (bracket)"
+_VAGUE = 0.5  # of a path's action: a greater error of the graph says nothing of it
 
 
 def least_of(branches: tuple[ActivationEnergy, ...]) -> dict[int, ActivationEnergy]:
@@ -93,6 +94,11 @@ def _compared(attractor: Attractor, path: ActivationEnergy, graph: ActivationEne
     if graph.lower > path.value:
         return (
             f"the graph has {_priced(graph)}, more than the {path.value:.6g} of the path: its grid is too coarse here."
+        )
+    if graph.upper - graph.value > _VAGUE * path.value:
+        return (
+            f"the graph has {_priced(graph)}, and its grid is too coarse here to say more of the {path.value:.6g} of the "
+            "path polished."
         )
     return f"the graph has {_priced(graph)}, and the path polished {path.value:.6g}: they agree."
 

@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
+
 from vibrokit.analyzers.exits import Exit
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
@@ -80,7 +82,8 @@ def checked_sources(
 def stepper_for(osc: Oscillator, attractor: Attractor, flow: Flow, stepper: Stepper | None) -> Stepper:
     """Return the stepper given, or the default one for ensembles, with finer steps until it has the attractor's orbit.
 
-    Steps across a contact that all but grazes can be too coarse for an orbit that located contacts show.
+    Steps across a contact that is short or all but grazes can be too coarse for an orbit that located contacts show, or
+    for its stability.
     """
     if stepper is not None:
         return stepper
@@ -89,11 +92,12 @@ def stepper_for(osc: Oscillator, attractor: Attractor, flow: Flow, stepper: Step
         return chosen
     for _ in range(_FINER):
         try:
-            refine_orbit(osc, attractor.points[0], attractor.period, tried)
+            orbit = refine_orbit(osc, attractor.points[0], attractor.period, tried)
+            if np.abs(np.linalg.eigvals(orbit.monodromy)).max() < 1:
+                return tried
         except StructureError:
-            tried = tried.refined()
-        else:
-            return tried
+            pass
+        tried = tried.refined()
     return chosen
 
 
