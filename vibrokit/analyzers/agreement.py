@@ -97,8 +97,8 @@ def _compared(attractor: Attractor, path: ActivationEnergy, graph: ActivationEne
         )
     if graph.upper - graph.value > _VAGUE * path.value:
         return (
-            f"the graph has {_priced(graph)}, and its grid is too coarse here to say more of the {path.value:.6g} of the "
-            "path polished."
+            f"the graph has {_priced(graph)}, and its grid is too coarse here to say more of the {path.value:.6g} of "
+            "the path polished."
         )
     return f"the graph has {_priced(graph)}, and the path polished {path.value:.6g}: they agree."
 

@@ -37,6 +37,7 @@ _EQUAL = 1e-6  # relative difference of the actions of one path, found twice
 _SAME = 0.05  # of its extent, at samples of the path
 _ROUNDS = 4  # how often a path is ended at an earlier touch
 _WORTH = 1.25  # times the least action known
+_CHEAPER = 1e-3  # of it
 _FLAT, _ALIKE = 1e-3, 0.01
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands
 
@@ -85,20 +86,21 @@ class _Goals:
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
         return [number for number in order if distances[number] <= _NEAR * distances[order[0]]]
 
-    def solve(self, number: int, candidate: Candidate) -> _Solved:
-        """Polish a candidate towards a goal, with finer pieces if need be."""
+    def solve(self, number: int, candidate: Candidate, known: Sequence[_Solved]) -> _Solved:
+        """Polish a candidate towards a goal, with finer pieces if need be; more is tried for one that is cheaper."""
+        least = min((found.action for goal, _, found, _ in known if goal is self.goals[number]), default=np.inf)
         for pieces in _PIECES:
             try:
-                return self._solve(number, candidate, pieces)
+                return self._solve(number, candidate, pieces, (1 - _CHEAPER) * least)
             except StructureError as error:
                 failure = error
         raise failure
 
-    def _solve(self, number: int, candidate: Candidate, pieces: int) -> _Solved:
+    def _solve(self, number: int, candidate: Candidate, pieces: int, worth: float) -> _Solved:
         polisher, destination = self.prepared(number, pieces)
         carrier = polisher.carrier
         for _ in range(_ROUNDS):
-            found = polisher.polished(destination.cuts(course_of(carrier, candidate, _BEYOND)))
+            found = polisher.polished(destination.cuts(course_of(carrier, candidate, _BEYOND)), worth)
             if not found.action > 0:
                 raise StructureError(f"the path it leads to has the action {found.action:.3g}, so it does not leave.")
             path = traced(carrier, found)
@@ -163,7 +165,7 @@ def polish_all(
         if _too_dear(candidate, solved):
             left += 1
         else:
-            found, failures = _polish_one(work, candidate)
+            found, failures = _polish_one(work, candidate, solved)
             solved += [each for each in found if not any(_same(each, known) for known in solved)]
             said += [] if found else [_failed(candidate, failures)]
         if progress is not None:
@@ -189,13 +191,13 @@ def _start(attractor: Attractor, orbit: Orbit | None) -> tuple[np.ndarray, int]:
     return attractor.points[0], attractor.period
 
 
-def _polish_one(work: _Goals, candidate: Candidate) -> tuple[list[_Solved], list[str]]:
+def _polish_one(work: _Goals, candidate: Candidate, known: Sequence[_Solved]) -> tuple[list[_Solved], list[str]]:
     """What a candidate leads to: the paths, and why there are none."""
     found, failures = [], []
     try:
         for number in work.near(candidate):
             try:
-                found.append(work.solve(number, candidate))
+                found.append(work.solve(number, candidate, known))
             except StructureError as error:
                 failures.append(str(error))
     except StructureError as error:
@@ -210,7 +212,7 @@ def _the_rest(work: _Goals, candidates: Sequence[Candidate], solved: list[_Solve
     for number, goal in enumerate(work.goals):
         if candidates and goal not in reached:
             with contextlib.suppress(StructureError):
-                found.append(work.solve(number, min(candidates, key=lambda each: each.action)))
+                found.append(work.solve(number, min(candidates, key=lambda each: each.action), ()))
     return found
 
 

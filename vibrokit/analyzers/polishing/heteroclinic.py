@@ -23,6 +23,7 @@ _CLOSER, _UNCHANGED = 4, 1e-8  # tenths of that, until the action stays, relativ
 _ENOUGH = 1e-6  # the same for a path begun on its orbit, made twice as long
 _LOOKS = 24  # of Newton's method for a path that is known but for its ends
 _HELD = (8, 16, 32, 64, 128)  # section intervals on the orbit, where a path is begun on it
+_FAILURES = 3  # of those in turn, after which no longer one is tried
 MORE = 2
 """Periods of its orbits by which a certified path may be made longer."""
 _FEWEST = 2  # nodes of a path
@@ -38,13 +39,15 @@ class Polisher:
         self.carrier, self.source = carrier, source
         self._known: dict[tuple[int, int, str], Extremum | StructureError] = {}
 
-    def polished(self, cuts: Sequence[Cut]) -> Extremum:
+    def polished(self, cuts: Sequence[Cut], worth: float = np.inf) -> Extremum:
         """Polish a candidate: smoothed as a chain, relaxed to a minimum of the action, solved for by Newton's method.
 
         Parameters
         ----------
         cuts : sequence of Cut
             The candidate ended in several ways, of which the cheapest is taken once they are smoothed.
+        worth : float
+            Action below which a path that cannot be joined to its source by linear motion is begun on that.
 
         Raises
         ------
@@ -61,11 +64,13 @@ class Polisher:
             points = relaxed(carrier, first, cut.ending, chain.points, cut.last)
             begun = extremal_path(carrier, source, first, cut.ending, points, last=cut.last)
         except StructureError as error:
+            if not chain.action < worth:
+                raise
             return _left_in_time(carrier, source, first, cut, chain.points, error)
         key = source.node(first), len(begun.points), f"{begun.action:.9e}"
         if key not in self._known:
             try:
-                self._known[key] = self._followed(begun, first, cut, chain.points)
+                self._known[key] = self._followed(begun, first, cut, chain.points, worth)
             except StructureError as error:
                 self._known[key] = error
         found = self._known[key]
@@ -73,10 +78,12 @@ class Polisher:
             raise found
         return found
 
-    def _followed(self, begun: Extremum, first: int, cut: Cut, points: Array) -> Extremum:
+    def _followed(self, begun: Extremum, first: int, cut: Cut, points: Array, worth: float) -> Extremum:
         try:
             return _left_for_good(self.carrier, begun)
         except StructureError as error:
+            if not begun.action < worth:
+                raise
             return _left_in_time(self.carrier, self.source, first, cut, points, error)
 
 
@@ -97,7 +104,7 @@ def _left_in_time(
     carrier: Carrier, orbit: End, first: int, cut: Cut, points: Array, failure: StructureError
 ) -> Extremum:
     """The path that starts on the orbit itself, so long that it costs no more than a longer one; else the failure."""
-    best = None
+    best, failures = None, 0
     source, size = orbit.on_orbit(), len(orbit.states[0])
     for intervals in _HELD:
         added = intervals * carrier.pieces
@@ -110,7 +117,8 @@ def _left_in_time(
             found = _within(carrier, found, _RADIUS * extent(found))
             solved_again(carrier, found, MORE * len(source.states), 0)
         except StructureError:
-            if best is not None:
+            failures += 1
+            if best is not None or failures == _FAILURES:
                 break
             continue
         if best is not None and abs(found.action - best.action) <= _ENOUGH * best.action:

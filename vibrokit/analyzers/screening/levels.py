@@ -69,28 +69,20 @@ class Levels:
         found = [one for potential in own for one in self.follower.follow(potential, way)]
         return [one.candidate for one in different(found)]
 
-    def cost(self, way: Way, path: float) -> tuple[float, float]:
+    def cost(self, way: Way) -> tuple[float, float]:
         """Return what a way out costs, and how far this may be wrong.
 
         The error is what halving the grid changed and the difference from a path's action by Hamilton's equations; or,
         if no path was found, half of what doubling the step changed; from a set also how V rises near by.
         """
-        fine, coarse, long = self._costs(way)
+        fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
         if not np.isfinite([fine, coarse, long]).all():
             whole = way.cost(self.whole)
             return whole, whole
+        paths = self.paths(way)
         blur = way.blur(self.fine) if self.from_set else 0.0
-        by_time = _BY_PATH * abs(path - fine) if np.isfinite(path) else _BY_STEP * abs(coarse - long)
+        by_time = _BY_PATH * abs(paths[0].action - fine) if paths else _BY_STEP * abs(coarse - long)
         return fine, abs(fine - coarse) + by_time + blur
-
-    def change(self, way: Way) -> float:
-        """By how much halving the grid and doubling the step changed the cost; infinite where that is not known."""
-        fine, coarse, long = self._costs(way)
-        found = abs(fine - coarse) + _BY_STEP * abs(coarse - long)
-        return found if np.isfinite(found) else np.inf
-
-    def _costs(self, way: Way) -> tuple[float, float, float]:
-        return way.cost(self.fine), way.cost(self.coarse), way.cost(self.long)
 
 
 def levels(

@@ -100,7 +100,7 @@ def screen(
     candidates, words = [], []
     for way in sorted(ways, key=lambda way: way.cost(known[way].fine)):
         paths = known[way].paths(way)
-        cost = known[way].cost(way, paths[0].action if paths else float("nan"))
+        cost = known[way].cost(way)
         if not np.isfinite(cost).all():
             continue
         if way.saddle >= 0:
@@ -135,7 +135,7 @@ def _on_grids_of_their_own(
             closer = solved(ways, part_of(progress, turn, _TURNS))
         except StructureError:  # too near to the attractor for any grid
             break
-        ways = [way for way in ways if closer.change(way) < known[way].change(way)]
+        ways = [way for way in ways if closer.cost(way)[1] < known[way].cost(way)[1]]
         known.update(dict.fromkeys(ways, closer))
     if progress is not None:
         progress(1, 1)
