@@ -73,7 +73,8 @@ class Levels:
         """Return what a way out costs, and how far this may be wrong.
 
         The error is what halving the grid changed and the difference from a path's action by Hamilton's equations; or,
-        if no path was found, half of what doubling the step changed; from a set also how V rises near by.
+        if no path was found, half of what doubling the step changed; from a set also how V rises near by, and where no
+        saddle is known how it falls towards the boundary.
         """
         fine, coarse, long = (way.cost(potential) for potential in (self.fine, self.coarse, self.long))
         if not np.isfinite([fine, coarse, long]).all():
@@ -82,7 +83,7 @@ class Levels:
         paths = self.paths(way)
         blur = way.blur(self.fine) if self.from_set else 0.0
         by_time = _BY_PATH * abs(paths[0].action - fine) if paths else _BY_STEP * abs(coarse - long)
-        return fine, abs(fine - coarse) + by_time + blur
+        return fine, abs(fine - coarse) + by_time + blur + way.beyond(self.fine)
 
 
 def levels(

@@ -67,9 +67,17 @@ class Potential:
 
     def blur(self, phase: int, state: Array) -> float:
         """Return by how much V rises within two cells of a state, which a grid cannot tell from it."""
+        return float(self._near(phase, state, (_BLUR, _BLUR)).max() - self.at(phase, state[None])[0])
+
+    def fall(self, phase: int, state: Array, room: Array) -> float:
+        """Return by how much V is lower within some distance in x and in v of a state."""
+        wide, high = np.ceil(room / self.grids.spacing(phase)).astype(int)
+        return float(self.at(phase, state[None])[0] - self._near(phase, state, (int(wide), int(high))).min())
+
+    def _near(self, phase: int, state: Array, reach: tuple[int, int]) -> Array:
+        """V at the nodes within so many cells of a state."""
         s, t = np.rint(self.grids.places(phase, state)).astype(int)
-        near = self.values[phase][max(s - _BLUR, 0) : s + _BLUR + 1, max(t - _BLUR, 0) : t + _BLUR + 1]
-        return float(near.max() - self.at(phase, state[None])[0])
+        return self.values[phase][max(s - reach[0], 0) : s + reach[0] + 1, max(t - reach[1], 0) : t + reach[1] + 1]
 
 
 class Iteration:

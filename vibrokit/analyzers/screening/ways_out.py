@@ -20,6 +20,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.sharing import agreeing
 from vibrokit.structure.orbits import section_derivative
 
+_INSIDE = 2  # cells of the basins, from the boundary to the nearest that counts as surely inside
 _BEYOND = (1.5, 3.0)  # cells from a saddle to where paths over it are begun
 
 Array = NDArray[np.float64]
@@ -68,6 +69,10 @@ class Way(ABC):
         """Return how far the cost is uncertain where the source is a set, on the grid some cells thick; 0 if not."""
         return 0.0
 
+    def beyond(self, potential: Potential) -> float:
+        """Return by how much the cost is too high because the way out is known a little beyond the boundary only."""
+        return 0.0
+
     @abstractmethod
     def tips(self, potential: Potential) -> list[Tip]:
         """Return from where paths are followed back."""
@@ -82,10 +87,13 @@ class Places(Way):
     states : array (count, 2)
     direction : array (2,), optional
         Of the unstable manifold at the first of them.
+    room : array (2,), optional
+        How far beyond the boundary the states may lie, in x and in v; by default on it.
     """
 
     states: Array
     direction: Array | None = None
+    room: Array | None = None
 
     def cost(self, potential: Potential) -> float:
         """The least V."""
@@ -94,6 +102,12 @@ class Places(Way):
     def blur(self, potential: Potential) -> float:
         """How V rises near the cheapest state."""
         return potential.blur(0, self.states[_first(potential.at(0, self.states))])
+
+    def beyond(self, potential: Potential) -> float:
+        """How far V falls towards the boundary from the cheapest state."""
+        if self.room is None:
+            return 0.0
+        return max(0.0, potential.fall(0, self.states[_first(potential.at(0, self.states))], self.room))
 
     def tips(self, potential: Potential) -> list[Tip]:
         """The cheapest state, or some just beyond a saddle, where V no longer falls."""
@@ -116,12 +130,14 @@ def ways_to_leave(osc: Oscillator, structure: Structure, attractor: Attractor, s
             ways.append(Places(others[0], index, bound, states, _direction(osc, stepper, saddle)))
     reached = {way.target for way in ways}
     sure = np.where(agreeing(structure.basins.labels, 1), structure.basins.labels, -1).ravel()
-    centres = structure.basins.region.cell_centres(structure.basins.labels.shape)
+    region, shape = structure.basins.region, structure.basins.labels.shape
+    centres = region.cell_centres(shape)
+    room = _INSIDE * np.diff(region.bounds, axis=1)[:, 0] / shape
     for other in structure.attractors:
         if other.label != attractor.label and other.label not in reached:
             inside = np.concatenate([centres[sure == other.label], other.points[:, :2]])
             bound = straight(osc, stepper, attractor, other.points[:, :2])
-            ways.append(Places(other.label, -1, bound, inside))
+            ways.append(Places(other.label, -1, bound, inside, room=room))
     return ways
 
 
