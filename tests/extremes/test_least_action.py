@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.extremes.scenes_of_action import damped_wells, first_contact, pressed_wells, tilted_wells
+from tests.extremes.scenes_of_action import damped_wells, first_contact, paper_scene, pressed_wells, tilted_wells
+from vibrokit.analyzers.analyzer import stepper_for
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
 
 EXACT = 1e-6  # relative, of certified energies
 CERTIFIED = 1e-9  # residual
@@ -105,3 +108,14 @@ def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
     exact = exact_energies(scene, structure)
     for energy in vk.ActionGraph(cells=(120, 120)).run(scene.oscillator, structure).energies:
         assert energy.lower <= exact[energy.source] <= energy.upper
+
+
+def test_steps_are_fine_enough_for_the_stability_of_an_orbit_at_a_stiff_stop():
+    """With the default steps of ensembles, this orbit of period 6 is there, but unstable."""
+    osc = paper_scene("hertz", stiffness=1e4)
+    structure = vk.find_structure(osc, cells=(20, 20), starts=(8, 8), saddles=False, manifolds=False)
+    hammering = next(attractor for attractor in structure.attractors if attractor.impacts)
+    stepper = stepper_for(osc, hammering, Flow.STATE, None)
+    orbit = refine_orbit(osc, hammering.points[0], hammering.period, stepper)
+    sizes = np.sort(np.abs(np.linalg.eigvals(orbit.monodromy)))
+    assert sizes == pytest.approx(np.sort(np.abs(hammering.multipliers)), abs=1e-3)
