@@ -38,6 +38,7 @@ _SAME = 0.05  # of its extent, at samples of the path
 _ROUNDS = 4  # how often a path is ended at an earlier touch
 _WORTH = 1.25  # times the least action known
 _CHEAPER = 1e-3  # of it
+_TRIES = 2  # candidates for a goal that the cheaper ones do not come to
 _FLAT, _ALIKE = 1e-3, 0.01
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands
 
@@ -206,14 +207,27 @@ def _polish_one(work: _Goals, candidate: Candidate, known: Sequence[_Solved]) ->
 
 
 def _the_rest(work: _Goals, candidates: Sequence[Candidate], solved: list[_Solved]) -> list[_Solved]:
-    """Paths to goals that no candidate came to, tried from the cheapest one."""
+    """Paths to goals that no candidate came to, tried from those that come near them and from the cheapest one."""
     found: list[_Solved] = []
     reached = [each[0] for each in solved]
+    ranked = sorted(candidates, key=lambda each: each.action)
     for number, goal in enumerate(work.goals):
-        if candidates and goal not in reached:
-            with contextlib.suppress(StructureError):
-                found.append(work.solve(number, min(candidates, key=lambda each: each.action), ()))
+        if goal in reached:
+            continue
+        near = [candidate for candidate in ranked if _comes_near(work, number, candidate)]
+        for candidate in [*near[:_TRIES], *ranked[:1]]:
+            try:
+                found.append(work.solve(number, candidate, ()))
+                break
+            except StructureError:
+                continue
     return found
+
+
+def _comes_near(work: _Goals, number: int, candidate: Candidate) -> bool:
+    with contextlib.suppress(StructureError):
+        return number in work.near(candidate)
+    return False
 
 
 def _too_dear(candidate: Candidate, solved: list[_Solved]) -> bool:

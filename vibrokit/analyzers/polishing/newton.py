@@ -16,7 +16,6 @@ from vibrokit.analyzers.polishing.ends import End
 from vibrokit.errors import StructureError
 
 _LOOKS = 200  # of Newton's method
-_HOPELESS = 5.0  # misfit, relative to the path's size, of a guess that is nothing like a path
 _EXACT = 1e-13
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _LEAST_SHARE = 1e-4
@@ -189,7 +188,7 @@ class _Matching:
         """Newton's method, each step as long as the one after it would be shorter (Deuflhard's natural test)."""
         free = np.concatenate([self.ending.free(last), np.zeros(int(self.pin is not None))])
         look = self.look(points, free)
-        while looks > 0 and _EXACT < look.largest <= _HOPELESS:
+        while looks > 0 and _EXACT < look.largest < math.inf:
             try:
                 factors = scipy.sparse.linalg.splu(self.derivatives(points, free, look))
             except RuntimeError:  # singular: the path's guess is nothing like a path
