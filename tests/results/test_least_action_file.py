@@ -279,7 +279,7 @@ def test_tables_have_energies_branches_and_transitions():
     text = report.analysis("least-action", everything())
     first, *_ = [line for line in text.splitlines() if line.startswith("0 → 1")]
     assert first.split()[3:] == ["0", "9e-05", "8.9999e-05", "9.0001e-05", "1e-11", "least", "action"]
-    assert "2 → –" in text
+    assert "2 → exit" in text
     assert text.count("0 → 1 ") == 3  # the best, it among the branches, and the other branch
     assert "from \\ to" in text
     assert "No exit" not in text
