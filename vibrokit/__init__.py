@@ -1,6 +1,6 @@
 """Stochastic stability of vibro-impact oscillators.
 
-The public names below are loaded on first use, so that importing vibrokit costs next to nothing.
+The public names below are loaded on first use, so that importing vibrokit is fast.
 """
 
 from importlib import import_module
@@ -9,10 +9,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vibrokit.analyzers.action_graph import ActionGraph as ActionGraph
     from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
+    from vibrokit.analyzers.analyzer import Analysis as Analysis
     from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.exits import Exit as Exit
     from vibrokit.analyzers.exits import FirstContact as FirstContact
     from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
+    from vibrokit.analyzers.exits import LeaveRegion as LeaveRegion
+    from vibrokit.analyzers.graph.search import GraphSearch as GraphSearch
     from vibrokit.analyzers.least_action import LeastAction as LeastAction
+    from vibrokit.analyzers.problem import ExitProblem as ExitProblem
+    from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
+    from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
     from vibrokit.kernels.rk4 import RK4 as RK4
@@ -33,7 +40,14 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
+    from vibrokit.results.energy import Bound as Bound
     from vibrokit.results.files import load_result as load_result
+    from vibrokit.results.finding import Code as Code
+    from vibrokit.results.finding import Finding as Finding
+    from vibrokit.results.finding import Severity as Severity
+    from vibrokit.results.record import Record as Record
+    from vibrokit.results.result import Result as Result
     from vibrokit.results.structure import Structure as Structure
     from vibrokit.scene_file import bundled_scenes as bundled_scenes
     from vibrokit.scene_file import load_scene as load_scene
@@ -45,14 +59,21 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# The same imports once more, for use; tests/test_import.py holds the two lists together.
-_HOMES = {
+# The same imports again, for use at run time; tests/test_import.py checks that the two lists agree.
+_MODULES = {
     "ActionGraph": "vibrokit.analyzers.action_graph",
     "ActionPlot": "vibrokit.analyzers.action_plot",
+    "Analysis": "vibrokit.analyzers.analyzer",
     "Analyzer": "vibrokit.analyzers.analyzer",
+    "Exit": "vibrokit.analyzers.exits",
     "FirstContact": "vibrokit.analyzers.exits",
     "LeaveBasin": "vibrokit.analyzers.exits",
+    "LeaveRegion": "vibrokit.analyzers.exits",
+    "GraphSearch": "vibrokit.analyzers.graph.search",
     "LeastAction": "vibrokit.analyzers.least_action",
+    "ExitProblem": "vibrokit.analyzers.problem",
+    "Shooting": "vibrokit.analyzers.shooting.shooting",
+    "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",
     "Order8": "vibrokit.kernels.order8",
     "RK4": "vibrokit.kernels.rk4",
@@ -73,7 +94,15 @@ _HOMES = {
     "CustomSpring": "vibrokit.parts.spring.custom",
     "LinearSpring": "vibrokit.parts.spring.linear",
     "Spring": "vibrokit.parts.spring.spring",
+    "ActivationEnergy": "vibrokit.results.energy",
+    "Bound": "vibrokit.results.energy",
     "load_result": "vibrokit.results.files",
+    "Code": "vibrokit.results.finding",
+    "Finding": "vibrokit.results.finding",
+    "Severity": "vibrokit.results.finding",
+    "Record": "vibrokit.results.record",
+    "Result": "vibrokit.results.result",
+    "Structure": "vibrokit.results.structure",
     "bundled_scenes": "vibrokit.scene_file",
     "load_scene": "vibrokit.scene_file",
     "save_scene": "vibrokit.scene_file",
@@ -81,21 +110,20 @@ _HOMES = {
     "find_structure": "vibrokit.structure.find",
     "shape_stability": "vibrokit.structure.shocks",
     "unstable_orbits": "vibrokit.structure.unstable_orbits",
-    "Structure": "vibrokit.results.structure",
 }
 
-__all__ = list(_HOMES)
+__all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
     if name in ("errors", "testing"):
         return import_module(f"vibrokit.{name}")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'vibrokit' has no attribute {name!r}; it offers {', '.join(_HOMES)}.")
-    value = getattr(import_module(_HOMES[name]), name)
+    if name not in _MODULES:
+        raise AttributeError(f"module 'vibrokit' has no attribute {name!r}; it offers {', '.join(_MODULES)}.")
+    value = getattr(import_module(_MODULES[name]), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES, "errors", "testing"})
+    return sorted({*globals(), *_MODULES, "errors", "testing"})

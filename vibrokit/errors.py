@@ -1,34 +1,38 @@
-"""What can go wrong, as exceptions whose text is a full sentence."""
+"""Exceptions of the toolkit, and the parts of their messages. Every message is a full sentence."""
 
 from __future__ import annotations
 
 import difflib
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class VibrokitError(Exception):
-    """Root of every error that the toolkit raises on purpose."""
+    """Base class of the errors of the toolkit."""
 
 
 class ParameterError(VibrokitError, ValueError):
-    """A parameter has a value that it may not have."""
+    """A parameter has a value outside its allowed range."""
+
+
+class FormulaError(VibrokitError, ValueError):
+    """A formula given as text, or the name of a parameter in it, is not allowed."""
 
 
 class SceneError(VibrokitError, ValueError):
-    """Parts, or the text of a scene file, do not make a scene."""
+    """Parts do not fit together, or a scene file does not describe a scene."""
 
 
 class NoSectionError(SceneError):
-    """A stroboscopic section was asked of excitations without a common period."""
+    """The excitations have no common period, so there is no stroboscopic section."""
 
 
 class UnknownNameError(VibrokitError, LookupError):
-    """A name that nothing is registered under."""
+    """Nothing is registered under a name."""
 
 
 class DerivationError(VibrokitError, TypeError):
-    """A part's formula cannot be turned into equations."""
+    """Equations cannot be derived from the formula of a part."""
 
 
 class StepperError(VibrokitError, ValueError):
@@ -36,18 +40,22 @@ class StepperError(VibrokitError, ValueError):
 
 
 class StructureError(VibrokitError, ValueError):
-    """A question about attractors or basins that the scene cannot answer."""
+    """A question about attractors, basins or exits has no answer in the scene."""
+
+
+class ResultFileError(VibrokitError, ValueError):
+    """A file is not a saved result, its parts contradict one another, or a result cannot be saved."""
 
 
 class IntegrationError(VibrokitError, ArithmeticError):
-    """The integration left the finite numbers or ran out of steps.
+    """A state became infinite or NaN, or the number of steps reached its limit.
 
     Attributes
     ----------
     time : float
-        Time at which the last good state was seen.
+        Time of the last finite state (s).
     state : tuple of float
-        That state.
+        The last finite state.
     """
 
     def __init__(self, message: str, time: float, state: tuple[float, ...]) -> None:
@@ -57,10 +65,10 @@ class IntegrationError(VibrokitError, ArithmeticError):
 
 
 def shown(value: object) -> str:
-    """Return a value as one short line, whatever it is: the part of a sentence that says what was given."""
+    """Return any value as one short line for an error message."""
     try:
         text = " ".join(_SHORT.repr(value).split())
-    except Exception:  # a repr that fails, or an integer too long to be printed
+    except Exception:  # repr fails, or Python refuses to print a very long integer
         return f"an object of type {type(value).__name__}"
     return text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
 
@@ -71,9 +79,22 @@ _SHORT.maxstring = _SHORT.maxother = _LONGEST_SHOWN
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence that names the closest of the known names, or all of them."""
+    """Return the end of a sentence that names the closest known name, or lists the known names.
+
+    The last component of a path counts as a name too: ``"freqency"`` is close to ``"excitations.0.frequency"``.
+    """
     names = sorted(known)
-    close = difflib.get_close_matches(str(name)[:60], names, n=1)
+    forms = {path.rpartition(".")[2]: path for path in reversed(names)} | {path: path for path in names}
+    close = difflib.get_close_matches(str(name)[:60], forms, n=1)
     if close:
-        return f"; the nearest is {close[0]!r}."
-    return f"; there {'is' if len(names) == 1 else 'are'} {', '.join(names) or 'none'}."
+        return f"; the nearest is {forms[close[0]]!r}."
+    return f"; allowed: {listed(names)}."
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names with commas between, at most twenty of them."""
+    rest = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
+    return ", ".join(names[:_MOST_LISTED]) + rest or "none"
+
+
+_MOST_LISTED = 20

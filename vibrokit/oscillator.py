@@ -1,4 +1,4 @@
-"""Oscillator: a scene that can be looked at and integrated."""
+"""Oscillator: a scene with its equations and its integration."""
 
 from __future__ import annotations
 
@@ -36,8 +36,7 @@ Rng = int | np.random.Generator | None
 class Oscillator(Scene):
     """A vibro-impact oscillator, x″ + 2ζω_n x′ + spring(x, x′) = stops + Σ excitations + noise, per unit mass.
 
-    Takes the parts that `Scene` describes, checks them, derives the equations when they are first looked at, and
-    compiles what is integrated when it is first integrated.
+    Parameters as for `Scene`. The equations are derived on first access, and code is compiled on first integration.
 
     Examples
     --------
@@ -51,7 +50,7 @@ class Oscillator(Scene):
 
     @cached_property
     def model(self) -> Model:
-        """The derived equations; shows itself as LaTeX in a notebook."""
+        """The derived equations; displayed as LaTeX in a notebook."""
         from vibrokit.symbolic.model import Model
 
         return Model(self)
@@ -72,19 +71,19 @@ class Oscillator(Scene):
         Parameters
         ----------
         state : array_like (n,)
-            Start (x, v), extra noise states after.
+            Initial state (x, v), then extra noise states.
         periods : float, optional
-            Length in forcing periods (units of 2π/ω_n without forcing). Give this or `duration`.
+            Length in forcing periods (units of 2π/ω_n without forcing). Give either this or `duration`.
         duration : float, optional
             Length in time (s).
         samples : int
-            Points per period; per 2π/ω_n where there is none.
+            Points per period, or per 2π/ω_n without forcing.
         start_time : float
-            Time of the start (s); the phase of the forcing follows from it.
+            Initial time (s), which sets the phase of the forcing.
         stepper : Stepper, optional
-            By default the one that `vibrokit.kernels.choice` recommends for single trajectories.
+            By default the choice of `vibrokit.kernels.choice` for single trajectories.
         rng : int or numpy.random.Generator, optional
-            Seed of the noise. Without it the trajectory is free of noise.
+            Seed of the noise. By default the trajectory is noise-free.
 
         Returns
         -------
@@ -93,7 +92,7 @@ class Oscillator(Scene):
         Raises
         ------
         IntegrationError
-            The numbers ran out of range; it says when, and from which state.
+            The state became infinite or NaN; the error has the time and the last finite state.
         """
         from vibrokit.kernels.choice import single_stepper
         from vibrokit.kernels.single import record
@@ -109,8 +108,8 @@ class Oscillator(Scene):
         if len(path) <= count:
             last = tuple(float(value) for value in path[-1])
             raise IntegrationError(
-                f"the trajectory ran out of range between t = {times[len(path) - 1]:g} and {times[len(path)]:g}; its "
-                f"last good state is {last}. Look at the signs of the forces, or take a finer stepper than {chosen}.",
+                f"the trajectory diverged between t = {times[len(path) - 1]:g} and {times[len(path)]:g}, after the "
+                f"state {last}; {_advice(chosen)}",
                 float(times[len(path) - 1]),
                 last,
             )
@@ -125,19 +124,19 @@ class Oscillator(Scene):
         rng: Rng = None,
         executor: concurrent.futures.Executor | None = None,
     ) -> Array:
-        """Map states from the section (t = 0) to the section some periods later.
+        """Map states on the section t = 0 to states on the section some periods later.
 
         Parameters
         ----------
         states : array_like (count, n)
         periods : int
-            Forcing periods; units of 2π/ω_n for a scene without forcing.
+            Number of forcing periods, or of units of 2π/ω_n without forcing.
         stepper : Stepper, optional
-            By default the one that `vibrokit.kernels.choice` recommends for ensembles.
+            By default the choice of `vibrokit.kernels.choice` for ensembles.
         rng : int or numpy.random.Generator, optional
-            Seed of the noise. Without it the map is free of noise.
+            Seed of the noise. By default the map is noise-free.
         executor : concurrent.futures.Executor, optional
-            Carries blocks of work; threads by default.
+            Runs blocks of trajectories; threads by default.
 
         Returns
         -------
@@ -148,14 +147,14 @@ class Oscillator(Scene):
         NoSectionError
             The excitations have no common period.
         IntegrationError
-            A trajectory ran out of range; it says which, when, and from which state.
+            A state became infinite or NaN; the error has the trajectory, the time and the last finite state.
         """
         from vibrokit.kernels.choice import ensemble_stepper
         from vibrokit.kernels.ensemble import run_ensemble
 
         starts = self._checked_states(states, 2)
         if isinstance(periods, bool) or not isinstance(periods, Integral) or periods < 0:
-            raise ParameterError(f"section_map: periods is {shown(periods)}; give a whole number, 0 or more.")
+            raise ParameterError(f"section_map: periods must be a whole number, at least 0, got {shown(periods)}.")
         flow = Flow.STATE if rng is None else self._noisy()
         chosen = stepper or ensemble_stepper(self, flow)
         stream = None if rng is None else (seed_from(rng), 0)
@@ -166,20 +165,21 @@ class Oscillator(Scene):
             time = float(ended.intervals[first] * self.section_interval)
             last = tuple(float(value) for value in ended.states[first])
             raise IntegrationError(
-                f"{failed.size} of {len(starts)} trajectories ran out of range; the first, number {first} from "
-                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, where its state was {last}. Look "
-                f"at the signs of the forces, or take a finer stepper than {chosen}.",
+                f"{failed.size} of {len(starts)} trajectories diverged; the first, number {first} from "
+                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, after the state {last}; "
+                f"{_advice(chosen)}",
                 time,
                 last,
             )
         return ended.states
 
     def error_estimate(self, states: ArrayLike, periods: int = 1, *, stepper: Stepper | None = None) -> Array:
-        """Estimate the error of `section_map` for each state: the distance to the result of the next finer stepper.
+        """Estimate the error of `section_map` for each state by comparison with the next finer stepper.
 
         Returns
         -------
         array (count,)
+            Distance between the two results.
         """
         from vibrokit.kernels.choice import ensemble_stepper
 
@@ -190,7 +190,7 @@ class Oscillator(Scene):
 
     def _noisy(self) -> Flow:
         if self.noise is None:
-            raise SceneError("rng was given but the scene has no noise; give the scene a noise model, or no rng.")
+            raise SceneError("rng was given, but the scene has no noise; add a noise model or omit rng.")
         return Flow.NOISY
 
     def _checked_states(self, states: ArrayLike, dimensions: int) -> Array:
@@ -199,22 +199,22 @@ class Oscillator(Scene):
             checked = np.atleast_2d(np.asarray(states, dtype=float))
         except (TypeError, ValueError, OverflowError) as error:
             raise ParameterError(
-                f"states are not numbers ({error}); give (x, v), or an array of shape (count, {size})."
+                f"states must be an array of numbers of shape (count, {size}), or one state: {error}."
             ) from error
         if checked.ndim != 2 or checked.shape[1] != size or (dimensions == 1 and len(checked) != 1):
             wanted = f"{size} numbers" if dimensions == 1 else f"an array of shape (count, {size})"
-            raise ParameterError(f"states have shape {np.shape(states)}; give {wanted}.")
+            raise ParameterError(f"states must be {wanted}, got the shape {np.shape(states)}.")
         if not np.isfinite(checked).all():
             row = checked[~np.isfinite(checked).all(axis=1)][0]
-            raise ParameterError(f"a state is {tuple(row.tolist())}, which is not finite; give finite numbers.")
+            raise ParameterError(f"states must be finite, got {tuple(row.tolist())}.")
         return checked
 
     def _sampling(self, periods: float | None, duration: float | None, samples: int) -> tuple[float, int]:
-        """Length of a trajectory (s) and number of samples after its start."""
+        """Length of a trajectory (s), and number of samples after the initial one."""
         if (periods is None) == (duration is None):
-            raise ParameterError("trajectory: give periods or duration, one of them.")
+            raise ParameterError("trajectory: give either periods or duration.")
         if isinstance(samples, bool) or not isinstance(samples, Integral) or samples < 1:
-            raise ParameterError(f"trajectory: samples is {shown(samples)}; give a whole number, 1 or more.")
+            raise ParameterError(f"trajectory: samples must be a whole number, at least 1, got {shown(samples)}.")
         if duration is not None:
             length = _DURATION.checked("trajectory", duration)
         else:
@@ -222,8 +222,8 @@ class Oscillator(Scene):
         count = length / self.time_unit * int(samples)
         if count > _MOST_SAMPLES:
             raise ParameterError(
-                f"trajectory: it would have {count:.0f} samples, at most {_MOST_SAMPLES} are kept; make it shorter or "
-                f"take fewer samples per period than {samples}."
+                f"trajectory: at most {_MOST_SAMPLES} samples are allowed, got {count:.0f}; give a shorter length or "
+                f"fewer samples per period than {samples}."
             )
         return length, max(1, math.ceil(count - 1e-9))
 
@@ -231,22 +231,28 @@ class Oscillator(Scene):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
+def _advice(stepper: Stepper) -> str:
+    return f"check the signs of the forces, or choose a finer stepper than {stepper}."
+
+
 def seed_from(rng: int | np.random.Generator) -> int:
-    """Return the seed of a family of random streams, one for each trajectory (SPEC 7's `rng`)."""
+    """Return the seed of a family of random streams, one per trajectory (`rng` as in SPEC 7)."""
     return int(generator_from(rng).integers(2**63))
 
 
 def generator_from(rng: int | np.random.Generator) -> np.random.Generator:
-    """Return the generator of a seed, or the given one.
+    """Return the generator of a seed, or the given generator.
 
     Raises
     ------
     ParameterError
-        Neither a generator nor a whole number, 0 or more.
+        `rng` is neither a generator nor a whole number, at least 0.
     """
     try:
         if isinstance(rng, bool):
-            raise TypeError("a truth value")
+            raise TypeError("bool")
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
-        raise ParameterError(f"rng is {rng!r}; give a whole number, 0 or more, or a numpy.random.Generator.") from error
+        raise ParameterError(
+            f"rng must be a whole number, at least 0, or a numpy.random.Generator, got {shown(rng)}."
+        ) from error

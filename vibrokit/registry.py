@@ -1,8 +1,7 @@
-"""Entry points: parts and analyzers by name, the built-in ones and those of plug-ins alike."""
+"""Entry points: parts, analyzers, exits and records by name, both built-in and from plug-ins."""
 
 from __future__ import annotations
 
-import difflib
 import importlib.metadata
 import warnings
 from collections.abc import Iterable
@@ -10,7 +9,7 @@ from enum import StrEnum
 from importlib.metadata import EntryPoint
 from typing import Any, NamedTuple, TypeVar, overload
 
-from vibrokit.errors import UnknownNameError
+from vibrokit.errors import UnknownNameError, nearest
 
 BUILT_IN = "vibrokit"
 
@@ -18,17 +17,19 @@ T = TypeVar("T")
 
 
 class Group(StrEnum):
-    """Kinds of thing that a distribution may register; each value is the name of an entry-point group."""
+    """Kinds of objects that a distribution may register; each value is the name of an entry-point group."""
 
     CONTACT_LAWS = "vibrokit.contact_laws"
     SPRINGS = "vibrokit.springs"
     EXCITATIONS = "vibrokit.excitations"
     NOISE_MODELS = "vibrokit.noise_models"
     ANALYZERS = "vibrokit.analyzers"
+    EXITS = "vibrokit.exits"
+    RECORDS = "vibrokit.records"
 
     @property
     def noun(self) -> str:
-        """What one member is called in a sentence."""
+        """Singular noun for one member, for messages."""
         return self.value.removeprefix("vibrokit.").removesuffix("s").replace("_", " ")
 
 
@@ -40,9 +41,9 @@ class Registered(NamedTuple):
 
 
 def names(group: Group) -> tuple[Registered, ...]:
-    """List what is registered, without importing any of it.
+    """List the registered names without importing any class.
 
-    Of several distributions that register one name the winner is listed, and a warning says so.
+    If several distributions register one name, the one that `load` tries first is listed and a warning is issued.
 
     Parameters
     ----------
@@ -63,15 +64,15 @@ def load(group: Group, name: str, kind: type[T]) -> type[T]: ...
 def load(group: Group, name: str, kind: type = object) -> type:
     """Import the class that is registered under a name.
 
-    A plug-in that cannot be imported, or that offers something else than a subclass of `kind`, gives a
-    warning, and the next distribution that registers the name is tried.
+    If an entry point cannot be imported or is not a subclass of `kind`, a warning is issued and the next
+    distribution that registers the name is tried.
 
     Parameters
     ----------
     group : Group
     name : str
     kind : type, optional
-        Class that the loaded one must inherit from.
+        Base class that the loaded class must have.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def load(group: Group, name: str, kind: type = object) -> type:
     Raises
     ------
     UnknownNameError
-        If nothing that works is registered under `name`.
+        No working class is registered under `name`.
     """
     candidates = _candidates(group, name)
     if name not in candidates:
@@ -90,18 +91,18 @@ def load(group: Group, name: str, kind: type = object) -> type:
         return loaded
     origins = " and ".join(_origin(entry) for entry in candidates[name])
     raise UnknownNameError(
-        f"The {group.noun} {name!r} is registered by {origins} but does not load; the warning before this says why."
+        f"The {group.noun} {name!r} of {origins} cannot be loaded; the warning above gives the reason."
     )
 
 
 def load_all(group: Group, kind: type[T]) -> dict[str, type[T]]:
-    """Import everything registered in a group; what is broken gives a warning and is left out.
+    """Import every class of a group; a broken entry point is skipped with a warning.
 
     Parameters
     ----------
     group : Group
     kind : type
-        Class that the loaded ones must inherit from.
+        Base class that the loaded classes must have.
 
     Returns
     -------
@@ -116,22 +117,27 @@ def load_all(group: Group, kind: type[T]) -> dict[str, type[T]]:
     return working
 
 
+def load_attribute(place: str) -> Any:
+    """Import the object at ``module:attribute``, for a module of the toolkit in a layer above the caller."""
+    return EntryPoint(name="", value=place, group="").load()
+
+
 def name_of(group: Group, cls: type) -> str:
-    """Return the name that a class is registered under, or ``module:Class`` if it is not registered."""
+    """Return the registered name of a class, or ``module:Class`` if it is not registered."""
     place = f"{cls.__module__}:{cls.__qualname__}"
     entries = list(_entry_points(group))
     for entry in entries:
         if entry.value == place:
             return entry.name
     top = cls.__module__.partition(".")[0]
-    for entry in entries:  # a package may offer a class under a shorter path
+    for entry in entries:  # an entry point may name the class by a shorter path
         if entry.value.startswith((f"{top}.", f"{top}:")) and _first_working(group, [entry], cls) is cls:
             return entry.name
     return place
 
 
 def _entry_points(group: str) -> Iterable[EntryPoint]:
-    """Read the entry points of a group; the one place that asks the installation."""
+    """Read the entry points of a group from the installation."""
     return importlib.metadata.entry_points(group=group)
 
 
@@ -145,46 +151,44 @@ def _rank(entry: EntryPoint) -> tuple[bool, str]:
 
 
 def _candidates(group: Group, only: str | None = None) -> dict[str, list[EntryPoint]]:
-    """Entry points by name, the winner of each name first; warns where a name has several."""
+    """Entry points by name, in the order in which they are tried; warns if a name has several."""
     found: dict[str, list[EntryPoint]] = {}
     for entry in sorted(_entry_points(group), key=lambda entry: (entry.name, _rank(entry))):
         if only is None or entry.name == only:
             found.setdefault(entry.name, []).append(entry)
-    for name, (winner, *others) in found.items():
+    for name, (first, *others) in found.items():
         if others:
             warnings.warn(
-                f"The {group.noun} {name!r} is registered by {_origin(winner)} and also by "
-                f"{' and '.join(map(_origin, others))}; the one of {_origin(winner)} is used.",
+                f"The {group.noun} {name!r} is registered by {_origin(first)} and also by "
+                f"{' and '.join(map(_origin, others))}; {_origin(first)} is used.",
                 stacklevel=3,
             )
     return found
 
 
 def _first_working(group: Group, entries: list[EntryPoint], kind: type[T]) -> type[T] | None:
-    """Import entries until one is sound; warns of each that is not."""
+    """Import entries until one is a subclass of `kind`; warns about each one before it."""
     for entry in entries:
         try:
             loaded: Any = entry.load()
-        except (Exception, SystemExit) as error:  # whatever a plug-in does at import, it stops nothing
+        except (Exception, SystemExit) as error:  # a broken plug-in must not stop the others
             flaw = f"importing {entry.value} raised {type(error).__name__}: {error}"
         else:
             if isinstance(loaded, type) and issubclass(loaded, kind):
                 return loaded
-            flaw = f"{entry.value} is {loaded!r}, which is no subclass of {kind.__name__}"
+            flaw = f"{entry.value} must be a subclass of {kind.__name__}, got {loaded!r}"
         warnings.warn(
-            f"The {group.noun} {entry.name!r} of the distribution {_origin(entry)} is left out: {flaw}.",
+            f"The {group.noun} {entry.name!r} of the distribution {_origin(entry)} is skipped: {flaw}.",
             stacklevel=3,
         )
     return None
 
 
 def _unknown(group: Group, name: str) -> str:
-    known = sorted({entry.name for entry in _entry_points(group)})
+    known = {entry.name for entry in _entry_points(group)}
     if not known:
         return (
-            f"There is no {group.noun} {name!r}, as none is registered at all, not even a built-in one; "
-            f"install vibrokit (from a checkout: pip install --editable .)."
+            f"No {group.noun} is registered, not even a built-in one, so {name!r} is unknown; install vibrokit "
+            "(from a checkout: pip install --editable .)."
         )
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f" Did you mean {near[0]!r}?" if near else ""
-    return f"There is no {group.noun} {name!r}.{hint} Registered are {', '.join(known)}."
+    return f"There is no {group.noun} {name!r}{nearest(name, known)}"

@@ -1,4 +1,4 @@
-"""Scene files: TOML in, TOML out. They may come from strangers, so they are read as data and never run."""
+"""Scene files in TOML. They may come from strangers, so they are read as data and never run as code."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
 
 def bundled_scenes() -> tuple[str, ...]:
-    """Return the names of the scenes that come with the toolkit."""
+    """Return the names of the bundled scenes."""
     return tuple(sorted(path.stem for path in _BUNDLED.glob("*.toml")))
 
 
 def load_scene(source: str | os.PathLike[str]) -> Oscillator:
-    """Read a scene from a file, or a bundled one by name.
+    """Read a scene from a file, or a bundled scene by name.
 
     Parameters
     ----------
     source : str or path
-        Path of a TOML file, or a name out of `bundled_scenes`.
+        Path of a TOML file, or one of `bundled_scenes`.
 
     Returns
     -------
@@ -51,9 +51,9 @@ def load_scene(source: str | os.PathLike[str]) -> Oscillator:
     Raises
     ------
     SceneError, ParameterError
-        Not a scene: what is wrong with it, and what is allowed.
+        The file does not describe a scene.
     UnknownNameError
-        A part that is not registered, or a scene that is neither file nor bundled.
+        A part is not registered, or `source` is neither a file nor a bundled scene.
     """
     path = _find(source)
     data = _read(path)
@@ -65,15 +65,15 @@ def load_scene(source: str | os.PathLike[str]) -> Oscillator:
 
 def _find(source: str | os.PathLike[str]) -> Path:
     if not isinstance(source, str | os.PathLike):
-        raise SceneError(f"the scene is {shown(source)}; give the path of a TOML file or one of {_bundled_names()}.")
+        raise SceneError(f"the scene must be the path of a TOML file or one of {_bundled()}, got {shown(source)}.")
     path = Path(source)
     if str(source) in bundled_scenes() and not _is(path.is_file):
         return _BUNDLED / f"{source}.toml"
     if _is(path.is_dir):
-        raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled_names()}.")
+        raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled()}.")
     if not _is(path.exists):
         raise UnknownNameError(
-            f"no file and no bundled scene is called {shown(str(source))}{nearest(str(source), bundled_scenes())}"
+            f"there is no file or bundled scene {shown(str(source))}{nearest(str(source), bundled_scenes())}"
         )
     return path
 
@@ -81,11 +81,11 @@ def _find(source: str | os.PathLike[str]) -> Path:
 def _is(question: Callable[[], bool]) -> bool:
     try:
         return question()
-    except (OSError, ValueError):  # a name that no file can have
+    except (OSError, ValueError):  # not a possible file name
         return False
 
 
-def _bundled_names() -> str:
+def _bundled() -> str:
     return ", ".join(bundled_scenes())
 
 
@@ -94,29 +94,29 @@ def _read(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             content = file.read(_LARGEST_FILE + 1)
     except OSError as error:
-        raise SceneError(f"{path} cannot be read ({error.strerror}); give a TOML file that can.") from error
+        raise SceneError(f"{path} cannot be read ({error.strerror}); give a readable TOML file.") from error
     if len(content) > _LARGEST_FILE:
-        raise SceneError(f"{path} is too large for a scene; at most {_LARGEST_FILE} bytes are read.")
+        raise SceneError(f"{path} is too large for a scene; at most {_LARGEST_FILE} bytes are allowed.")
     try:
         return tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path} is no text in UTF-8 (at byte {error.start}); a scene is a TOML file.") from error
+        raise SceneError(f"{path} is not UTF-8 text (byte {error.start}); give a TOML file.") from error
     except RecursionError as error:
-        raise SceneError(f"{path} is nested too deeply; a scene has tables of numbers and text.") from error
+        raise SceneError(f"{path} is nested too deeply; give tables of numbers and text.") from error
     except ValueError as error:  # TOMLDecodeError, or an integer too long for Python
-        raise SceneError(f"{path} is no TOML: {' '.join(str(error).split())}.") from error
+        raise SceneError(f"{path} is not valid TOML: {' '.join(str(error).split())}.") from error
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene to a TOML file, whole or not at all.
+    """Write a scene to a TOML file. Writing is atomic.
 
     Raises
     ------
     SceneError
-        A part is of a class that is not registered, so that no file could name it; or the file cannot be written.
+        The class of a part is not registered, so the file cannot name it; or the file cannot be written.
     """
     if not isinstance(scene, Scene):
-        raise SceneError(f"save_scene: {shown(scene)} is no scene; give an Oscillator.")
+        raise SceneError(f"save_scene: scene must be an Oscillator, got {shown(scene)}.")
     data = scene_data(scene)
     for kind, values in _named_parts(data):
         if ":" in values["name"]:
@@ -127,13 +127,11 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     try:
         write_atomically(Path(path), _toml(data).encode("utf-8"))
     except OSError as error:
-        raise SceneError(
-            f"{path} cannot be written ({error.strerror}); give a path in a folder that can be."
-        ) from error
+        raise SceneError(f"{path} cannot be written ({error.strerror}); give a path in a writable folder.") from error
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:
-    """Return a scene as plain data, as a scene file has it. A class that is not registered is named module:Class."""
+    """Return a scene as the plain data of a scene file. A class that is not registered is named module:Class."""
     data: dict[str, Any] = {"natural_frequency": scene.natural_frequency, "damping_ratio": scene.damping_ratio}
     if scene.spring is not None:
         data["spring"] = _part_data(Group.SPRINGS, scene.spring)
@@ -163,7 +161,7 @@ def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
 
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
-    """Make an oscillator from plain data, checking all of it."""
+    """Return a checked oscillator from plain data."""
     _check_keys("scene", data, _KEYS, required=_KEYS[:2])
     spring, noise = data.get("spring"), data.get("noise")
     return Oscillator(
@@ -182,9 +180,9 @@ def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
 def _listed(key: str, data: Mapping[str, Any]) -> list[Any]:
     values = data.get(key, [])
     if not isinstance(values, list):
-        raise SceneError(f"scene: {key} is {shown(values)}, no list; write a table [[{key}]] for each.")
+        raise SceneError(f"scene: {key} must be a list of tables [[{key}]], got {shown(values)}.")
     if len(values) > _MOST_PARTS:
-        raise SceneError(f"scene: {key} has {len(values)} entries; at most {_MOST_PARTS} are allowed.")
+        raise SceneError(f"scene: at most {_MOST_PARTS} entries of {key} are allowed, got {len(values)}.")
     return values
 
 
@@ -196,9 +194,9 @@ def _barrier(place: str, data: Any) -> Barrier:
 
 def _part(place: str, group: Group, kind: type, data: Any) -> Any:
     if not isinstance(data, dict) or not isinstance(data.get("name"), str):
-        raise SceneError(f"{place} is {shown(data)}; write a table with the part's name and its parameters.")
+        raise SceneError(f"{place} must be a table with the name of the part and its parameters, got {shown(data)}.")
     if len(data["name"]) > _LONGEST_NAME:
-        raise SceneError(f"{place} has the name {shown(data['name'])}; a name has at most {_LONGEST_NAME} characters.")
+        raise SceneError(f"{place}: name may have at most {_LONGEST_NAME} characters, got {shown(data['name'])}.")
     part: type = load(group, data["name"], kind)
     values = {key: value for key, value in data.items() if key != "name"}
     accepted = inspect.signature(part).parameters.values()
@@ -210,7 +208,7 @@ def _part(place: str, group: Group, kind: type, data: Any) -> Any:
 
 
 def _made(place: str, make: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
-    """Make a part; what is wrong with it is said with its place in the file."""
+    """Make a part; prefix its errors with its place in the file."""
     try:
         return make(*arguments, **values)
     except VibrokitError as error:
@@ -219,13 +217,13 @@ def _made(place: str, make: Callable[..., Any], *arguments: Any, **values: Any) 
 
 def _check_keys(place: str, data: Any, known: Any, required: Any) -> None:
     if not isinstance(data, Mapping):
-        raise SceneError(f"{place} is {shown(data)}, no table; it has {', '.join(known)}.")
+        raise SceneError(f"{place} must be a table with {', '.join(known)}, got {shown(data)}.")
     for key in data:
         if key not in known:
             raise SceneError(f"{place} has an unknown entry {shown(key)}{nearest(key, known)}")
     for key in required:
         if key not in data:
-            raise SceneError(f"{place} lacks {key}; it needs {', '.join(required)}.")
+            raise SceneError(f"{place} has no entry {key}; it needs {', '.join(required)}.")
 
 
 def _toml(data: Mapping[str, Any]) -> str:

@@ -1,111 +1,84 @@
-"""Agreement: what polished paths and the graph say of the same exits, put together."""
+"""Agreement: polished paths and the graph's estimates combined into energies with bounds."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Sequence
 
-from vibrokit.analyzers.screening.screen import Screen
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
 
-_GRAPH = "graph"
-_BRACKET = "least action (bracket)"
-_VAGUE = 0.5  # of a path's action: a greater error of the graph says nothing of it
-
-
-def least_of(branches: tuple[ActivationEnergy, ...]) -> dict[int, ActivationEnergy]:
-    """Return the least action to each target; branches come the cheapest first."""
-    found: dict[int, ActivationEnergy] = {}
-    for branch in branches:
-        found.setdefault(branch.target, branch)
-    return found
+_VAGUE = 0.5  # of a path's action: with a larger error the graph cannot exclude a path of half the action
 
 
-def energies_of(found: Screen) -> dict[int, ActivationEnergy]:
-    """Return what the graph has for each target."""
-    return {
-        target: ActivationEnergy(
-            source=found.source,
-            target=target,
-            value=value,
-            lower=max(0.0, value - error),
-            upper=value + error,
-            method=_GRAPH,
-            residual=float("nan"),
-            saddle=found.saddles[target],
-        )
-        for target, (value, error) in found.targets.items()
-    }
+def combined(
+    attractor: Attractor, branches: Sequence[ActivationEnergy], estimates: Iterable[ActivationEnergy]
+) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+    """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
+    The upper bound is the action of the best path and its numerical error. The lower bound rests on the graph, which
+    searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
+    graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
+    excludes a cheaper path, and the lower bound is 0.
 
-def agreed(
-    attractor: Attractor, polished: dict[int, ActivationEnergy], screened: dict[int, ActivationEnergy]
-) -> tuple[list[ActivationEnergy], list[str]]:
-    """Put polished paths and the graph together, target by target.
-
-    A polished path bounds the least action from above; the graph, which no shot can miss, says whether a cheaper one is
-    to be expected. Where the graph is cheaper by more than its error, the energy's lower bound is the graph's.
+    Parameters
+    ----------
+    attractor : Attractor
+    branches : sequence of ActivationEnergy
+        Polished paths, the cheapest first.
+    estimates : iterable of ActivationEnergy
+        The graph's, one for each target.
 
     Returns
     -------
-    energies : list of ActivationEnergy
-    words : list of str
-        One sentence for each target.
+    energies : tuple of ActivationEnergy
+        One for each target.
+    findings : tuple of Finding
+        One for each target.
     """
-    energies, words = [], []
-    for target in sorted({*polished, *screened}, key=lambda key: (key < 0, key)):
-        path, graph = polished.get(target), screened.get(target)
-        if path is None and graph is not None:
-            energies.append(graph)
-            words.append(
-                f"{_from(attractor, target)} no path was polished; the graph's {_priced(graph)} is all there is."
-            )
-        elif path is not None and graph is not None:
-            energies.append(_bounded(path, graph) if attractor.is_fixed else _bracket(path, graph))
-            words.append(f"{_from(attractor, target)} {_compared(attractor, path, graph)}")
-        elif path is not None:
-            energies.append(path)
-    return energies, words
+    paths: dict[int, ActivationEnergy] = {}
+    for branch in branches:
+        paths.setdefault(branch.target, branch)
+    graph = {estimate.target: estimate for estimate in estimates}
+    pairs = [
+        _of_target(attractor, paths.get(target), graph.get(target))
+        for target in sorted({*paths, *graph}, key=lambda target: (target < 0, target))
+    ]
+    return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
 
 
-def _bounded(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnergy:
-    return dataclasses.replace(path, lower=min(path.lower, graph.lower)) if graph.upper < path.value else path
+def _of_target(
+    attractor: Attractor, path: ActivationEnergy | None, graph: ActivationEnergy | None
+) -> tuple[ActivationEnergy, Finding]:
+    if path is None:
+        assert graph is not None
+        code, energy = Code.NO_POLISHED_PATH, graph
+    elif graph is None:
+        code, energy = Code.NOT_SEARCHED, path
+    elif not attractor.is_fixed:
+        code, energy = Code.BRACKET, _bracket(path, graph)
+    else:
+        code, energy = _compared(path, graph)
+    values = {} if graph is None else {"graph": graph.value, "error": graph.numerical_error}
+    values |= {} if path is None else {"path": path.value}
+    return energy, Finding(code, attractor.label, energy.target, values)
+
+
+def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, ActivationEnergy]:
+    """The path's energy with the lower bound that the graph supports, and how the two compare."""
+    difference = abs(graph.value - path.value)
+    if difference > graph.numerical_error:
+        code = Code.CHEAPER_PATH_EXPECTED if graph.value < path.value else Code.GRAPH_TOO_COARSE
+        lower = min(path.value, graph.value) - difference
+    else:
+        code = Code.GRAPH_TOO_COARSE if graph.numerical_error > _VAGUE * path.value else Code.AGREEMENT
+        lower = min(path.value - path.numerical_error, graph.value - graph.numerical_error)
+    bound = Bound.CERTIFIED if code is Code.AGREEMENT else Bound.UPPER
+    return code, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
 
 
 def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnergy:
-    """From a set, of whose orbits a few only were tried: the path above, the graph below."""
-    return dataclasses.replace(
-        path,
-        value=min(path.value, graph.value),
-        lower=min(path.lower, graph.lower),
-        upper=path.upper,
-        method=_BRACKET,
-    )
-
-
-def _compared(attractor: Attractor, path: ActivationEnergy, graph: ActivationEnergy) -> str:
-    if not attractor.is_fixed:
-        return f"a path from an orbit inside costs {path.value:.6g}, and the graph has {_priced(graph)}: a bracket."
-    if graph.upper < path.value:
-        return (
-            f"the graph has {_priced(graph)}, less than the {path.value:.6g} of the best path polished: there is a "
-            "cheaper way out that was not polished; take more cells, or more points of the action plot."
-        )
-    if graph.lower > path.value:
-        return (
-            f"the graph has {_priced(graph)}, more than the {path.value:.6g} of the path: its grid is too coarse here."
-        )
-    if graph.upper - graph.value > _VAGUE * path.value:
-        return (
-            f"the graph has {_priced(graph)}, and its grid is too coarse here to say more of the {path.value:.6g} of "
-            "the path polished."
-        )
-    return f"the graph has {_priced(graph)}, and the path polished {path.value:.6g}: they agree."
-
-
-def _from(attractor: Attractor, target: int) -> str:
-    return f"From {attractor.label} to {target if target >= 0 else 'the exit'}:"
-
-
-def _priced(graph: ActivationEnergy) -> str:
-    return f"{graph.value:.4g} ± {graph.upper - graph.value:.1g}"
+    """Between the graph and a path from an orbit inside a set: only a few of its orbits were tried."""
+    value, lower = min(path.value, graph.value), min(path.value - path.numerical_error, graph.lower)
+    return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=Bound.BRACKET)

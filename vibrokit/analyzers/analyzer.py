@@ -1,135 +1,187 @@
-"""Analyzer: a way to find activation energies."""
+"""Analyzer: a method that answers how attractors are left."""
 
 from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeVar
+from typing import Any, ClassVar, dataclass_transform
 
-import numpy as np
+import xarray
 
-from vibrokit.analyzers.exits import Exit
-from vibrokit.errors import SceneError, StructureError, shown
-from vibrokit.kernels.choice import ensemble_stepper
-from vibrokit.kernels.ensemble import Progress
+from vibrokit.analyzers.exits import Exit, LeaveBasin
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.settings import settings_of
+from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
-from vibrokit.structure.orbits import refine_orbit
+from vibrokit.scene_file import scene_data
 from vibrokit.structure.request import check_belongs, check_means
-from vibrokit.symbolic.flow_kind import Flow
 
-_FINER = 5
-
-Found = TypeVar("Found")
+_WEAK = 3.0  # ΔU/D: below, exp(ΔU/D) varies no faster than the prefactor, and escape is no rare event
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
+class Analysis:
+    """What a method found about one attractor.
+
+    Attributes
+    ----------
+    estimates : tuple of ActivationEnergy
+        The best one of each exit.
+    data : xarray.Dataset
+        Arrays behind the numbers, without a dimension ``source``: those of all attractors are joined along one.
+    findings : tuple of Finding
+    branches : tuple of ActivationEnergy
+        All exit paths that were found, also those that are not the best; the cheapest first.
+    complete : bool
+        False if the work was stopped before its end.
+    """
+
+    estimates: tuple[ActivationEnergy, ...] = ()
+    data: xarray.Dataset = dataclasses.field(default_factory=xarray.Dataset)
+    findings: tuple[Finding, ...] = ()
+    branches: tuple[ActivationEnergy, ...] = ()
+    complete: bool = True
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,))
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Analyzer(ABC):
-    """One method behind a common face: configuration in the fields, no hidden state. Abstract.
+    """A method with its configuration in its fields and no hidden state. Abstract.
+
+    A subclass becomes a frozen dataclass by itself; no decorator is needed.
+
+    Parameters
+    ----------
+    source : int or str, optional
+        Label or name of the attractor to leave; by default each in turn.
+    exit : Exit
+        What counts as leaving.
+    stepper : Stepper, optional
+        By default each method chooses its own.
 
     For developers
     --------------
-    Write `run`, return a `Result`, and register the class under the entry-point group ``vibrokit.analyzers``: then
-    ``vibrokit run SCENE --analyzer NAME`` knows it.
+    Write `analyze`, and register the class under the entry-point group ``vibrokit.analyzers``: then ``vibrokit run
+    SCENE --analyzer NAME`` runs it, and its results are saved, opened and drawn. A method with its own picture names a
+    subclass of `Result` as its `result`.
     """
 
+    result: ClassVar[type[Result]] = Result
+
+    source: int | str | None = None
+    exit: Exit = dataclasses.field(default_factory=LeaveBasin)
+    stepper: Stepper | None = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
     @abstractmethod
-    def run(self, osc: Oscillator, structure: Structure, *, progress: Progress | None = None) -> Result:
+    def analyze(self, problem: ExitProblem) -> Analysis:
+        """Analyze how one attractor is left.
+
+        Raises
+        ------
+        StructureError
+            The method cannot be used for this attractor; the others are analyzed all the same.
+        """
+
+    def run(
+        self,
+        osc: Oscillator,
+        structure: Structure,
+        *,
+        progress: Progress = None,
+        time_limit: float | None = None,
+    ) -> Result:
         """Analyze a scene whose structure is known.
+
+        On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete.
 
         Parameters
         ----------
         osc : Oscillator
         structure : Structure
-        progress : callable, optional
-            Called with (work done, work in all).
+            What `find_structure` returned for this oscillator.
+        progress : bool or callable, optional
+            True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
+        time_limit : float, optional
+            In seconds.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        SceneError
+            The scene has no noise.
+        StructureError
+            The structure is that of another scene, the scene has no such exit, or the source is unknown.
         """
+        sources = self._checked(osc, structure)
+        analyses: dict[int, Analysis] = {}
+        findings: list[Finding] = []
+        with working(progress, time_limit) as work:
+            try:
+                for attractor in sources:
+                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper)
+                    with stage(type(self).__name__, subject=attractor.name):
+                        analyses[attractor.label] = self._analyzed(problem)
+                    if not analyses[attractor.label].complete:
+                        break
+            except KeyboardInterrupt as stopped:
+                findings.append(Finding.stopped(type(self).__name__, stopped, attractor.label))
+            return self.result.assembled(
+                structure,
+                estimates={label: one.estimates for label, one in analyses.items()},
+                branches={label: one.branches for label, one in analyses.items()},
+                data={label: one.data for label, one in analyses.items()},
+                findings=(
+                    *(finding for one in analyses.values() for finding in one.findings),
+                    *_strength(osc, analyses),
+                    *findings,
+                ),
+                scene=scene_data(osc),
+                settings=settings_of(self),
+                stats=work.stats,
+                complete=not findings and all(one.complete for one in analyses.values()),
+                seconds=work.seconds,
+            )
 
+    def _checked(self, osc: Oscillator, structure: Structure) -> tuple[Attractor, ...]:
+        """Check what a run is given, before any work is done, and return the attractors to leave."""
+        check_means(osc, self.stepper, None)
+        check_belongs(osc, structure)
+        if osc.noise is None:
+            raise SceneError("the scene has no noise, so nothing leaves an attractor; give it a noise model.")
+        if not isinstance(self.exit, Exit):
+            raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
+        self.exit.check(osc, structure)
+        return structure.attractors if self.source is None else (structure.attractor(self.source),)
 
-def checked_sources(
-    osc: Oscillator,
-    structure: Structure,
-    exit: Any,  # noqa: A002 - the word of all analyzers
-    source: int | None,
-    stepper: Any,
-    progress: Any,
-) -> tuple[Attractor, ...]:
-    """Check what every search for exits is given, before any work is done, and return the attractors to leave.
-
-    Raises
-    ------
-    SceneError
-        The scene has no noise.
-    StructureError
-        The structure is of another scene, the exit cannot be asked for in it, or the source is unknown.
-    """
-    check_means(osc, stepper, None, progress)
-    check_belongs(osc, structure)
-    if osc.noise is None:
-        raise SceneError("the scene has no noise, and nothing leaves an attractor without; give it a noise model.")
-    if not isinstance(exit, Exit):
-        raise StructureError(f"exit is {shown(exit)}, which is none; give LeaveBasin() or FirstContact().")
-    exit.check(osc, structure)
-    if isinstance(source, bool):
-        raise StructureError(f"source is {source}; give the label of an attractor, or None for each in turn.")
-    return structure.attractors if source is None else (structure.attractor(source),)
-
-
-def stepper_for(osc: Oscillator, attractor: Attractor, flow: Flow, stepper: Stepper | None) -> Stepper:
-    """Return the stepper given, or the default one for ensembles, with finer steps until it has the attractor's orbit.
-
-    Steps across a contact that is short or all but grazes can be too coarse for an orbit that located contacts show, or
-    for its stability.
-    """
-    if stepper is not None:
-        return stepper
-    chosen = tried = ensemble_stepper(osc, flow)
-    if not attractor.is_fixed:
-        return chosen
-    for _ in range(_FINER):
+    def _analyzed(self, problem: ExitProblem) -> Analysis:
+        """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""
         try:
-            orbit = refine_orbit(osc, attractor.points[0], attractor.period, tried)
-            if np.abs(np.linalg.eigvals(orbit.monodromy)).max() < 1:
-                return tried
-        except StructureError:
-            pass
-        tried = tried.refined()
-    return chosen
+            return self.analyze(problem)
+        except (StructureError, StepperError) as error:
+            failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
+            return Analysis(findings=(failed,))
 
 
-def part_of(progress: Progress | None, number: int, count: int) -> Progress | None:
-    """Progress of one of several pieces of work that count alike."""
-    if progress is None:
-        return None
-    grain = 1000
-    return lambda done, total: progress(number * grain + grain * done // max(1, total), count * grain)
-
-
-def each_searched(
-    sources: Sequence[Attractor],
-    search: Callable[[Attractor, Progress | None], Found],
-    words: list[str],
-    progress: Progress | None,
-) -> Iterator[tuple[Attractor, Found]]:
-    """Search from each attractor in turn; of those that cannot be searched from, the reason is added to the words."""
-    for number, attractor in enumerate(sources):
-        try:
-            found = search(attractor, part_of(progress, number, len(sources)))
-        except StructureError as error:
-            words.append(f"Attractor {attractor.label} was left out: {error}")
-        else:
-            yield attractor, found
-
-
-def plain_settings(analyzer: Any) -> dict[str, Any]:
-    """Return the configuration of an analyzer as plain data."""
-    return {
-        field.name: value
-        if isinstance(value := getattr(analyzer, field.name), int | float | str | None)
-        else repr(value)
-        for field in dataclasses.fields(analyzer)
-    }
+def _strength(osc: Oscillator, analyses: dict[int, Analysis]) -> list[Finding]:
+    """Findings where the noise of the scene is not weak against an energy."""
+    intensity = osc.noise.intensity if osc.noise else 0.0
+    energies = [energy for one in analyses.values() for energy in one.estimates]
+    return [
+        Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=_WEAK)
+        for e in energies
+        if 0 < e.value < _WEAK * intensity
+    ]

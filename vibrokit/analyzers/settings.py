@@ -1,85 +1,159 @@
-"""Settings of analyzers as text, as the command line has them."""
+"""Settings of analyzers: as plain data that files carry, and as text on the command line."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from vibrokit.analyzers.analyzer import Analyzer
-from vibrokit.errors import SceneError, UnknownNameError, nearest
+from vibrokit.analyzers.exits import Exit
+from vibrokit.errors import SceneError, StructureError, UnknownNameError, nearest, shown
+from vibrokit.kernels.named import name_of as stepper_name
+from vibrokit.kernels.named import named_stepper
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.registry import Group, load, name_of
 
-_NOTHING = "none"
+if TYPE_CHECKING:
+    from vibrokit.analyzers.analyzer import Analyzer
+
+_NONE = "none"
 
 
-def setting(text: str) -> tuple[str, Any]:
-    """Read a setting from its text: ``points=40000``, ``graph.cells=240,240``, ``plot=none``.
+def settings_of(analyzer: Analyzer) -> dict[str, Any]:
+    """Return the configuration of an analyzer as plain data, from which `analyzer_from` builds it again."""
+    return {"analyzer": name_of(Group.ANALYZERS, type(analyzer)), **_fields_as_data(analyzer)}
+
+
+def _fields_as_data(configuration: Any) -> dict[str, Any]:
+    return {field.name: _as_data(getattr(configuration, field.name)) for field in dataclasses.fields(configuration)}
+
+
+def _as_data(value: Any) -> Any:
+    if isinstance(value, Stepper):
+        return stepper_name(value)
+    if isinstance(value, Exit):
+        return {"name": name_of(Group.EXITS, type(value)), **_fields_as_data(value)}
+    if dataclasses.is_dataclass(value):
+        return _fields_as_data(value)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def analyzer_from(settings: Mapping[str, Any]) -> Analyzer:
+    """Build the analyzer whose settings a result carries.
 
     Raises
     ------
-    SceneError
-        It is not a name and a number, or numbers.
+    UnknownNameError
+        The analyzer or its exit is not registered, or has no such setting.
+    StructureError
+        A setting has a value that is not allowed.
     """
-    name, _, value = text.partition("=")
-    try:
-        numbers = tuple(_number(word) for word in value.split(",")) if value != _NOTHING else (None,)
-    except ValueError:
-        raise SceneError(
-            f"setting {text!r}: write FIELD=NUMBER, such as points=40000, FIELD=NUMBER,NUMBER, such as "
-            "graph.cells=240,240, or FIELD=none."
-        ) from None
-    return name, numbers[0] if len(numbers) == 1 else numbers
+    from vibrokit.analyzers.analyzer import Analyzer
 
-
-def _number(word: str) -> int | float:
-    return int(word) if word.strip().lstrip("+-").isdecimal() else float(word)
+    kind = load(Group.ANALYZERS, str(settings.get("analyzer")), Analyzer)
+    return configured(kind, {name: value for name, value in settings.items() if name != "analyzer"})
 
 
 def configured(kind: type[Analyzer], settings: Mapping[str, Any]) -> Analyzer:
-    """Make an analyzer of some settings; one with a dot is a setting of a part of it.
+    """Make an analyzer from settings; ``graph.nodes`` is the setting ``nodes`` of its part ``graph``.
 
     Raises
     ------
     UnknownNameError
         The analyzer, or the part, has no such setting.
     StructureError
-        A setting has a value that it may not have.
+        A setting has a value that is not allowed.
     """
-    own = {name: value for name, value in settings.items() if "." not in name}
-    plain = kind()
-    for name in own:
-        if name not in _fields(plain):
-            raise UnknownNameError(f"{kind.__name__} has no setting {name!r}{_where(plain, name)}")
-    analyzer = kind(**own)
+    nested: dict[str, Any] = {}
     for name, value in settings.items():
         part, dot, inner = name.partition(".")
-        if dot:
-            analyzer = dataclasses.replace(analyzer, **{part: _changed(analyzer, part, inner, value)})
-    return analyzer
+        if not dot:
+            nested[name] = value
+        elif isinstance(nested.setdefault(part, {}), dict):
+            nested[part][inner] = value
+    return _made(kind, nested)
 
 
-def _changed(analyzer: Analyzer, part: str, inner: str, value: Any) -> Any:
-    """A part of an analyzer with one setting changed."""
-    parts = _parts(analyzer)
-    if part not in parts:
-        raise UnknownNameError(f"{type(analyzer).__name__} has no part {part!r}{nearest(part, parts)}")
-    known = _fields(parts[part])
-    if inner not in known:
-        raise UnknownNameError(f"{type(parts[part]).__name__} has no setting {inner!r}{nearest(inner, known)}")
-    return dataclasses.replace(parts[part], **{inner: value})
+def _made(kind: type, settings: Mapping[str, Any]) -> Any:
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for name in settings:
+        if name not in fields:
+            raise UnknownNameError(f"{kind.__name__} has no setting {name!r}{_where(fields, name)}")
+    return kind(**{name: _read(kind, fields[name], value) for name, value in settings.items()})
 
 
-def _fields(configuration: Any) -> list[str]:
-    return [field.name for field in dataclasses.fields(configuration)]
+def _read(kind: type, field: dataclasses.Field[Any], value: Any) -> Any:
+    if field.name == "exit" and isinstance(value, dict):
+        exit_kind = load(Group.EXITS, str(value.get("name")), Exit)
+        return _made(exit_kind, {name: entry for name, entry in value.items() if name != "name"})
+    if field.name == "exit" and isinstance(value, str):
+        return named_exit(value)
+    if field.name == "stepper" and isinstance(value, str):
+        return named_stepper(value)
+    if isinstance(value, dict):
+        part = _part_of(field)
+        if part is None:
+            raise UnknownNameError(f"{kind.__name__} has no part {field.name!r} with settings of its own.")
+        return _made(part, value)
+    return tuple(value) if isinstance(value, list) else value
 
 
-def _parts(analyzer: Analyzer) -> dict[str, Any]:
-    """Settings that have settings of their own."""
-    values = {name: getattr(analyzer, name) for name in _fields(analyzer)}
-    return {name: value for name, value in values.items() if dataclasses.is_dataclass(value) and _fields(value)}
+def _part_of(field: dataclasses.Field[Any]) -> type | None:
+    """The class of a setting that has settings itself, as its default shows."""
+    default = None if field.default_factory is dataclasses.MISSING else field.default_factory()
+    return type(default) if dataclasses.is_dataclass(default) and dataclasses.fields(default) else None
 
 
-def _where(analyzer: Analyzer, name: str) -> str:
-    """The end of a sentence that says which part has a setting, or which setting has the nearest name."""
-    homes = [f"{part}.{name}" for part, value in _parts(analyzer).items() if name in _fields(value)]
-    return f"; write {' or '.join(homes)}." if homes else nearest(name, _fields(analyzer))
+def _where(fields: Mapping[str, dataclasses.Field[Any]], name: str) -> str:
+    """The end of a sentence that names the part that has a setting, or the setting of the nearest name."""
+    parts = {own: part for own, field in fields.items() if (part := _part_of(field)) is not None}
+    homes = [f"{own}.{name}" for own, part in parts.items() if name in [f.name for f in dataclasses.fields(part)]]
+    return f"; write {' or '.join(homes)}." if homes else nearest(name, fields)
+
+
+def setting(text: str) -> tuple[str, Any]:
+    """Read a setting from the command line, such as ``points=40000``, ``graph.nodes=240,240`` or ``graph=none``.
+
+    Raises
+    ------
+    SceneError
+        It has no name or no value.
+    """
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise SceneError(
+            f"setting {text!r}: write FIELD=VALUE, such as points=40000, graph.nodes=240,240, source=clear or "
+            "graph=none."
+        )
+    values = tuple(_value(word.strip()) for word in value.split(","))
+    return name, values[0] if len(values) == 1 else values
+
+
+def _value(word: str) -> int | float | str | None:
+    if word == _NONE:
+        return None
+    for read in (int, float):
+        try:
+            return read(word)
+        except ValueError:
+            continue
+    return word
+
+
+def named_exit(text: str) -> Exit:
+    """Read an exit from its registered name and its arguments: ``leave-basin``, ``first-contact:right``.
+
+    Raises
+    ------
+    UnknownNameError
+        No such exit is registered.
+    StructureError
+        The exit does not take these arguments.
+    """
+    name, colon, arguments = text.partition(":")
+    kind = load(Group.EXITS, name, Exit)
+    fields = dataclasses.fields(kind)
+    values = [_value(word) for word in arguments.split(",")] if colon else []
+    if len(values) > len(fields):
+        raise StructureError(f"exit {shown(text)}: {name} takes {len(fields)} arguments, got {len(values)}.")
+    return kind(*values)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.parts.excitation.constant import Constant
 from vibrokit.parts.scene import Scene
@@ -53,6 +53,8 @@ def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
     if not scene.barriers:
         return ()
     module, theta = kernel_for(scene, flow, RK4()).module, theta_of(scene)
+    with first_call(module.law):
+        module.law(0, 0.0, 0.0, theta)
     reach, speed = _typical_motion(scene, module, theta)
     found = (_contact(module, theta, stop, reach, speed) for stop in range(len(scene.barriers)))
     return tuple(contact for contact in found if contact is not None)

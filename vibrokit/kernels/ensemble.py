@@ -1,27 +1,29 @@
-"""Runs many trajectories: splits them into blocks and has threads, or any executor, carry the blocks."""
+"""Runs many trajectories, split into blocks that threads or any executor integrate."""
 
 from __future__ import annotations
 
 import concurrent.futures as futures
+import contextlib
+import contextvars
 import dataclasses
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
+from vibrokit.kernels.kernel import Kernel, first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
+from vibrokit.progress import TRAJECTORIES, advance, count, working
 from vibrokit.symbolic.flow_kind import Flow
 
 _BLOCK = 2048
 _SMALLEST_BLOCK = 64
 
 Array = NDArray[Any]
-Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,12 +33,12 @@ class Stop:
     Attributes
     ----------
     region : array (2, 2)
-        Bounds of x and of v; outside, the trajectory has left.
+        Bounds of x and of v; a trajectory outside has left the region.
     labels : int16 array (nx, nv)
         Labels of the cells of the region; a label that is neither negative nor `home` ends the trajectory.
     home : int
     points : array (m, 2), point_labels : int64 array (m,), tolerance : float
-        Known places; a trajectory nearer than `tolerance` to one has reached it.
+        Known points of the section; a trajectory nearer than `tolerance` to one has reached it.
     """
 
     region: Array = dataclasses.field(default_factory=lambda: np.array([[-np.inf, np.inf], [-np.inf, np.inf]]))
@@ -54,7 +56,7 @@ class Ensemble:
     Attributes
     ----------
     states : array (count, equations)
-        Last state, at a section. Where the numbers ran out of range: the last good one.
+        Last state, at a section. Of a trajectory that diverged: the last finite one.
     intervals : int64 array (count,)
         Sections passed.
     status : int64 array (count,)
@@ -81,9 +83,10 @@ def run_ensemble(
     interval: float | None = None,
     stream: tuple[int, int] | None = None,
     executor: futures.Executor | None = None,
-    progress: Progress | None = None,
 ) -> Ensemble:
     """Advance trajectories from section to section until each meets a stop test or has spent its budget.
+
+    Trajectories, intervals and steps count into the work under way; a stage of trajectories advances by each block.
 
     Parameters
     ----------
@@ -103,15 +106,13 @@ def run_ensemble(
         For the noisy flow: seed, and index of the first trajectory. Each trajectory has a random stream of its own
         that depends on the seed and its index alone.
     executor : concurrent.futures.Executor, optional
-        Carries the blocks; threads of this process by default. The result is the same to the last bit.
-    progress : callable, optional
-        Called with (blocks done, blocks in all).
+        Integrates the blocks; threads of this process by default. The result is the same to the last bit.
 
     Returns
     -------
     Ensemble
     """
-    kernel = kernel_for(scene, flow, stepper)
+    kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     starts = np.ascontiguousarray(states, dtype=float)
     budgets = np.broadcast_to(budget, len(starts))
@@ -124,7 +125,27 @@ def run_ensemble(
             seed, first = stream
             streams = (np.int64(seed), np.arange(first + block.start, first + block.stop, dtype=np.int64))
         tasks.append((kernel, starts[block], budgets[block], common, streams, stop or Stop()))
-    return _joined(list(carry(_advance_block, tasks, executor, progress)), starts.shape[1])
+    steps, parts = stepper.steps_in(scene, span), []
+    with contextlib.closing(carry(_advance_block, tasks, executor)) as blocks:
+        for part in blocks:
+            parts.append(part)
+            passed = int(part.intervals.sum())
+            count(trajectories=len(part.intervals), intervals=passed, steps=steps * passed)
+            advance(len(part.intervals), TRAJECTORIES)
+    return _joined(parts, starts.shape[1])
+
+
+def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
+    """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation."""
+    kernel = kernel_for(scene, flow, stepper)
+    advance_kernel = kernel.module.advance
+    if not advance_kernel.overloads:
+        common = (theta_of(scene), 0.0, 1.0, np.array(stepper.settings(scene, 1.0)))
+        streams = (np.int64(0), np.empty(0, dtype=np.int64)) if flow is Flow.NOISY else ()
+        nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
+        with first_call(advance_kernel):
+            _advance_block(kernel, *nothing, common, streams, Stop())
+    return kernel
 
 
 def _blocks(count: int) -> Iterator[slice]:
@@ -161,26 +182,31 @@ def _joined(parts: list[Ensemble], equations: int) -> Ensemble:
 
 
 def carry(
-    work: Callable[..., Any],
-    tasks: list[tuple[Any, ...]],
-    executor: futures.Executor | None = None,
-    progress: Progress | None = None,
-) -> Iterator[Any]:
-    """Yield ``work(*task)`` for each task, in order; on Ctrl-C nothing more is begun."""
-    if executor is None and len(tasks) == 1:  # starting a thread takes longer than most tasks that are alone
+    work: Callable[..., Any], tasks: list[tuple[Any, ...]], executor: futures.Executor | None = None
+) -> Generator[Any, None, None]:
+    """Yield ``work(*task)`` for each task, in order. Closing the generator starts no more tasks."""
+    if executor is None and len(tasks) == 1:  # starting a thread takes longer than most single tasks
         yield work(*tasks[0])
-        if progress is not None:
-            progress(1, 1)
         return
     pool = executor or futures.ThreadPoolExecutor(max_workers=os.cpu_count())
-    pending = [pool.submit(work, *task) for task in tasks]
+    pending = [pool.submit(_counted_apart, work, task) for task in tasks]
     try:
-        for done, future in enumerate(pending, start=1):
-            yield future.result()
-            if progress is not None:
-                progress(done, len(tasks))
+        for future in pending:
+            result, counts = future.result()
+            count(**counts)
+            yield result
     finally:
         for future in pending:
             future.cancel()
         if executor is None:
             pool.shutdown()
+
+
+def _counted_apart(work: Callable[..., Any], task: tuple[Any, ...]) -> tuple[Any, Mapping[str, int]]:
+    """Do a task, in whatever thread or process; return its result and what it counted."""
+
+    def counted() -> tuple[Any, Mapping[str, int]]:
+        with working() as own:
+            return work(*task), dict(own.counts)
+
+    return contextvars.Context().run(counted)  # an executor may run it in the calling thread

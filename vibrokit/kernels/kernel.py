@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import dataclasses
 import functools
 import hashlib
 import re
 import types
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +18,17 @@ from numpy.typing import NDArray
 from vibrokit.errors import SceneError, StepperError, shown
 from vibrokit.kernels import store
 from vibrokit.kernels.fingerprint import scene_fingerprint
-from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stepper import Emitter
 from vibrokit.parts.scene import Scene
+from vibrokit.progress import compiling
 from vibrokit.symbolic.flow_kind import Flow
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MARKER = "# --- scene above, stepper below ---\n"
 _NEED_NOISE = {
     Flow.NOISY: "random forces",
-    Flow.GRAMIAN: "random forces",
-    Flow.GRAMIAN_REVERSED: "random forces",
+    Flow.LINEARISED: "random forces",
+    Flow.COVARIANCE_REVERSED: "random forces",
     Flow.HAMILTONIAN: "momenta",
     Flow.HAMILTONIAN_VARIATIONAL: "momenta",
 }
@@ -54,8 +56,8 @@ class Kernel:
         return store.load(self.name, self.source)
 
 
-def kernel_for(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
-    """Return the kernel for a flow of a scene: from disk if its like was made before, else derived and written.
+def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
+    """Return the kernel for a flow of a scene: read from disk if one with the same code exists, else derived.
 
     Raises
     ------
@@ -69,8 +71,8 @@ def kernel_for(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
             f"scene: it has no noise, so there are no {_NEED_NOISE[flow]} and no {flow.value} flow; give the scene a "
             "noise model, such as WhiteNoise(intensity=2e-5)."
         )
-    if not isinstance(stepper, Stepper):
-        raise StepperError(f"the stepper is {shown(stepper)}, which is none; give one, such as RK4(steps=256).")
+    if not isinstance(stepper, Emitter):
+        raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
     stepper.check(scene, flow)
     return _kernel(scene_fingerprint(scene), flow, stepper.name, _Sources(scene, flow, stepper))
 
@@ -81,7 +83,7 @@ class _Sources:
 
     scene: Scene
     flow: Flow
-    stepper: Stepper
+    stepper: Emitter
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Sources)
@@ -96,12 +98,18 @@ def _kernel(fingerprint: str, flow: Flow, stepper: str, sources: _Sources) -> Ke
     name = f"vibrokit_{flow.value}_{stepper}_{digest}"
     source = store.stored(name)
     if source is None:
-        source = write_source(sources.scene, flow, sources.stepper)
+        with compiling():
+            source = write_source(sources.scene, flow, sources.stepper)
         store.store(name, source)
     return Kernel(name, source)
 
 
-def write_source(scene: Scene, flow: Flow, stepper: Stepper) -> str:
+def first_call(function: Any) -> contextlib.AbstractContextManager[None]:
+    """Return a context for a call of a compiled function that marks its first call in this process as compilation."""
+    return contextlib.nullcontext() if function.overloads else compiling()
+
+
+def write_source(scene: Scene, flow: Flow, stepper: Emitter) -> str:
     """Derive the equations and write the module, scene above and stepper below."""
     from vibrokit.symbolic.source import scene_text  # only here is SymPy needed
 

@@ -16,9 +16,9 @@ FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0
 # What carries over an event, where more is integrated than runs through it unbroken.
 _CROSSING: Mapping[Flow, tuple[str, ...]] = {
-    Flow.STATE_VARIATIONAL: ("crossing_derivatives",),
-    Flow.GRAMIAN: ("crossing_covariance",),
-    Flow.GRAMIAN_REVERSED: ("crossing_covariance",),
+    Flow.STATE_VARIATIONAL: ("crossing_linear",),
+    Flow.LINEARISED: ("crossing_linear",),
+    Flow.COVARIANCE_REVERSED: ("crossing_linear",),
     Flow.HAMILTONIAN: ("grazing", "crossing_momenta"),
     Flow.HAMILTONIAN_VARIATIONAL: ("grazing", "crossing_extremals"),
 }

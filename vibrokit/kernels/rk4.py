@@ -40,13 +40,16 @@ class RK4(Stepper):
 
     def __post_init__(self) -> None:
         if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= _LARGEST:
-            raise StepperError(f"RK4: steps is {self.steps!r}; give a whole number from 1 to {_LARGEST}.")
+            raise StepperError(f"RK4: steps must be a whole number from 1 to {_LARGEST}, got {self.steps!r}.")
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
         """Steps in this interval, whether the forcing repeats with it, and the step length."""
-        unit = scene.time_unit
-        steps = max(1, round(self.steps * interval / unit))
-        return float(steps), float(scene.repeats_after(interval)), unit / self.steps
+        steps = self.steps_in(scene, interval)
+        return float(steps), float(scene.repeats_after(interval)), scene.time_unit / self.steps
+
+    def steps_in(self, scene: Scene, interval: float) -> int:
+        """Return the number of steps in an interval (s), 1 or more."""
+        return max(1, round(self.steps * interval / scene.time_unit))
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The lane-packed step, and what it calls; and the laws of the stops.

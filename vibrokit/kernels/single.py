@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
@@ -54,5 +54,6 @@ def record(
     noise: tuple[Any, ...] = ()
     if flow is Flow.NOISY:
         noise = (np.int64(seed or 0), np.int64(0), np.empty((0, 2)) if normals is None else normals)
-    good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
+    with first_call(module.record):
+        good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
     return out[:good]

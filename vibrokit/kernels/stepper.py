@@ -1,4 +1,4 @@
-"""Stepper: how trajectories are integrated."""
+"""Emitter: what a generated module consists of. Stepper: how trajectories are integrated."""
 
 from __future__ import annotations
 
@@ -12,38 +12,52 @@ from vibrokit.symbolic.scene_text import SceneText
 
 
 @dataclasses.dataclass(frozen=True)
-class Stepper(ABC):
+class Emitter(ABC):
+    """What a generated module consists of: pieces of the scene, and templates below them.
+
+    For developers
+    --------------
+    An emitter names its templates, files of `vibrokit/kernels/templates`, and says which pieces of the scene stand
+    above them.
+    """
+
+    name: ClassVar[str]
+    templates: ClassVar[tuple[str, ...]] = ()
+    flight: ClassVar[bool] = False
+
+    @abstractmethod
+    def scene_part(self, text: SceneText) -> list[str]:
+        """Return the pieces of the scene that stand above the templates."""
+
+    def templates_for(self, text: SceneText) -> tuple[str, ...]:
+        """Return the names of the templates that a scene needs, in the order in which they are pasted."""
+        return self.templates
+
+    def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most take every scene
+        """Raise StepperError if the module cannot be made for this flow of this scene."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Stepper(Emitter):
     """A way to integrate: its configuration is its fields, all else is derived.
 
     For developers
     --------------
-    A stepper names its templates, files of `vibrokit/kernels/templates`, says which pieces of the scene it is
-    pasted under, and turns its fields into the few numbers that the templates read.
+    A stepper also turns its fields into the few numbers that the templates read.
     """
-
-    name: ClassVar[str]
-    templates: ClassVar[tuple[str, ...]]
-    flight: ClassVar[bool] = False
 
     @abstractmethod
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Numbers that the templates read."""
+        """Return the numbers that the templates read."""
 
-    @abstractmethod
-    def scene_part(self, text: SceneText) -> list[str]:
-        """Pieces of the scene that the templates are pasted under."""
-
-    def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """Names of the templates that a scene needs, in the order in which they are pasted."""
-        return self.templates
+    def steps_in(self, scene: Scene, interval: float) -> int:
+        """Return the number of fixed steps in an interval (s); 0 if the stepper chooses its own steps."""
+        return 0
 
     @abstractmethod
     def refined(self) -> Self:
-        """The next finer setting, for an error estimate by comparison."""
+        """Return the next finer setting, for an error estimate by comparison."""
 
     @abstractmethod
     def coarsened(self) -> Self:
-        """The next coarser setting."""
-
-    def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most steppers take every scene
-        """Raise StepperError if this stepper cannot integrate this flow of this scene."""
+        """Return the next coarser setting."""

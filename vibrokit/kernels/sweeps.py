@@ -1,9 +1,9 @@
-"""Value iteration with continuous predecessors: what one step of time does to a function on a grid.
+"""Value iteration with continuous predecessors: one step of time applied to a function on a grid.
 
-V_after(y) = min over x of V_before(x) + ½ |R (x − b)|², where b(y) and the triangular R(y) are given for every node y
-of the grid after, and x is any point of the grid before. Places are in units of cells, so that nodes are whole numbers;
-V is interpolated by quadratic pieces whose curvature is what neighbouring nodes agree on (Min & Gibou, J. Comput. Phys.
-225, 300, 2007): exact for quadratic forms, and linear across the ridges where two ways of coming are equally cheap.
+V_after(y) = min over x of V_before(x) + ½ |R (x − b)|², where b(y) and the upper triangular R(y) are given for every
+node y of the grid after, and x is any point of the grid before. Points are in units of nodes, so that nodes are whole
+numbers. V is interpolated by quadratic pieces whose curvature is what neighbouring nodes agree on (Min & Gibou, J.
+Comput. Phys. 225, 300, 2007): exact for quadratic forms, and linear across the ridges where two paths cost the same.
 """
 
 import math
@@ -12,9 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-_NEWTON = 6
-_HALVINGS = 3
-_NEAR = 1e-4  # of a cell: where Newton's method has arrived
+_NEWTON = 6  # iterations; the next sweep goes on from where they end
+_HALVINGS = 3  # of a step that does not descend
+_CONVERGED = 1e-4  # of a node distance; the cost is quadratic there
+_CONVEX = 0.1  # of the step's own curvature: what V must leave of it for Newton's method to use that of V as well
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -28,7 +29,7 @@ def _common(a: float, b: float) -> float:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def interpolate(values: Array, s: float, t: float) -> tuple[float, float, float, float, float, float]:
-    """Return V, ∂V/∂s, ∂V/∂t, ∂²V/∂s², ∂²V/∂s∂t, ∂²V/∂t² at a point of a grid, at least a cell from its edge."""
+    """Return V, ∂V/∂s, ∂V/∂t, ∂²V/∂s², ∂²V/∂s∂t, ∂²V/∂t² at a point of a grid, at least a node from its edge."""
     i = min(max(int(s), 1), values.shape[0] - 3)
     j = min(max(int(t), 1), values.shape[1] - 3)
     x, y = s - i, t - j
@@ -51,50 +52,48 @@ def interpolate(values: Array, s: float, t: float) -> tuple[float, float, float,
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def paid(s: float, t: float, centre: Array, root: Array) -> float:
-    """Return ½ |R (x − b)|², a sum of squares, so that it cannot come out negative however long and thin R is."""
+def _step_cost(s: float, t: float, centre: Array, root: Array) -> float:
+    """Return ½ |R (x − b)|², as a sum of squares, which rounding cannot make negative however long and thin R is."""
     ds, dt = s - centre[0], t - centre[1]
     first, second = root[0] * ds + root[1] * dt, root[2] * dt
     return 0.5 * (first * first + second * second)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def cost(before: Array, s: float, t: float, centre: Array, root: Array) -> float:
-    """Return what it costs to come by a point of the grid before."""
-    return interpolate(before, s, t)[0] + paid(s, t, centre, root)
+def _total_cost(before: Array, s: float, t: float, centre: Array, root: Array) -> float:
+    """Return the cost of a path that comes by a point of the grid before."""
+    return interpolate(before, s, t)[0] + _step_cost(s, t, centre, root)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def inside(value: float, count: int) -> float:
-    """The nearest place that can be interpolated."""
+def _clamped(value: float, count: int) -> float:
+    """Return the nearest coordinate that can be interpolated."""
     return min(max(value, 1.0), count - 2.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def descend(before: Array, s: float, t: float, centre: Array, root: Array) -> tuple[float, float, float]:
-    """Return the local minimum near a point by Newton's method, as (cost, s, t)."""
+    """Return the local minimum of the cost near a point by Newton's method, as (cost, s, t)."""
     found = math.inf
     a, b, c = root[0] * root[0], root[0] * root[1], root[1] * root[1] + root[2] * root[2]
     for _ in range(_NEWTON):
         value, gs, gt, hss, hst, htt = interpolate(before, s, t)
-        found = value + paid(s, t, centre, root)
+        found = value + _step_cost(s, t, centre, root)
         ds, dt = s - centre[0], t - centre[1]
         first = root[0] * ds + root[1] * dt
         gs += root[0] * first
         gt += root[1] * first + root[2] * root[2] * dt
         hss, hst, htt = hss + a, hst + b, htt + c
-        if not (hss > 0.1 * a and htt > 0.1 * c and hss * htt - hst * hst > 0.01 * a * root[2] * root[2]):
-            hss, hst, htt = a, b, c
-            det = a * root[2] * root[2]
-        else:
-            det = hss * htt - hst * hst
+        det, own = hss * htt - hst * hst, a * root[2] * root[2]
+        if not (hss > _CONVEX * a and htt > _CONVEX * c and det > _CONVEX * _CONVEX * own):
+            hss, hst, htt, det = a, b, c, own
         step_s, step_t = (hst * gt - htt * gs) / det, (hst * gs - hss * gt) / det
-        if abs(step_s) < _NEAR and abs(step_t) < _NEAR:
+        if abs(step_s) < _CONVERGED and abs(step_t) < _CONVERGED:
             return found, s, t
         moved = False
         for _ in range(_HALVINGS):
-            new_s, new_t = inside(s + step_s, before.shape[0]), inside(t + step_t, before.shape[1])
-            if cost(before, new_s, new_t, centre, root) < found:
+            new_s, new_t = _clamped(s + step_s, before.shape[0]), _clamped(t + step_t, before.shape[1])
+            if _total_cost(before, new_s, new_t, centre, root) < found:
                 moved = True
                 break
             step_s *= 0.3
@@ -102,7 +101,7 @@ def descend(before: Array, s: float, t: float, centre: Array, root: Array) -> tu
         if not moved:
             return found, s, t
         s, t = new_s, new_t
-    return cost(before, s, t, centre, root), s, t
+    return _total_cost(before, s, t, centre, root), s, t
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -115,7 +114,7 @@ def best_node(before: Array, centre: Array, root: Array, most: float, reach: int
     n, m = before.shape
     for i in range(max(1, math.ceil(centre[0] - wide)), min(n - 2, math.floor(centre[0] + wide)) + 1):
         for j in range(max(1, math.ceil(centre[1] - high)), min(m - 2, math.floor(centre[1] + high)) + 1):
-            here = before[i, j] + paid(i, j, centre, root)
+            here = before[i, j] + _step_cost(i, j, centre, root)
             if here < found:
                 found, at_i, at_j = here, i, j
     return found, at_i, at_j
@@ -127,140 +126,137 @@ def sweep_rows(
     after: Array,
     centres: Array,
     roots: Array,
-    places: Array,
-    anchors: Array,
-    still: Flags,
-    awake: Flags,
+    predecessors: Array,
+    uphill: Array,
+    ceilings: Array,
+    fixed: Flags,
+    active: Flags,
     changed: Flags,
     first: int,
     last: int,
     order: int,
     reach: int,
-    ceilings: Array,
     tolerance: float,
-) -> int:
-    """Improve some rows of nodes of the grid after, in place; return how many were looked at.
+) -> None:
+    """Improve some rows of nodes of the grid after, in place.
 
     Parameters
     ----------
     before, after : array (n, m)
         V on the two grids.
     centres : array (n, m, 2)
-        b of each node of the grid after, in cells of the grid before; NaN where there is none.
+        b of each node of the grid after; NaN where there is none.
     roots : array (n, m, 3)
-        R as (ss, st, tt), for displacements in cells.
-    places : array (n, m, 2)
+        R as (ss, st, tt).
+    predecessors : array (n, m, 2)
         Best x known of each node; improved.
-    anchors : array (n, m, 2)
-        Places that are always tried.
-    still : uint8 array (n, m)
+    uphill : array (n, m, 2)
+        Points that are always tried.
+    ceilings : array (n, m)
+        Upper bounds of V.
+    fixed : uint8 array (n, m)
         Nodes whose V is given.
-    awake : uint8 array (n, m)
-        Nodes of the grid before near which V has changed; others need not be looked at.
+    active : uint8 array (n, m)
+        Nodes of the grid before near which V has changed. If reach is 0, only nodes with predecessors there are
+        evaluated.
     changed : uint8 array (n, m)
         Set for nodes of the grid after whose V changed by more than the tolerance, else cleared.
     first, last : int
-        Rows to do: first ≤ i < last. Neighbours' places are taken from these only, so that the result does not depend
-        on who does the others.
+        Rows to do: first ≤ i < last. Predecessors are taken over from neighbours in these rows only, so that the
+        result does not depend on who does the others.
     order : int
-        1 from the first row and column to the last, −1 the other way round; the places of neighbours done are tried.
+        1 from the first row and column to the last, −1 the other way round. The predecessors of the two neighbours
+        done before are tried.
     reach : int
-        Nodes (cells to each side) among which a cheaper one is looked for; 0 to follow known places only.
-    ceilings : array (n, m)
-        No V is kept above these.
+        Nodes to each side of b among which a cheaper predecessor is searched; 0 to improve known ones only.
     tolerance : float
         Relative.
     """
     n, m = before.shape
-    looked = 0
     for row in range(last - first):
         i = first + row if order > 0 else last - 1 - row
         for column in range(m):
             j = column if order > 0 else m - 1 - column
             changed[i, j] = 0
-            if still[i, j] or math.isnan(centres[i, j, 0]):
+            if fixed[i, j] or math.isnan(centres[i, j, 0]):
                 continue
-            s, t = places[i, j, 0], places[i, j, 1]
-            if reach == 0 and not awake[int(s + 0.5), int(t + 0.5)]:
+            s, t = predecessors[i, j, 0], predecessors[i, j, 1]
+            if reach == 0 and not active[int(s + 0.5), int(t + 0.5)]:
                 continue
-            looked += 1
             ceiling = ceilings[i, j]
             centre, root = centres[i, j], roots[i, j]
-            found = cost(before, s, t, centre, root)
-            for tried in range(2):
+            found = _total_cost(before, s, t, centre, root)
+            for tried in range(4):
                 if tried == 0:
-                    ns, nt = inside(centre[0], n), inside(centre[1], m)
+                    new_s, new_t = _clamped(centre[0], n), _clamped(centre[1], m)
+                elif tried == 1:
+                    new_s, new_t = uphill[i, j, 0], uphill[i, j, 1]
                 else:
-                    ns, nt = anchors[i, j, 0], anchors[i, j, 1]
-                here = cost(before, ns, nt, centre, root)
+                    ni, nj = (i, j - order) if tried == 2 else (i - order, j)
+                    if not (first <= ni < last and 0 <= nj < m) or math.isnan(centres[ni, nj, 0]):
+                        continue
+                    new_s, new_t = predecessors[ni, nj, 0], predecessors[ni, nj, 1]
+                here = _total_cost(before, new_s, new_t, centre, root)
                 if here < found:
-                    found, s, t = here, ns, nt
-            for near in range(2):
-                ni, nj = (i, j - order) if near == 0 else (i - order, j)
-                if not (first <= ni < last and 0 <= nj < m) or math.isnan(centres[ni, nj, 0]):
-                    continue
-                ns, nt = places[ni, nj, 0], places[ni, nj, 1]
-                here = cost(before, ns, nt, centre, root)
-                if here < found:
-                    found, s, t = here, ns, nt
+                    found, s, t = here, new_s, new_t
             if reach > 0:
                 here, ni, nj = best_node(before, centre, root, min(found, ceiling), reach)
                 if ni >= 0 and here < found:
                     found, s, t = here, float(ni), float(nj)
             if found < ceiling:
                 found, s, t = descend(before, s, t, centre, root)
-            places[i, j, 0], places[i, j, 1] = s, t
+            predecessors[i, j, 0], predecessors[i, j, 1] = s, t
             found = min(found, ceiling)
             if abs(found - after[i, j]) > tolerance * after[i, j]:
                 changed[i, j] = 1
             after[i, j] = found
-    return looked
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def interpolate_all(values: Array, places: Array) -> Array:
-    """Return V at places (count, 2) of a grid; NaN where a place is NaN."""
-    found = np.empty(len(places))
-    for k in range(len(places)):
-        if math.isnan(places[k, 0]):
+def interpolate_all(values: Array, points: Array) -> Array:
+    """Return V at points (count, 2) of a grid; NaN where a point is NaN."""
+    found = np.empty(len(points))
+    for k in range(len(points)):
+        if math.isnan(points[k, 0]):
             found[k] = math.nan
         else:
-            found[k] = interpolate(values, places[k, 0], places[k, 1])[0]
+            found[k] = interpolate(values, points[k, 0], points[k, 1])[0]
     return found
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def descend_all(before: Array, starts: Array, centres: Array, roots: Array, weight: float) -> tuple[Array, Array]:
-    """Return the least cost to come to some points, and the places come from.
+def descend_all(before: Array, starts: Array, centres: Array, roots: Array, step_weight: float) -> tuple[Array, Array]:
+    """Return the least cost of reaching some points, and the predecessors.
 
     Parameters
     ----------
     before : array (n, m)
     starts : array (count, tries, 2)
-        Places from which each descent begins; the best is kept.
+        Points from which each descent begins; the best result is kept.
     centres : array (count, 2)
     roots : array (count, 3)
-    weight : float
-        Of V against the cost of the step; above 1, ways along which V falls faster are preferred.
+    step_weight : float
+        Of the step's cost against V in the choice of the predecessor. Below 1, those from which V falls faster are
+        preferred.
 
     Returns
     -------
     costs : array (count,)
-        Not weighted.
-    places : array (count, 2)
+        Not weighted; infinite where there is no b.
+    predecessors : array (count, 2)
     """
     n, m = before.shape
-    costs, places = np.full(len(starts), math.inf), np.ones((len(starts), 2))
+    costs, predecessors = np.full(len(starts), math.inf), np.ones((len(starts), 2))
     for k in range(len(starts)):
         if math.isnan(centres[k, 0]):
             continue
-        root = roots[k] / math.sqrt(weight)
+        root = roots[k] * math.sqrt(step_weight)
         least = math.inf
         for start in range(starts.shape[1]):
-            s, t = inside(starts[k, start, 0], n), inside(starts[k, start, 1], m)
+            s, t = _clamped(starts[k, start, 0], n), _clamped(starts[k, start, 1], m)
             found, s, t = descend(before, s, t, centres[k], root)
             if found < least:
                 least = found
-                places[k, 0], places[k, 1] = s, t
-        costs[k] = cost(before, places[k, 0], places[k, 1], centres[k], roots[k])
-    return costs, places
+                predecessors[k, 0], predecessors[k, 1] = s, t
+        costs[k] = _total_cost(before, predecessors[k, 0], predecessors[k, 1], centres[k], roots[k])
+    return costs, predecessors

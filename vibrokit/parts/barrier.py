@@ -1,4 +1,4 @@
-"""Barrier: a contact law put somewhere."""
+"""Barrier: a contact law with a position and a side."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _POSITION = Parameter("position", "position", "b", "m")
 
 @dataclasses.dataclass(frozen=True)
 class Barrier:
-    """A stop: a contact law, its place, and the side of the mass that it is on.
+    """A stop: a contact law, its position, and its side of the mass.
 
     Parameters
     ----------
     law : ContactLaw
-        How hard it pushes back.
+        Contact force as a function of depth and rate.
     position : float
-        Where the mass touches it (m).
+        Position of the mass at first touch (m).
     side : {"right", "left"}
         ``"right"``: depth is x − position; ``"left"``: depth is position − x.
     adhesive : bool
-        False: a law that would pull (dissipative laws, at release) is cut at zero. True: it may pull.
+        False: a negative (pulling) force, as of dissipative laws at release, is set to zero. True: it is kept.
     """
 
     law: ContactLaw
@@ -36,21 +36,21 @@ class Barrier:
     def __post_init__(self) -> None:
         if not isinstance(self.law, ContactLaw):
             raise SceneError(
-                f"Barrier: law is {shown(self.law)}, which is no contact law; give one, such as Hertz(stiffness=50.0)."
+                f"Barrier: law must be a ContactLaw, such as Hertz(stiffness=50.0), got {shown(self.law)}."
             )
         if self.side not in ("right", "left"):
-            raise ParameterError(f"Barrier: side is {shown(self.side)}; give 'right' or 'left'.")
+            raise ParameterError(f"Barrier: side must be 'right' or 'left', got {shown(self.side)}.")
         if not isinstance(self.adhesive, bool):
-            raise ParameterError(f"Barrier: adhesive is {shown(self.adhesive)}; give True or False.")
+            raise ParameterError(f"Barrier: adhesive must be True or False, got {shown(self.adhesive)}.")
         object.__setattr__(self, "position", _POSITION.checked("Barrier", self.position))
 
     @property
     def sign(self) -> int:
-        """+1 for a right stop, −1 for a left one: depth = sign · (x − position)."""
+        """+1 for a right stop, −1 for a left stop: depth = sign · (x − position)."""
         return 1 if self.side == "right" else -1
 
     def declared(self) -> tuple[Parameter, ...]:
-        """Parameters of the barrier itself, those of its law apart."""
+        """Parameters of the barrier itself, without those of its law."""
         return (_POSITION,)
 
     @property
@@ -59,5 +59,5 @@ class Barrier:
         return {"position": self.position}
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some fields changed, checked like new ones."""
+        """Return a checked copy with some fields changed."""
         return dataclasses.replace(self, **changes)

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from vibrokit.errors import ParameterError
-from vibrokit.parts.formula import check_parameter_name, parse_formula
+from vibrokit.parts.formula import check_parameter_names, read
 from vibrokit.parts.parameter import Parameter
 
 
 class FormulaPart:
-    """What the custom parts share: a formula as text, and constants that it may use.
+    """Base of the custom parts: a formula as text, and named constants that it may use.
 
-    The constants take part in everything as declared parameters do: they are checked to be finite, have symbols,
-    travel in scene files, and can be changed without compiling anew. The formula itself is structural.
+    The constants are parameters: they must be finite, have symbols, are saved in scene files, and can be changed
+    without recompilation. The formula is structural.
     """
 
     variables: ClassVar[tuple[str, ...]]
@@ -25,11 +24,8 @@ class FormulaPart:
 
     def _read(self, formula: str, constants: Mapping[str, Any]) -> None:
         """Check formula and constants and store them."""
-        for name in constants:
-            check_parameter_name(name, self.variables)
-            if name in ("name", "formula", "constants"):
-                raise ParameterError(f"{type(self).__name__}: a constant is called {name}; choose another name for it.")
-        parse_formula(formula, self.variables, tuple(constants))
+        check_parameter_names(tuple(constants), (*self.variables, "name", "formula", "constants"))
+        read(formula, (*self.variables, *constants))
         checked = tuple(
             (name, Parameter(name, name, name, "").checked(type(self).__name__, value))
             for name, value in constants.items()
@@ -60,6 +56,7 @@ class FormulaPart:
         return twin
 
     def _evaluate(self, *arguments: Any) -> Any:
-        """The formula as a SymPy expression, at the given variables and this part's constants."""
-        formula = parse_formula(self.formula, self.variables, tuple(name for name, _ in self.constants))
-        return formula.expression({**dict(zip(self.variables, arguments, strict=True)), **dict(self.constants)})
+        """The formula as a SymPy expression in the given variables and the constants of this part."""
+        from vibrokit.parts.formula_expression import expression
+
+        return expression(self.formula, dict(zip(self.variables, arguments, strict=True)) | dict(self.constants))

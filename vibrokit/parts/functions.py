@@ -1,8 +1,8 @@
 """Functions for the formulas of parts.
 
-Each forwards to the SymPy function of its name when it is called, so that a module that defines a part can be
-imported without importing SymPy: a scene whose kernels are on disk never needs it. A part of yours may as well
-import the same names from SymPy.
+Each calls the SymPy function of the same name. SymPy is imported at the first call, not with the module that defines
+a part, because a scene whose kernels are cached on disk does not need it. Your own parts may also import these names
+from SymPy.
 """
 
 from typing import Any

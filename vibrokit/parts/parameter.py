@@ -1,4 +1,4 @@
-"""Parameters: what each is called, its unit, and the values that it may have."""
+"""Parameters: name, symbol, unit and allowed range."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Parameter:
     name : str
         Name in the constructor and in scene files.
     attribute : str
-        Field that holds it; the same name, unless a method has that one.
+        Field of the part that holds it; differs from the name if a method has that name.
     symbol : str
-        Letter in equations, as SymPy writes it (``"k"``, ``"omega"``).
+        Symbol in equations, as SymPy writes it (``"k"``, ``"omega"``).
     unit : str or None
-        Unit in SI base units; ``""`` is dimensionless, None is undeclared.
+        Unit in SI base units; ``""`` if dimensionless, None if undeclared.
     minimum, above, maximum : float or None
-        Allowed range: at least, strictly more than, at most.
+        Allowed range: value ≥ minimum, value > above, value ≤ maximum.
     structural : bool
-        True if the value shapes the equations (an exponent, a formula): it stays in them, and another value
-        means other compiled code.
+        True if the form of the equations depends on the value (an exponent, a formula); changing it triggers
+        recompilation.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """The allowed range in words."""
+        """The allowed range, for messages."""
         words = []
         if self.above is not None:
             words.append(f"greater than {self.above:g}")
@@ -55,13 +55,13 @@ class Parameter:
         return "a finite number" + (" " + " and ".join(words) if words else "")
 
     def checked(self, owner: str, value: Any) -> float:
-        """Return `value` as a float, or raise ParameterError naming owner, parameter, value and range."""
+        """Return `value` as a float; raise ParameterError if it is not a number in the allowed range."""
         if isinstance(value, bool) or not isinstance(value, Real):
-            raise ParameterError(f"{owner}: {self.name} is {shown(value)}, which is no number; give {self.allowed}.")
+            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {shown(value)}.")
         try:
             number = float(value)
         except OverflowError:
-            raise ParameterError(f"{owner}: {self.name} is beyond 1.8e308; give {self.allowed}.") from None
+            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got one above 1.8e308.") from None
         outside = (
             not math.isfinite(number)
             or (self.minimum is not None and number < self.minimum)
@@ -69,7 +69,7 @@ class Parameter:
             or (self.maximum is not None and number > self.maximum)
         )
         if outside:
-            raise ParameterError(f"{owner}: {self.name} is {number:g}; give {self.allowed}.")
+            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {number:g}.")
         return number
 
 
@@ -84,7 +84,7 @@ def parameter(
     default: Any = dataclasses.MISSING,
     name: str = "",
 ) -> Any:
-    """Declare a field of a part as a parameter; the arguments are those of `Parameter`.
+    """Declare a field of a part as a parameter; arguments as for `Parameter`.
 
     Examples
     --------
@@ -96,8 +96,8 @@ def parameter(
 
 
 def declared_parameters(cls: type) -> tuple[Parameter, ...]:
-    """Parameters of a dataclass, in field order; a field declared without `parameter` may have any finite value."""
-    # A base class that was decorated a second time has lost the metadata of its fields, but not its declarations.
+    """Parameters of a dataclass in field order; a field declared without `parameter` accepts any finite number."""
+    # A second dataclass decorator drops the metadata of inherited fields, but not the declarations of the base class.
     inherited = {d.attribute: d for base in reversed(cls.__mro__[1:]) for d in vars(base).get("_declared", ())}
     found = []
     for field in dataclasses.fields(cls):

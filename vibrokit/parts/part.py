@@ -1,4 +1,4 @@
-"""Part: what contact laws, springs, excitations and noise models have in common."""
+"""Part: base class of contact laws, springs, excitations and noise models."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from abc import ABC
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
-from vibrokit.errors import ParameterError
+from vibrokit.errors import ParameterError, nearest
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
 class Part(ABC):
-    """One piece of a scene: a frozen dataclass whose fields are its parameters.
+    """One part of a scene: a frozen dataclass whose fields are its parameters.
 
-    A class that inherits from a part becomes a frozen dataclass by itself; no decorator is needed. Every class is
-    either abstract or final: a concrete part refuses to be inherited from.
+    A subclass becomes a frozen dataclass without a decorator. Every class is either abstract or final: a concrete
+    part cannot have subclasses.
 
     For developers
     --------------
-    Write the formula method of the abstract class and declare each field with `parameter`. From these,
-    everything else just works: range checks, scene files, derivatives, compiled kernels, the conformance kit.
+    Write the formula method of the abstract class and declare each field with `parameter`. Range checks, scene files,
+    derivatives, compiled kernels and the conformance kit follow from these.
     """
 
     _declared: ClassVar[tuple[Parameter, ...]] = ()
@@ -33,11 +33,11 @@ class Part(ABC):
             if issubclass(base, Part) and base._is_final():
                 kind = next(b.__name__ for b in base.__mro__[1:] if issubclass(b, Part))
                 raise TypeError(
-                    f"{cls.__name__} inherits from {base.__name__}, a finished part, and finished parts are final; "
-                    f"inherit from {kind} instead and write the whole formula."
+                    f"{cls.__name__} inherits from {base.__name__}, which is a concrete part and final; inherit from "
+                    f"{kind} and write the whole formula."
                 )
         dataclasses.dataclass(frozen=True, repr=False)(cls)
-        del cls.__setattr__, cls.__delattr__  # those below do, and an explicit decorator may put its own
+        del cls.__setattr__, cls.__delattr__  # Part has its own; an explicit decorator may add them again
         cls._declared = declared_parameters(cls)
 
     @classmethod
@@ -48,7 +48,7 @@ class Part(ABC):
         for declared in self.declared():
             value = getattr(self, declared.attribute)
             number = declared.checked(type(self).__name__, value)
-            if isinstance(value, float) or not declared.structural:  # a structural fraction stays exact
+            if isinstance(value, float) or not declared.structural:  # a structural Fraction stays exact
                 object.__setattr__(self, declared.attribute, number)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -74,19 +74,17 @@ class Part(ABC):
         return f"{type(self).__name__}({values})"
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with some parameters changed, checked like new ones."""
+        """Return a checked copy with some parameters changed."""
         known = self.parameters
         for name in changes:
             if name not in known:
-                raise ParameterError(
-                    f"{type(self).__name__} has no parameter {name!r}; it has {', '.join(known) or 'none'}."
-                )
+                raise ParameterError(f"{type(self).__name__} has no parameter {name!r}{nearest(name, known)}")
         return type(self)(**(known | changes))
 
     def twin(self, values: Mapping[str, Any]) -> Self:
-        """Return an unchecked copy whose parameters are `values` by name, SymPy symbols as a rule.
+        """Return an unchecked copy whose parameters are `values` by name, usually SymPy symbols.
 
-        The formula method, called on the twin, returns the formula as a SymPy expression.
+        The formula method of the twin returns the formula as a SymPy expression.
         """
         twin = object.__new__(type(self))
         for declared in self.declared():

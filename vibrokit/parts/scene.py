@@ -1,4 +1,4 @@
-"""Scene: checked parts that fit together."""
+"""Scene: the checked parts of one oscillator."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _OWN = (
     Parameter("natural_frequency", "natural_frequency", "omega_n", "s^-1", above=0),
     Parameter("damping_ratio", "damping_ratio", "zeta", "", minimum=0),
 )
-_LONGEST_RATIO = 1000  # common periods are looked for among frequency ratios of whole numbers up to this
+_LONGEST_RATIO = 1000  # largest whole number in a ratio of two frequencies with a common period
 
 
 class Entry(NamedTuple):
-    """One parameter of a scene: where it is, what was declared, its value."""
+    """One parameter of a scene: its path, its declaration and its value."""
 
     path: str
     declared: Parameter
@@ -38,11 +38,11 @@ class Scene:
     Parameters
     ----------
     natural_frequency : float
-        ω_n (s⁻¹), positive. Sets the spring ω_n² x unless another is given, and with ζ the damping 2ζω_n.
+        ω_n (s⁻¹), positive. Sets the spring ω_n² x if no spring is given, and with ζ the damping 2ζω_n.
     damping_ratio : float
         ζ, not negative.
     barriers : sequence of Barrier
-        At most one on each side, the left one not to the right of the right one.
+        At most one per side; the left one is not to the right of the right one.
     excitations : sequence of Excitation
     noise : NoiseModel, optional
     spring : Spring, optional
@@ -50,7 +50,7 @@ class Scene:
     Raises
     ------
     ParameterError, SceneError
-        A number out of range; parts that do not fit together.
+        A number is out of range, or parts do not fit together.
     """
 
     natural_frequency: float
@@ -78,14 +78,14 @@ class Scene:
             places = [barrier.position for barrier in self.barriers if barrier.side == side]
             if len(places) > 1:
                 raise SceneError(
-                    f"scene: {len(places)} stops on the {side} side, at {', '.join(f'{p:g}' for p in places)}; "
-                    "give at most one on each side."
+                    f"scene: at most one stop per side is allowed, got {len(places)} on the {side} side, at "
+                    f"{', '.join(f'{p:g}' for p in places)}."
                 )
         stops = {barrier.side: barrier.position for barrier in self.barriers}
         if len(stops) == 2 and stops["left"] > stops["right"]:
             raise SceneError(
                 f"scene: the left stop, at {stops['left']:g}, is to the right of the right stop, at "
-                f"{stops['right']:g}; the left one must not be beyond the right one (equal places are allowed)."
+                f"{stops['right']:g}; exchange them, or give both the same position."
             )
 
     def _check_periods(self) -> None:
@@ -93,12 +93,12 @@ class Scene:
             period = part.period
             if period is not None and (isinstance(period, bool) or not isinstance(period, Real) or not period > 0):
                 raise SceneError(
-                    f"scene: excitations.{index}, a {type(part).__name__}, has the period {shown(period)}; give a "
-                    "positive number, None for a constant force, or math.inf for one that never repeats."
+                    f"scene: the period of excitations.{index} ({type(part).__name__}) must be a positive number, None "
+                    f"for a constant force, or math.inf for one that never repeats, got {shown(period)}."
                 )
 
     def entries(self) -> tuple[Entry, ...]:
-        """Every parameter with its path, in the order in which they travel to compiled code."""
+        """Every parameter with its path, in the order of the parameter array of compiled code."""
         found = [Entry(declared.name, declared, getattr(self, declared.name)) for declared in _OWN]
         for prefix, part in self._placed_parts():
             values = part.parameters
@@ -117,26 +117,70 @@ class Scene:
         """Every parameter by its path, such as ``"excitations.0.frequency"``."""
         return {entry.path: entry.value for entry in self.entries()}
 
-    def replace(self, changes: Mapping[str, Any]) -> Self:
-        """Return a copy with the parameters at some paths changed.
+    def entry(self, path: str) -> Entry:
+        """Return the parameter at a path.
+
+        Parameters
+        ----------
+        path : str
+            A key of `parameters`, or the end of exactly one key after a dot: ``"frequency"`` is short for
+            ``"excitations.0.frequency"`` where there is one harmonic, and never for ``"natural_frequency"``.
 
         Raises
         ------
         ParameterError
-            An unknown path, or a value out of its range.
+            The path matches no parameter, or several.
         """
-        known = self.parameters
-        fields: dict[str, Any] = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        for path, value in changes.items():
-            if path not in known:
-                raise ParameterError(f"scene has no parameter {shown(path)}{nearest(path, known)}")
+        entries = {entry.path: entry for entry in self.entries()}
+        name = path if isinstance(path, str) else ""
+        found = [full for full in entries if full == name] or [full for full in entries if full.endswith(f".{name}")]
+        if not found:
+            raise ParameterError(f"scene has no parameter {shown(path)}{nearest(name, entries)}")
+        if len(found) > 1:
+            raise ParameterError(
+                f"scene: {shown(path)} matches {len(found)} parameters, {', '.join(found)}; give one full path."
+            )
+        return entries[found[0]]
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> Self:
+        """Return a copy with some parameters or parts changed, checked like a new scene.
+
+        Parameters
+        ----------
+        changes : mapping of str to value, optional
+            By name of a field of the scene, or by path of a parameter as in `entry`.
+        **more : value
+            Further changes, by name of a field or by short path.
+
+        Raises
+        ------
+        ParameterError, SceneError
+            An unknown or ambiguous path, one parameter given twice, a value out of range, or parts that do not
+            fit together.
+
+        Examples
+        --------
+        >>> osc.replace(damping_ratio=0.02, noise=vk.WhiteNoise(intensity=1e-4))  # doctest: +SKIP
+        >>> osc.replace({"noise.intensity": 1e-4}, frequency=0.58)  # doctest: +SKIP
+        """
+        fields = {field.name for field in dataclasses.fields(self)}
+        if not isinstance(changes, Mapping | None):
+            raise ParameterError(f"scene: changes must be a mapping from paths to values, got {shown(changes)}.")
+        given = [*(changes or {}).items(), *more.items()]
+        scene = dataclasses.replace(self, **{key: value for key, value in given if key in fields})
+        paths = [key if key in fields else scene.entry(key).path for key, _ in given]
+        changed: dict[str, Any] = {}
+        for path, (_, value) in zip(paths, given, strict=True):
+            if paths.count(path) > 1:
+                raise ParameterError(f"scene: {path} is given {paths.count(path)} times; give it once.")
             head, *rest = path.split(".")
-            fields[head] = _replaced(fields[head], rest, value)
-        return type(self)(**fields)
+            if rest:
+                changed[head] = _replaced(changed.get(head, getattr(scene, head)), rest, value)
+        return dataclasses.replace(scene, **changed)
 
     @property
     def period(self) -> float | None:
-        """Common period of the excitations (s); None if none is periodic.
+        """Common period of the excitations (s); None without periodic excitation.
 
         Raises
         ------
@@ -157,7 +201,7 @@ class Scene:
             if ratio > _LONGEST_RATIO or not math.isclose(float(ratio), longest / period, rel_tol=1e-12):
                 raise NoSectionError(
                     f"scene: excitations of periods {longest:.10g} and {period:.10g} have no common period, so there "
-                    f"is no section; make the ratio of their frequencies one of whole numbers up to {_LONGEST_RATIO}."
+                    f"is no section; give frequencies whose ratio is one of whole numbers up to {_LONGEST_RATIO}."
                 )
             multiple = math.lcm(multiple, ratio.denominator)
         return longest * multiple
@@ -169,19 +213,19 @@ class Scene:
 
     @property
     def section_interval(self) -> float:
-        """Time from section to section (s): the common period, or 2π/ω_n for an autonomous scene."""
+        """Time between sections (s): the common period, or 2π/ω_n for an autonomous scene."""
         return self.period or 2 * math.pi / self.natural_frequency
 
     @property
     def time_unit(self) -> float:
-        """Time that steps and samples are counted in (s): the section interval, or 2π/ω_n without a section."""
+        """Unit of time for counts of steps and samples (s): the section interval, or 2π/ω_n without a section."""
         try:
             return self.section_interval
         except NoSectionError:
             return 2 * math.pi / self.natural_frequency
 
     def repeats_after(self, interval: float) -> bool:
-        """Whether the excitations are the same again after `interval` (s), so that trajectories share the phase."""
+        """Whether the excitations repeat after `interval` (s), so that trajectories share the phase."""
         if self.autonomous:
             return True
         try:
@@ -193,13 +237,13 @@ class Scene:
 
 def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:
     if isinstance(parts, kind):
-        raise SceneError(f"scene: {name} is a single {type(parts).__name__}; give a sequence of them, even of one.")
+        raise SceneError(f"scene: {name} must be a sequence, got a single {type(parts).__name__}; give a list of it.")
     if not isinstance(parts, Iterable):
-        raise SceneError(f"scene: {name} is {shown(parts)}; give a sequence of {kind.__name__}s, empty for none.")
+        raise SceneError(f"scene: {name} must be a sequence of {kind.__name__} objects, got {shown(parts)}.")
     found = tuple(parts)
     for part in found:
         if not isinstance(part, kind):
-            raise SceneError(f"scene: {name} has {shown(part)}, which is no {kind.__name__}; give one.")
+            raise SceneError(f"scene: {name} must be of type {kind.__name__}, got {shown(part)}.")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Where pictures are drawn."""
+"""Axes, colours and legends that all pictures share."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 COLOURS = (
@@ -33,33 +34,36 @@ def colour(label: int) -> str:
     return COLOURS[label % len(COLOURS)]
 
 
-def draw_stops(ax: Axes, stops: Any) -> list[Any]:
+def draw_stops(ax: Axes, stops: Iterable[float]) -> tuple[Line2D, ...]:
     """Draw the stops as vertical lines."""
-    return [ax.axvline(place, color="0.55", linewidth=1.0, linestyle=(0, (4, 2)), zorder=0) for place in stops]
+    return tuple(ax.axvline(place, color="0.55", linewidth=1.0, linestyle=(0, (4, 2)), zorder=0) for place in stops)
 
 
-def draw_walls(ax: Axes, stops: Iterable[tuple[float, str]], reach: tuple[float, float]) -> list[Any]:
+def draw_walls(
+    ax: Axes, stops: Iterable[tuple[float, str]], reach: tuple[float, float]
+) -> tuple[tuple[Line2D, ...], tuple[Rectangle, ...]]:
     """Draw the stops as hatched walls.
 
     Parameters
     ----------
     ax : matplotlib Axes
     stops : iterable of (float, str)
-        Place of each (m) and the side that it is on, ``"left"`` or ``"right"``.
+        Place of each (m) and its side, ``"left"`` or ``"right"``.
     reach : (float, float)
         Least and largest x up to which the walls are drawn (m).
 
     Returns
     -------
-    list of artists
-        Face and wall of each stop.
+    faces : tuple of Line2D
+    walls : tuple of Rectangle
     """
-    artists: list[Any] = []
+    faces: list[Line2D] = []
+    walls: list[Rectangle] = []
     for place, side in stops:
         ends = (place, max(place, reach[1])) if side == "right" else (min(place, reach[0]), place)
-        artists.append(ax.axvline(place, color=WALL, linewidth=1.2, zorder=0.6))
-        artists.append(ax.axvspan(*ends, facecolor="0.96", edgecolor="0.78", hatch="////", linewidth=0, zorder=0.5))
-    return artists
+        faces.append(ax.axvline(place, color=WALL, linewidth=1.2, zorder=0.6))
+        walls.append(ax.axvspan(*ends, facecolor="0.96", edgecolor="0.78", hatch="////", linewidth=0, zorder=0.5))
+    return tuple(faces), tuple(walls)
 
 
 def rows(points: ArrayLike) -> NDArray[np.float64]:
@@ -75,7 +79,7 @@ def phase_plane(ax: Axes) -> None:
 
 
 def add_legend(ax: Axes, given: Axes | None, handles: Sequence[Any]) -> None:
-    """Add a legend: beside the axes of a figure of our own, inside axes that were given, where there is most room."""
+    """Add a legend: beside the axes of a new figure, or inside axes that were given, where there is most room."""
     if not handles:
         return
     if given is None:
@@ -100,6 +104,6 @@ def span(values: Sequence[Any]) -> tuple[float, float]:
     if finite.size == 0:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    resting = high - low <= _ROUNDING * max(1.0, abs(high))  # what is left of it is rounding
+    resting = high - low <= _ROUNDING * max(1.0, abs(high))  # the width is rounding
     room = 0.1 * max(1.0, abs(high)) if resting else 0.06 * (high - low)
     return low - room, high + room

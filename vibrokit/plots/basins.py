@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
+from vibrokit.plots.artists import Artists, attractor_name
 from vibrokit.plots.axes import add_legend, axes_or_new, colour, named, phase_plane, rows
 from vibrokit.plots.clipping import clipped
 
@@ -41,27 +45,72 @@ _SADDLE_MARKERS: Mapping[str, Style] = {
 }
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class BasinArtists(Artists):
+    """Basins and attractors.
+
+    Attributes
+    ----------
+    ax : Axes
+    image : AxesImage
+        The cells.
+    hatching : Rectangle or None
+        Seen where motion leaves the region.
+    attractors : tuple of Line2D
+        The markers of each attractor.
+    """
+
+    image: AxesImage
+    hatching: Rectangle | None
+    attractors: tuple[Line2D, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SectionArtists(BasinArtists):
+    """Basins, attractors, saddles and manifolds.
+
+    Attributes
+    ----------
+    ax, image, hatching, attractors
+        As in `BasinArtists`.
+    stable, unstable : tuple of Line2D
+        Branches of the manifolds.
+    cycles : tuple of Line2D
+        Limit cycles.
+    saddles : tuple of Line2D
+        The markers of each saddle.
+    """
+
+    stable: tuple[Line2D, ...]
+    unstable: tuple[Line2D, ...]
+    cycles: tuple[Line2D, ...]
+    saddles: tuple[Line2D, ...]
+
+
 def basin_map(
     labels: NDArray[Any],
     bounds: ArrayLike,
     points: Sequence[ArrayLike],
     *,
+    names: Sequence[str] = (),
     kinds: Sequence[str] = (),
     ax: Axes | None = None,
-) -> list[Any]:
+) -> BasinArtists:
     """Draw basins as pale colours and attractors as markers.
 
-    Cells that settled on nothing are grey, those whose motion left the region are hatched, and those that were not
+    Cells that did not settle are grey, those whose motion left the region are hatched, and those that were not
     followed are dark.
 
     Parameters
     ----------
     labels : int array (nx, nv)
-        Label of the attractor that each cell leads to; −1 settled on nothing, −2 left, −3 not followed.
+        Label of the attractor that each cell leads to; −1 not settled, −2 left the region, −3 not followed.
     bounds : array_like (2, 2)
         Bounds of x and v.
     points : sequence of array_like (count, n)
         Points of each attractor, x and v first.
+    names : sequence of str, optional
+        Name of each attractor; ``"attractor 0"`` and so on by default.
     kinds : sequence of str, optional
         Kind of each attractor, which chooses its marker: ``"periodic"`` (circle), ``"equilibrium"`` (square),
         ``"limit cycle"`` (diamond), ``"chaotic"`` or ``"quasiperiodic"`` (dots). All periodic by default.
@@ -69,8 +118,7 @@ def basin_map(
 
     Returns
     -------
-    list of artists
-        The image of the basins, the hatching if there is any, the markers of each attractor.
+    BasinArtists
     """
     axes = axes_or_new(ax, 5.4, 4.6)
     cells = np.asarray(labels)
@@ -86,19 +134,20 @@ def basin_map(
         aspect="auto",
         interpolation="nearest",
     )
-    artists: list[Any] = [image]
+    hatching = None
     if (cells == LEFT).any():  # seen through the image where that is clear
-        under = Rectangle((x_low, v_low), x_high - x_low, v_high - v_low, zorder=-1, **_HATCH)
-        artists.append(axes.add_patch(under))
+        hatching = Rectangle((x_low, v_low), x_high - x_low, v_high - v_low, zorder=-1, **_HATCH)
+        axes.add_patch(hatching)
+    attractors: list[Line2D] = []
     for label, visits in enumerate(points):
         place = rows(visits)
-        name = f"attractor {label}" + (f", {kinds[label]}" if kinds else "")
+        name = attractor_name(label, names) + (f", {kinds[label]}" if kinds else "")
         style: Style = {"markeredgecolor": "white", **_style_of(_MARKERS, kinds, label)}
-        artists += axes.plot(
+        attractors += axes.plot(
             place[:, 0], place[:, 1], linestyle="none", color=colour(label), label=name, zorder=7, **style
         )  # fmt: skip
     phase_plane(axes)
-    return artists
+    return BasinArtists(axes, image, hatching, tuple(attractors))
 
 
 def section_portrait(
@@ -106,6 +155,7 @@ def section_portrait(
     bounds: ArrayLike,
     points: Sequence[ArrayLike],
     *,
+    names: Sequence[str] = (),
     kinds: Sequence[str] = (),
     saddles: Sequence[ArrayLike] = (),
     saddle_kinds: Sequence[str] = (),
@@ -113,12 +163,12 @@ def section_portrait(
     unstable: Sequence[ArrayLike] = (),
     cycles: Mapping[int, ArrayLike] | None = None,
     ax: Axes | None = None,
-) -> list[Any]:
+) -> SectionArtists:
     """Draw attractors, saddles and their manifolds over the basins: the global structure on the section.
 
     Parameters
     ----------
-    labels, bounds, points, kinds
+    labels, bounds, points, names, kinds
         As in `basin_map`.
     saddles : sequence of array_like (count, n)
         Points of each saddle.
@@ -126,39 +176,46 @@ def section_portrait(
         Kind of each, which chooses its marker: ``"saddle"`` (cross), ``"flip saddle"`` (plus), ``"repeller"``
         (triangle), ``"chaotic"`` (dots). All saddles by default.
     stable, unstable : sequence of array_like (count, 2)
-        Branches of the manifolds as curves; what lies outside the bounds is cut off.
+        Branches of the manifolds as curves; parts outside the bounds are cut off.
     cycles : dict of int to array_like (count, 2), optional
-        Limit cycles as curves, by the place of the attractor.
+        Limit cycles as curves, by label of the attractor.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
 
     Returns
     -------
-    list of artists
-        Those of `basin_map`, a line for each branch (stable ones first) and each cycle, the markers of each saddle.
+    SectionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.8)
     box = np.asarray(bounds, dtype=float)
-    artists = basin_map(labels, box, points, kinds=kinds, ax=axes)
-    for curves, ink, name in ((stable, STABLE, "stable manifold"), (unstable, UNSTABLE, "unstable manifold")):
-        for index, curve in enumerate(curves):
-            inside = clipped(curve, box)
-            artists += axes.plot(
-                inside[:, 0], inside[:, 1], color=ink, linewidth=0.8, zorder=3, rasterized=len(inside) > _DENSE,
-                label=name if index == 0 else "_more",
-            )  # fmt: skip
-    for place, curve in (cycles or {}).items():
+    basins = basin_map(labels, box, points, names=names, kinds=kinds, ax=axes)
+    inwards = _draw_curves(axes, [clipped(curve, box) for curve in stable], STABLE, "stable manifold")
+    outwards = _draw_curves(axes, [clipped(curve, box) for curve in unstable], UNSTABLE, "unstable manifold")
+    loops: list[Line2D] = []
+    for label, curve in (cycles or {}).items():
         x, v = np.asarray(curve, dtype=float)[:, :2].T
-        artists += axes.plot(x, v, color=colour(place), linewidth=1.4, zorder=4, label="_cycle")
-    artists += _draw_saddles(axes, saddles, saddle_kinds)
+        loops += axes.plot(x, v, color=colour(label), linewidth=1.4, zorder=4, label="_cycle")
+    marks = _draw_saddles(axes, saddles, saddle_kinds)
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
-    add_legend(axes, ax, [*named(artists), *cell_samples(np.asarray(labels))])
-    return artists
+    add_legend(axes, ax, [*named((*basins.attractors, *inwards, *outwards, *marks)), *cell_samples(labels)])
+    return SectionArtists(
+        axes, basins.image, basins.hatching, basins.attractors, inwards, outwards, tuple(loops), marks
+    )  # fmt: skip
 
 
-def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]) -> list[Any]:
-    artists: list[Any] = []
+def _draw_curves(axes: Axes, curves: Sequence[NDArray[np.float64]], ink: str, name: str) -> tuple[Line2D, ...]:
+    lines: list[Line2D] = []
+    for curve in curves:
+        lines += axes.plot(
+            curve[:, 0], curve[:, 1], color=ink, linewidth=0.8, zorder=3, rasterized=len(curve) > _DENSE,
+            label="_more" if lines else name,
+        )  # fmt: skip
+    return tuple(lines)
+
+
+def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]) -> tuple[Line2D, ...]:
+    marks: list[Line2D] = []
     seen: set[str] = set()
     for index, visits in enumerate(saddles):
         kind = kinds[index] if kinds else "saddle"
@@ -167,25 +224,29 @@ def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]
         style = {"markeredgecolor": "white", **_style_of(_SADDLE_MARKERS, kinds, index)}
         if len(place) > _FEW and kind != "chaotic":  # so that many points do not hide what they lie on
             style |= {"markersize": 4, "markeredgewidth": 0.4}
-        artists += axes.plot(
+        marks += axes.plot(
             place[:, 0], place[:, 1], linestyle="none", color="black", zorder=6,
             label="_more" if kind in seen else name, **style,
         )  # fmt: skip
         seen.add(kind)
-    return artists
+    return tuple(marks)
 
 
 def _style_of(markers: Mapping[str, Style], kinds: Sequence[str], index: int) -> Style:
-    """Marker of a kind; that of the first kind where none is said or it is unknown."""
+    """Marker of a kind; that of the first kind if none is given or it is unknown."""
     usual = next(iter(markers))
     return markers.get(kinds[index] if kinds else usual, markers[usual])
 
 
 def cell_samples(cells: NDArray[Any]) -> list[Patch]:
-    """Entries of the legend for cells that lead to no attractor, where there are any."""
+    """Entries of the legend for cells that lead to no attractor, if there are any."""
     samples = (
         (UNSETTLED, {"facecolor": _GREY}, "not settled"),
         (LEFT, _HATCH, "leaves the region"),
         (NOT_FOLLOWED, {"facecolor": _DARK}, "not followed"),
     )
-    return [Patch(**{"linewidth": 0, **style}, label=name) for label, style, name in samples if (cells == label).any()]
+    return [
+        Patch(**{"linewidth": 0, **style}, label=name)
+        for label, style, name in samples
+        if (np.asarray(cells) == label).any()
+    ]

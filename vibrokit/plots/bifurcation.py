@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
+from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import add_legend, axes_or_new, colour, named
 
 _MARKS: Mapping[str, Mapping[str, Any]] = {
@@ -22,15 +26,50 @@ _MARKS: Mapping[str, Mapping[str, Any]] = {
 _OTHER_MARKS = ("^", "<", ">", "h", "d", "X")
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class BifurcationArtists(Artists):
+    """A bifurcation diagram.
+
+    Attributes
+    ----------
+    ax : Axes
+    branches : tuple of Line2D
+        The points of each branch, in the order of their numbers.
+    marks : tuple of Line2D
+        Bifurcations, kind by kind: one for those with an x, and one for each without.
+    """
+
+    branches: tuple[Line2D, ...]
+    marks: tuple[Line2D, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FractionArtists(Artists):
+    """Basin fractions.
+
+    Attributes
+    ----------
+    ax : Axes
+    areas : tuple of PolyCollection
+        The area of each branch.
+    remainder : PolyCollection or None
+        What leads to none of the branches; None if it vanishes.
+    """
+
+    areas: tuple[PolyCollection, ...]
+    remainder: PolyCollection | None
+
+
 def bifurcation_diagram(
     values: ArrayLike,
     x: ArrayLike,
     branches: ArrayLike,
     marks: Sequence[tuple[str, float, float]] = (),
     *,
+    names: Sequence[str] = (),
     label: str,
     ax: Axes | None = None,
-) -> list[Any]:
+) -> BifurcationArtists:
     """Draw the points of steady states on the section against a parameter, with the bifurcations marked.
 
     Parameters
@@ -44,6 +83,8 @@ def bifurcation_diagram(
     marks : sequence of (str, float, float)
         Kind of each bifurcation (``"grazing"``, ``"period doubling"``, ``"fold"``, …), the parameter's value there, and
         x on the section; with x = NaN, a line marks the value alone.
+    names : sequence of str, optional
+        What the legend calls each branch, by number; ``"branch 0"`` and so on by default.
     label : str
         Symbol and unit of the parameter, such as ``r"forcing frequency $\\omega$ (rad s$^{-1}$)"``.
     ax : matplotlib Axes, optional
@@ -51,41 +92,40 @@ def bifurcation_diagram(
 
     Returns
     -------
-    list of artists
-        A line of dots for each branch, in order of their numbers; then the marks, kind by kind, one artist for those
-        with an x and one for each without.
+    BifurcationArtists
     """
     axes = axes_or_new(ax, 7.0, 4.4)
     value, place, branch = (np.ravel(np.asarray(array)) for array in (values, x, branches))
-    artists: list[Any] = []
+    lines: list[Line2D] = []
     for number in np.unique(branch):
         own = branch == number
-        size = 3.0 if own.sum() < 1000 else 1.0
-        artists += axes.plot(
-            value[own], place[own], ".", markersize=size, color=colour(int(number)), label=f"branch {number}",
+        size, name = 3.0 if own.sum() < 1000 else 1.0, names[number] if number < len(names) else f"branch {number}"
+        lines += axes.plot(
+            value[own], place[own], ".", markersize=size, color=colour(int(number)), label=name,
             rasterized=own.sum() > 10_000,
         )  # fmt: skip
+    drawn: list[Line2D] = []
     for index, kind in enumerate(dict.fromkeys(kind for kind, _, _ in marks)):
-        artists += _draw_marks(axes, kind, index, np.array([(a, b) for k, a, b in marks if k == kind], dtype=float))
+        drawn += _draw_marks(axes, kind, index, np.array([(a, b) for k, a, b in marks if k == kind], dtype=float))
     axes.set_xlabel(label)
     axes.set_ylabel(r"displacement on the section $x$ (m)")
-    add_legend(axes, ax, named(artists))
-    return artists
+    add_legend(axes, ax, named((*lines, *drawn)))
+    return BifurcationArtists(axes, tuple(lines), tuple(drawn))
 
 
-def _draw_marks(axes: Axes, kind: str, index: int, at: Any) -> list[Any]:
+def _draw_marks(axes: Axes, kind: str, index: int, at: Any) -> list[Line2D]:
     style = _MARKS.get(kind, {"marker": _OTHER_MARKS[index % len(_OTHER_MARKS)], "color": "black"})
     placed = at[np.isfinite(at[:, 1])]
-    artists: list[Any] = []
+    marks: list[Line2D] = []
     if len(placed):
-        artists += axes.plot(
+        marks += axes.plot(
             placed[:, 0], placed[:, 1], linestyle="none", label=kind, zorder=5,
             **{"markersize": 7, "markeredgecolor": "white", **style},
         )  # fmt: skip
     for number, value in enumerate(at[~np.isfinite(at[:, 1]), 0]):
         name = "_more" if number or len(placed) else kind
-        artists.append(axes.axvline(value, color=style["color"], linewidth=0.8, linestyle=":", label=name, zorder=1))
-    return artists
+        marks.append(axes.axvline(value, color=style["color"], linewidth=0.8, linestyle=":", label=name, zorder=1))
+    return marks
 
 
 def basin_fractions(
@@ -96,18 +136,18 @@ def basin_fractions(
     label: str,
     branches: Sequence[int] | None = None,
     ax: Axes | None = None,
-) -> list[Any]:
-    """Draw shares of the region against a parameter as areas, one on the other.
+) -> FractionArtists:
+    """Draw shares of the region against a parameter as stacked areas.
 
     Parameters
     ----------
     values : array_like (count,)
-        The parameter's values, in any order; an area takes two or more.
+        The parameter's values, in any order; an area needs at least two.
     fractions : array_like (branches, count)
-        Share of the region that leads to each branch; 0 or NaN where it is not there. Where all are NaN, nothing is
+        Share of the region that leads to each branch; 0 or NaN where it does not exist. Where all are NaN, nothing is
         known, and the areas have a gap.
     names : sequence of str
-        What each branch is called in the legend.
+        What the legend calls each branch.
     label : str
         Symbol and unit of the parameter.
     branches : sequence of int, optional
@@ -117,8 +157,7 @@ def basin_fractions(
 
     Returns
     -------
-    list of artists
-        The area of each branch; last, if it does not vanish, what leads to none of them.
+    FractionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.0)
     order = np.argsort(np.ravel(np.asarray(values, dtype=float)), kind="stable")
@@ -127,17 +166,18 @@ def basin_fractions(
     share = np.where(np.isnan(given).all(axis=0), np.nan, np.nan_to_num(given))
     tops = np.cumsum(share, axis=0)
     numbers = range(len(names)) if branches is None else branches
-    artists: list[Any] = []
-    for number, name, top, part in zip(numbers, names, tops, share, strict=True):
-        area = axes.fill_between(value, top - part, top, color=colour(number), alpha=0.7, linewidth=0, label=name)
-        artists.append(area)
+    areas = tuple(
+        axes.fill_between(value, top - part, top, color=colour(number), alpha=0.7, linewidth=0, label=name)
+        for number, name, top, part in zip(numbers, names, tops, share, strict=True)
+    )
     reached = tops[-1] if len(names) else np.zeros(len(value))
+    remainder = None
     if (reached < 1 - 1e-9).any():
-        artists.append(axes.fill_between(value, reached, 1.0, color="0.85", linewidth=0, label="none of these"))
+        remainder = axes.fill_between(value, reached, 1.0, color="0.85", linewidth=0, label="none of these")
     axes.set_ylim(0, 1)
     if len(value) > 1 and value[-1] > value[0]:
         axes.set_xlim(value[0], value[-1])
     axes.set_xlabel(label)
     axes.set_ylabel("share of the region")
-    add_legend(axes, ax, artists)
-    return artists
+    add_legend(axes, ax, [*areas, *([] if remainder is None else [remainder])])
+    return FractionArtists(axes, areas, remainder)

@@ -2,21 +2,60 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
+from vibrokit.plots.artists import Artists, attractor_name
 from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw_stops, draw_walls, named, phase_plane, rows, span
 
 _SAMPLE = 32  # points above which they are a sample of motion that never repeats, or as crowded as one
 _DENSE = 20_000  # samples of a line above which it is drawn thin, as pixels
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class PortraitArtists(Artists):
+    """A trajectory in the phase plane.
+
+    Attributes
+    ----------
+    ax : Axes
+    line : Line2D
+    stops : tuple of Line2D
+    """
+
+    line: Line2D
+    stops: tuple[Line2D, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MotionArtists(Artists):
+    """Steady motions in the phase plane.
+
+    Attributes
+    ----------
+    ax : Axes
+    orbits, points : tuple of Line2D
+        The line and the markers of each motion.
+    stops : tuple of Line2D
+        The face of each stop.
+    walls : tuple of Rectangle
+        The hatched part behind each stop.
+    """
+
+    orbits: tuple[Line2D, ...]
+    points: tuple[Line2D, ...]
+    stops: tuple[Line2D, ...]
+    walls: tuple[Rectangle, ...]
+
+
 def phase_portrait(
     x: ArrayLike, v: ArrayLike, *, stops: tuple[float, ...] = (), label: int = 0, ax: Axes | None = None
-) -> list[Any]:
+) -> PortraitArtists:
     """Draw a trajectory in the phase plane, with the stops.
 
     Parameters
@@ -31,12 +70,13 @@ def phase_portrait(
 
     Returns
     -------
-    list of artists
+    PortraitArtists
     """
     axes = axes_or_new(ax)
-    artists = [*draw_stops(axes, stops), *axes.plot(x, v, color=colour(label), linewidth=1.0)]
+    faces = draw_stops(axes, stops)
+    (line,) = axes.plot(x, v, color=colour(label), linewidth=1.0)
     phase_plane(axes)
-    return artists
+    return PortraitArtists(axes, line, faces)
 
 
 def steady_motions(
@@ -46,7 +86,7 @@ def steady_motions(
     stops: Sequence[tuple[float, str]] = (),
     names: Sequence[str] = (),
     ax: Axes | None = None,
-) -> list[Any]:
+) -> MotionArtists:
     """Draw the steady motions of all attractors in the phase plane, with the stops as hatched walls.
 
     Parameters
@@ -58,35 +98,32 @@ def steady_motions(
     stops : sequence of (float, str)
         Place of each stop (m) and its side, ``"left"`` or ``"right"``.
     names : sequence of str, optional
-        What each motion is called in the legend; ``"attractor 0"`` and so on by default.
+        What the legend calls each motion; ``"attractor 0"`` and so on by default.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
 
     Returns
     -------
-    list of artists
-        Line and markers of each motion, then face and wall of each stop.
+    MotionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.4)
-    artists: list[Any] = []
+    lines: list[Line2D] = []
+    marks: list[Line2D] = []
     paths = [rows(orbit) for orbit in orbits]
     for label, (path, visits) in enumerate(zip(paths, points, strict=True)):
-        name = names[label] if names else f"attractor {label}"
         many = len(path) > _DENSE
-        artists += axes.plot(
+        lines += axes.plot(
             path[:, 0], path[:, 1], color=colour(label), linewidth=0.3 if many else 1.2, alpha=0.6 if many else 1.0,
-            label=name, rasterized=many, zorder=2,
+            label=attractor_name(label, names), rasterized=many, zorder=2,
         )  # fmt: skip
         place = rows(visits)
         dots = {"markersize": 2.2, "markeredgewidth": 0}
         edge = dots if len(place) > _SAMPLE else {"markersize": 6, "markeredgecolor": "white"}
-        artists += axes.plot(
-            place[:, 0], place[:, 1], "o", color=colour(label), label="_section", zorder=3, **edge
-        )  # fmt: skip
+        marks += axes.plot(place[:, 0], place[:, 1], "o", color=colour(label), label="_section", zorder=3, **edge)
     reach = span([*(path[:, 0] for path in paths), [place for place, _ in stops]])
-    artists += draw_walls(axes, stops, reach)
+    faces, walls = draw_walls(axes, stops, reach)
     axes.set_xlim(*reach)
     axes.set_ylim(*span([path[:, 1] for path in paths]))
     phase_plane(axes)
-    add_legend(axes, ax, named(artists))
-    return artists
+    add_legend(axes, ax, named(lines))
+    return MotionArtists(axes, tuple(lines), tuple(marks), faces, walls)

@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar
+from matplotlib.contour import QuadContourSet
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
+from vibrokit.plots.artists import Artists, attractor_name
 from vibrokit.plots.axes import axes_or_new, colour, named, phase_plane, rows
 
 _LEVELS = 14
 _PATH = "#c4007a"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class QuasiPotentialArtists(Artists):
+    """A quasi-potential on the section.
+
+    Attributes
+    ----------
+    ax : Axes
+    image : AxesImage
+    contours : QuadContourSet or None
+        None if the quasi-potential is flat or unknown.
+    attractor : Line2D
+    saddles, paths : tuple of Line2D
+        The markers of each.
+    colorbar : Colorbar
+    """
+
+    image: AxesImage
+    contours: QuadContourSet | None
+    attractor: Line2D
+    saddles: tuple[Line2D, ...]
+    paths: tuple[Line2D, ...]
+    colorbar: Colorbar
 
 
 def quasi_potential_map(
@@ -21,11 +50,12 @@ def quasi_potential_map(
     points: ArrayLike,
     *,
     label: int = 0,
+    names: Sequence[str] = (),
     top: float | None = None,
     saddles: Sequence[ArrayLike] = (),
     paths: Sequence[ArrayLike] = (),
     ax: Axes | None = None,
-) -> list[Any]:
+) -> QuasiPotentialArtists:
     """Draw the quasi-potential of an attractor as shades and level lines; white where it is not known.
 
     Parameters
@@ -38,8 +68,10 @@ def quasi_potential_map(
         Points of the attractor, x and v first.
     label : int
         Of the attractor: chooses its colour.
+    names : sequence of str, optional
+        Names of all attractors, in the order of their labels.
     top : float, optional
-        Value from which on all has one shade; by default the largest.
+        Value above which all shades are the same; by default the largest.
     saddles : sequence of array_like (count, n)
     paths : sequence of array_like (count, n)
         Points of exit paths on the section.
@@ -47,8 +79,7 @@ def quasi_potential_map(
 
     Returns
     -------
-    list of artists
-        The shades, the level lines if there are any, then markers of attractor, saddles and paths.
+    QuasiPotentialArtists
     """
     axes = axes_or_new(ax, 7.6, 4.8)
     psi = np.ma.masked_invalid(np.asarray(potential, dtype=float))
@@ -57,29 +88,28 @@ def quasi_potential_map(
         psi.T, origin="lower", extent=tuple(box.ravel()), cmap="YlGnBu_r", vmin=0.0, vmax=top, aspect="auto",
         interpolation="nearest",
     )  # fmt: skip
-    artists: list[Any] = [image]
+    contours = None
     highest = float(psi.max() if top is None else top) if psi.count() else 0.0
     if highest > 0 and min(psi.shape) > 1:
         x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
-        artists.append(
-            axes.contour(x, v, psi.T, levels=np.linspace(0.0, highest, _LEVELS)[1:-1], colors="0.25", linewidths=0.4)
-        )
+        levels = np.linspace(0.0, highest, _LEVELS)[1:-1]
+        contours = axes.contour(x, v, psi.T, levels=levels, colors="0.25", linewidths=0.4)
     place = rows(points)
-    artists += axes.plot(
+    (attractor,) = axes.plot(
         place[:, 0], place[:, 1], "o", color=colour(label), markeredgecolor="white", markersize=6, zorder=6,
-        label=f"attractor {label}",
+        label=attractor_name(label, names),
     )  # fmt: skip
-    for index, visits in enumerate(saddles):
-        place = rows(visits)
-        artists += axes.plot(
+    crosses: list[Line2D] = []
+    for place in map(rows, saddles):
+        crosses += axes.plot(
             place[:, 0], place[:, 1], "X", color="black", markeredgecolor="white", markersize=7, zorder=6,
-            label="_more" if index else "saddle",
+            label="_more" if crosses else "saddle",
         )  # fmt: skip
-    for index, path in enumerate(paths):
-        place = rows(path)
-        artists += axes.plot(
+    dots: list[Line2D] = []
+    for place in map(rows, paths):
+        dots += axes.plot(
             place[:, 0], place[:, 1], "o", color=_PATH, markersize=2.4, markeredgewidth=0, zorder=5,
-            label="_more" if index else "exit path",
+            label="_more" if dots else "exit path",
         )  # fmt: skip
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
@@ -89,6 +119,7 @@ def quasi_potential_map(
     )  # fmt: skip
     bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.legend(
-        handles=named(artists), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=8, frameon=False
+        handles=named((attractor, *crosses, *dots)), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=8,
+        frameon=False,
     )  # fmt: skip
-    return artists
+    return QuasiPotentialArtists(axes, image, contours, attractor, tuple(crosses), tuple(dots), bar)

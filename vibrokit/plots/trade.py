@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.lines import Line2D
 
+from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour
 
 _FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axis
@@ -31,7 +35,26 @@ class WorkPrecision(Protocol):
     def default(self) -> bool: ...
 
 
-def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> list[Any]:
+@dataclasses.dataclass(frozen=True, eq=False)
+class TradeArtists(Artists):
+    """Work and precision.
+
+    Attributes
+    ----------
+    ax : Axes
+    ensembles, spreads, alone : tuple
+        For each stepper: the line of ensembles, the shade up to the 90 % quantile, the line of single trajectories.
+    defaults : tuple of Line2D
+        Rings around the default settings.
+    """
+
+    ensembles: tuple[Line2D, ...]
+    spreads: tuple[PolyCollection, ...]
+    alone: tuple[Line2D, ...]
+    defaults: tuple[Line2D, ...]
+
+
+def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> TradeArtists:
     """Draw error against time, one line per stepper: solid in an ensemble, dotted one trajectory at a time.
 
     Parameters
@@ -42,26 +65,29 @@ def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> 
 
     Returns
     -------
-    list of artists
+    TradeArtists
     """
     axes = axes_or_new(ax, 6.4, 4.8)
-    artists: list[Any] = []
+    ensembles: list[Line2D] = []
+    spreads: list[PolyCollection] = []
+    alone: list[Line2D] = []
+    defaults: list[Line2D] = []
     for label, name in enumerate(dict.fromkeys(row.name for row in rows)):
         own = [row for row in rows if row.name == name]
         errors = [max(row.error_median, _FLOOR) for row in own]
         times = [1e6 * row.seconds for row in own]
-        artists += axes.plot(times, errors, "o-", color=colour(label), markersize=4, label=f"{name}, ensemble")
-        artists.append(
+        ensembles += axes.plot(times, errors, "o-", color=colour(label), markersize=4, label=f"{name}, ensemble")
+        spreads.append(
             axes.fill_between(
                 times, errors, [max(row.error_90, _FLOOR) for row in own], color=colour(label), alpha=0.12, linewidth=0
             )
         )
-        artists += axes.plot(
+        alone += axes.plot(
             [1e6 * row.seconds_alone for row in own], errors, "o:", color=colour(label), markersize=3,
             markerfacecolor="white", label=f"{name}, alone",
         )  # fmt: skip
         for row in (row for row in own if row.default):
-            artists += axes.plot(
+            defaults += axes.plot(
                 1e6 * row.seconds, max(row.error_median, _FLOOR), "o", color=colour(label), markersize=10,
                 markerfacecolor="none", label=f"default: {row.stepper}",
             )  # fmt: skip
@@ -71,4 +97,4 @@ def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> 
     axes.set_ylabel(r"error: distance in $(x, v)$ (m, m s$^{-1}$)")
     axes.grid(which="major", color="0.9", linewidth=0.6)
     axes.legend(fontsize=7, title="line: median, shade: to 90 %", title_fontsize=7)
-    return artists
+    return TradeArtists(axes, tuple(ensembles), tuple(spreads), tuple(alone), tuple(defaults))

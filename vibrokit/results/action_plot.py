@@ -2,70 +2,91 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.results.content import Content
-from vibrokit.results.path_pictures import plot_exit_paths
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.labels import label_of
 from vibrokit.results.result import Result
-from vibrokit.results.section import Section
+
+if TYPE_CHECKING:
+    from vibrokit.plots.actions import ActionMapArtists, ActionPlotArtists
+
+Starts = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ActionPlotResult(Result):
     """Actions of exits against the angle and the radius at which they started, attractor by attractor.
 
-    `data` has, for the attractor of label k and every start:
+    `data` has, along ``source`` and ``start``:
 
-    - ``angle_k``, in the plane where Σ is a circle (on the ring, in the plane of m and m s⁻¹);
-    - ``radius_k``, how far from the inner to the outer edge of the fundamental domain, from 0 to 1 on a logarithmic
+    - ``angle``, in the plane where Σ is a circle (on the ring, in the plane of m and m s⁻¹);
+    - ``radius``, the distance from the inner to the outer edge of the fundamental domain, from 0 to 1 on a logarithmic
       scale; 0 on the ring;
-    - ``polar_k``, further angles, where noise has states of its own;
-    - ``action_k``, at the exit, NaN where there was none; exits much dearer than the least are not confirmed;
-    - ``status_k``, a constant of `vibrokit.kernels.stopping`; ``target_k``, the label of where the exit leads, −1 where
-      that is not known; ``exit_x_k`` and ``exit_v_k``, where the path was when it ended;
-
-    and the section as `Section.data` lays it out.
+    - ``polar``, further angles, where the noise has states;
+    - ``action`` at the exit, NaN where there was none; exits that cost much more than the least are not confirmed;
+    - ``exit_status``, a constant of `vibrokit.kernels.stopping`; ``target``, the label of the attractor that the exit
+      leads to, −1 where that is not known; ``exit_x`` and ``exit_v``, where the path ended.
     """
 
     kind: ClassVar[str] = "action_plot"
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: Any = None) -> ActionPlotArtists:
         """Draw action against angle; see `vibrokit.plots.actions.action_plot`."""
         from vibrokit.plots.actions import action_plot
 
-        return action_plot(self.data, self.energies, ax=ax)
+        starts = self._starts()
+        angles, radii, actions = zip(*starts.values(), strict=True) if starts else ((), (), ())
+        return action_plot(
+            angles,
+            radii,
+            actions,
+            labels=list(starts),
+            names=[self.names[label] for label in starts],
+            energies=[(energy.source, energy.value) for energy in self.energies],
+            ax=ax,
+        )
 
-    def plot_domain(self, label: int, ax: Any = None) -> Any:
-        """Draw action over angle and radius; see `vibrokit.plots.actions.action_map`.
+    def plot_domain(self, source: int | str | None = None, ax: Any = None) -> ActionMapArtists:
+        """Draw the action over the fundamental domain; see `vibrokit.plots.actions.action_map`.
 
         Parameters
         ----------
-        label : int
-            Of the attractor that is left.
+        source : int or str, optional
+            Label or name of the attractor that is left; by default the first that was searched.
         ax : matplotlib Axes, optional
 
         Raises
         ------
         StructureError
-            Nothing was started from an attractor of that label.
+            There is no search from this attractor, or from any.
         """
         from vibrokit.plots.actions import action_map
 
-        if f"action_{label}" not in self.data:
-            started = [str(name).removeprefix("action_") for name in self.data if str(name).startswith("action_")]
-            raise StructureError(
-                f"no path started from attractor {label!r}; some did from {', '.join(started) or 'none'}."
-            )
-        return action_map(self.data, label, ax=ax)
+        starts = self._starts()
+        if not starts:
+            raise StructureError("the result has no starts; see its status.")
+        label = min(starts) if source is None else label_of(source, self.names)
+        if label not in starts:
+            have = ", ".join(self.names[other] for other in starts)
+            raise StructureError(f"the result has no starts from {self.names[label]}; it has those from {have}.")
+        return action_map(*starts[label], name=self.names[label], ax=ax)
 
-    def plot_paths(self, ax: Any = None) -> Any:
-        """Draw the exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`."""
-        return plot_exit_paths(self.data, self.energies, ax)
-
-    @classmethod
-    def read_extras(cls, content: Content) -> dict[str, Any]:
-        """Check what lies on the section; raises ResultFileError."""
-        Section.in_data(content.dataset)
-        return {}
+    def _starts(self) -> dict[int, Starts]:
+        """Angle, radius and action of the starts, by label of the attractor."""
+        arrays = Arrays(self.data)
+        if "angle" not in arrays:
+            return {}
+        labels = arrays.wholes("source", (None,), 0, len(self.names) - 1)
+        columns = [
+            arrays.numbers(name, (len(labels), arrays.size("start")), finite=False)
+            for name in ("angle", "radius", "action")
+        ]
+        found = {}
+        for label, angle, radius, action in zip(labels.tolist(), *columns, strict=True):
+            kept = np.isfinite(angle)  # shorter ones end in NaN
+            found[label] = angle[kept], radius[kept], action[kept]
+        return found

@@ -24,7 +24,7 @@ def write_atomically(path: Path, content: bytes) -> None:
             os.chmod(file.name, 0o666 & ~_umask())
             os.replace(file.name, path)
         except BaseException:
-            os.unlink(file.name)
+            Path(file.name).unlink(missing_ok=True)  # it is gone if the interrupt came after the replacement
             raise
 
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from vibrokit.results.survival import Survival
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Attractor:
     """A steady state.
 
     Attributes
     ----------
     label : int
-        Its place among the attractors of a structure, and its label in the basin grid.
+        Its index among the attractors of a structure, and its label in the basin grid.
     kind : str
         ``"periodic"``, ``"quasiperiodic"``, ``"chaotic"``, ``"equilibrium"`` or ``"limit cycle"``.
     period : int
@@ -43,17 +43,20 @@ class Attractor:
         Hits of each stop (``"left"``, ``"right"``) per orbit; for motion that never repeats, per forcing period on
         average.
     peak_depth, peak_force : dict of str to float
-        Deepest that the orbit goes into each stop (m), and the largest push of each (m s⁻²).
+        Largest depth past each stop (m), and the largest push of each (m s⁻²).
     basin_fraction : float
         Share of the region's cells that lead to it.
     basin_fraction_error : float
-        Its standard error, as if the cells were independent draws.
+        Its standard error, if the cells are taken as independent draws.
     residual : float
         Distance between the first point and its image after one period of the orbit; NaN for motion that never repeats.
     error : float
-        How far the first point moves when the integration is tightened; NaN for motion that never repeats.
+        Change of the first point when the integration is tightened; NaN for motion that never repeats.
     survival : tuple of Survival
         For motion that never repeats: the evidence that it lasts, at two accuracies of integration.
+    name : str
+        Short name from what it does, such as ``"clear"`` or ``"hammering"``; distinct among the attractors of a
+        structure.
     """
 
     label: int
@@ -73,6 +76,7 @@ class Attractor:
     residual: float
     error: float
     survival: tuple[Survival, ...] = ()
+    name: str = ""
 
     @property
     def impacts(self) -> float:
@@ -91,8 +95,21 @@ class Attractor:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether its points are fixed by a power of the section map, and motion is linearised round each of them.
+        """Whether its points are fixed points of a power of the section map.
 
-        So are those of a periodic orbit and of an equilibrium; a limit cycle may be shifted in time.
+        This holds for periodic orbits and equilibria; a limit cycle may be shifted in time.
         """
         return self.kind in ("periodic", "equilibrium")
+
+    @property
+    def description(self) -> tuple[str, ...]:
+        """What it is, as short texts: kind, period, stop hits, basin fraction."""
+        return (
+            self.kind,
+            f"period {self.period}" if self.repeats else "never repeats",
+            f"{self.impacts:.4g} stop hits",
+            f"basin fraction {self.basin_fraction:.4f} ± {self.basin_fraction_error:.1g}",
+        )
+
+    def __repr__(self) -> str:
+        return f"Attractor {self.label} {self.name!r}: {', '.join(self.description)}"

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from vibrokit.results.region import Region
 
 UNSETTLED = -1
-"""Label of cells that reached no attractor in the time given, and are in the region still."""
+"""Label of cells whose motion is in the region and had reached no attractor within the budget."""
 LEFT = -2
-"""Label of cells whose motion left the region, or every bound, and was not back when the time was up."""
+"""Label of cells whose motion was outside the region at the end of the budget, or diverged."""
 NOT_FOLLOWED = -3
-"""Label of cells that were not looked at, because the work was stopped."""
+"""Label of cells that were not followed, because the work was stopped."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Basins:
     """Labels of the cells of a region.
 
@@ -25,7 +25,7 @@ class Basins:
     ----------
     region : Region
     labels : int16 array (nx, nv)
-        Label of the attractor that each cell's centre leads to; UNSETTLED, LEFT or NOT_FOLLOWED where it leads to none.
+        Label of the attractor that each cell's centre leads to; UNSETTLED, LEFT or NOT_FOLLOWED if it leads to none.
     """
 
     region: Region
@@ -34,3 +34,6 @@ class Basins:
     def fraction(self, label: int) -> float:
         """Share of the cells with a label."""
         return float(np.mean(self.labels == label))
+
+    def __repr__(self) -> str:
+        return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"

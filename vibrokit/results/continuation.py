@@ -2,89 +2,31 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.bifurcation import Bifurcation
+from vibrokit.results.continuation_table import continuation_dataset, read_continuation
+from vibrokit.results.labels import label_of
+from vibrokit.results.record import Record
 from vibrokit.results.region import Region
+from vibrokit.results.steady_states import SteadyStates
+from vibrokit.results.summary import Summary, counted
 
-BIFURCATIONS = (
-    "fold", "pitchfork or transcritical", "period doubling", "Neimark–Sacker", "Hopf", "grazing",
-)  # fmt: skip
+if TYPE_CHECKING:
+    from vibrokit.plots.bifurcation import BifurcationArtists, FractionArtists
+
 _GREEK = (
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda",
     "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
 )  # fmt: skip
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Bifurcation:
-    """A value of the parameter at which a branch of steady states changes in kind.
-
-    Attributes
-    ----------
-    kind : str
-        ``"fold"`` (the branch turns back), ``"pitchfork or transcritical"`` (another branch crosses it), ``"period
-        doubling"``, ``"Neimark–Sacker"``, ``"Hopf"``, or ``"grazing"`` (one more turn of the orbit touches a stop, or
-        an equilibrium does).
-    value : float
-        Of the parameter.
-    error : float
-        How far it moves when the integration is tightened; where it is only known to lie between two values, half
-        their distance; where it can be approached from one side only, how far the nearest orbit is.
-    branch : int
-    period : int
-        Of the orbit, in forcing periods; 1 for an equilibrium or a limit cycle. For a period doubling, of the orbit
-        that doubles.
-    point : array (n,)
-        A point of the orbit there, on the section.
-    side : str
-        For grazing, of the stop; empty for the others.
-    """
-
-    kind: str
-    value: float
-    error: float
-    branch: int
-    period: int
-    point: NDArray[np.float64]
-    side: str = ""
-
-    def __str__(self) -> str:
-        side = f" at the {self.side} stop" if self.side else ""
-        return f"{self.kind}{side} of branch {self.branch} at {self.value:.8g} ± {self.error:.1g}"
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SteadyStates:
-    """The steady states at one value of the parameter.
-
-    Attributes
-    ----------
-    value : float
-    attractors : tuple of Attractor
-        Labelled by their places. Orbits are thinned to some 1000 samples; basin fractions are NaN if the work was
-        stopped before them.
-    branches : tuple of int
-        The branch that each attractor belongs to.
-    status : str
-        What was found and what was not, or why nothing was, as sentences.
-    """
-
-    value: float
-    attractors: tuple[Attractor, ...]
-    branches: tuple[int, ...]
-    status: str
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Continuation:
+class Continuation(Record):
     """Steady states along values of a parameter, joined into branches, with the bifurcations between.
 
     Attributes
@@ -99,35 +41,26 @@ class Continuation:
         What basin fractions are shares of, the same at all values; None if nothing was found.
     states : tuple of SteadyStates
         One for each value, in ascending order.
+    branch_names : tuple of str
+        Name of each branch, that of its first attractor.
     bifurcations : tuple of Bifurcation
         In ascending order of the value.
-    complete : bool
-        False if the work was stopped before its end.
-    status : str
-    scene : dict
-        The scene as plain data, with every parameter; that which is changed has the value it was given with.
-    seed : int or None
-    seconds : float
-        Time that it took.
-    versions : dict
-        Versions of the toolkit and of what it stands on.
     """
+
+    kind: ClassVar[str] = "continuation"
 
     parameter: str
     symbol: str
     unit: str | None
     region: Region | None
     states: tuple[SteadyStates, ...]
-    bifurcations: tuple[Bifurcation, ...]
-    complete: bool
-    status: str
-    scene: Mapping[str, Any]
-    seed: int | None
-    seconds: float
-    versions: Mapping[str, str]
+    branch_names: tuple[str, ...]
+    bifurcations: tuple[Bifurcation, ...] = ()
 
-    def __repr__(self) -> str:
-        return f"<Continuation: {self.status}>"
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the branches, in the order of their numbers; attractors have other labels at each value."""
+        return self.branch_names
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -137,25 +70,28 @@ class Continuation:
     @property
     def branches(self) -> tuple[int, ...]:
         """Numbers of the branches."""
-        return tuple(sorted({branch for at in self.states for branch in at.branches}))
+        return tuple(range(len(self.branch_names)))
 
-    def branch(self, number: int) -> tuple[tuple[float, Attractor], ...]:
+    def branch(self, which: int | str) -> tuple[tuple[float, Attractor], ...]:
         """Return the values at which a branch has an attractor, each with it.
+
+        Parameters
+        ----------
+        which : int or str
+            Number or name of the branch; the beginning of a name is enough if it is unique.
 
         Raises
         ------
         StructureError
             There is no such branch.
         """
-        found = tuple(
+        number = label_of(which, self.branch_names, "branch")
+        return tuple(
             (at.value, attractor)
             for at in self.states
             for attractor, branch in zip(at.attractors, at.branches, strict=True)
             if branch == number
         )
-        if not found:
-            raise StructureError(f"there is no branch {number!r}; there are {', '.join(map(str, self.branches))}.")
-        return found
 
     def fractions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return basin fractions and their standard errors, each of shape (values, branches).
@@ -174,6 +110,18 @@ class Continuation:
         return shares, errors
 
     @property
+    def summary(self) -> Summary:
+        """The bifurcations."""
+        values = f"{counted(len(self.states), 'value')} of {self.parameter}"
+        return Summary(
+            f"Continuation: {counted(len(self.branches), 'branch', 'branches')} at {values}",
+            tuple(
+                (f"{b.kind} {b.side}".strip(), self.branch_names[b.branch], f"{b.value:.8g} ± {b.error:.1g}")
+                for b in self.bifurcations
+            ),
+        )
+
+    @property
     def axis_label(self) -> str:
         """Label of the parameter's axis, with symbol and unit in TeX."""
         head, _, index = self.symbol.partition("_")
@@ -181,7 +129,7 @@ class Continuation:
         label = f"{self.parameter} ${letter}{f'_{{{index}}}' if index else ''}$"
         return f"{label} ({_unit_in_tex(self.unit)})" if self.unit else label
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: Any = None) -> BifurcationArtists:
         """Draw the bifurcation diagram; see `vibrokit.plots.bifurcation.bifurcation_diagram`."""
         from vibrokit.plots.bifurcation import bifurcation_diagram
 
@@ -193,23 +141,23 @@ class Continuation:
         ]
         values, x, branches = (np.array(column) for column in (zip(*rows, strict=True) if rows else ([], [], [])))
         marks = [(found.kind, found.value, float(found.point[0])) for found in self.bifurcations]
-        return bifurcation_diagram(values, x, branches, marks, label=self.axis_label, ax=ax)
+        return bifurcation_diagram(values, x, branches, marks, names=self.branch_names, label=self.axis_label, ax=ax)
 
-    def plot_fractions(self, ax: Any = None) -> Any:
+    def plot_fractions(self, ax: Any = None) -> FractionArtists:
         """Draw the basin fractions along the parameter; see `vibrokit.plots.bifurcation.basin_fractions`."""
         from vibrokit.plots.bifurcation import basin_fractions
 
         shares, _ = self.fractions()
-        names = [f"branch {branch}" for branch in self.branches]
-        return basin_fractions(
-            self.values, shares.T, names, label=self.axis_label, branches=self.branches, ax=ax
-        )  # fmt: skip
+        return basin_fractions(self.values, shares.T, self.branch_names, label=self.axis_label, ax=ax)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
-        from vibrokit.results.continuation_file import save_continuation
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays with dimensions, coordinates, units and long names."""
+        return continuation_dataset(self)
 
-        save_continuation(self, path)
+    @classmethod
+    def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
+        """Make a continuation of its arrays; raises ResultFileError."""
+        return cls(**read_continuation(dataset), **provenance)
 
 
 def _unit_in_tex(unit: str) -> str:

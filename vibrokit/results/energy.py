@@ -1,8 +1,9 @@
-"""ActivationEnergy: how much action an exit costs."""
+"""ActivationEnergy: the least action of an exit, with bounds."""
 
 from __future__ import annotations
 
 import dataclasses
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,24 @@ from numpy.typing import NDArray
 from vibrokit.results.certificate import Certificate
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+class Bound(StrEnum):
+    """What the bounds of an activation energy rest on."""
+
+    CERTIFIED = "certified"
+    """Upper: a certified path. Lower: the graph search found no cheaper path within its error estimate."""
+    UPPER = "upper"
+    """Upper: a path. Lower: what no search has excluded, 0 if nothing was."""
+    ESTIMATE = "estimate"
+    """Both are error estimates of a grid."""
+    BRACKET = "bracket"
+    """Upper: a path that starts inside a set. Lower: an error estimate of a grid."""
+    CONFIDENCE = "confidence"
+    """A 95 % confidence interval."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ExitPath:
-    """A path of least action, from an attractor to where it left the basin.
+    """A path of least action, from an attractor to where it leaves the basin.
 
     Attributes
     ----------
@@ -34,6 +50,9 @@ class ExitPath:
     action: NDArray[np.float64]
     section: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        return f"ExitPath: {len(self.t)} samples over {np.ptp(self.t):g} s, action {self.action[-1]:.6g} m² s⁻³"
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ActivationEnergy:
@@ -42,17 +61,23 @@ class ActivationEnergy:
     Attributes
     ----------
     source, target : int
-        Labels of the attractor that is left and of the one that is reached; −1 for a target that is none, as a touch.
+        Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor.
     value : float
         ΔU, in units of action (m² s⁻³).
     lower, upper : float
-        Bounds: numerical error where certified, 95 % interval where sampled.
+        Bounds of ΔU itself: a cheaper path that was not excluded lies within them.
     method : str
+    bound : Bound
+        What the bounds rest on.
+    numerical_error : float
+        Error of `value` as the action of its own path or as the value on its own grid (m² s⁻³). It says nothing of
+        cheaper paths.
     residual : float
-        Size of the momentum at the exit: 0 for a path that ends on the basin's boundary for good.
+        Largest misfit of the path's equations, relative to the size of what is matched; NaN for a path that was not
+        polished.
     path : ExitPath or None
     saddle : int
-        Which of the structure's saddles the path ends on; −1 where it ends on none.
+        Which of the structure's saddles the path ends on; −1 if it ends on no saddle.
     certificate : Certificate or None
         Evidence, where the path was polished.
     """
@@ -63,12 +88,9 @@ class ActivationEnergy:
     lower: float
     upper: float
     method: str
-    residual: float
+    bound: Bound
+    numerical_error: float = float("nan")
+    residual: float = float("nan")
     path: ExitPath | None = dataclasses.field(default=None, repr=False)
     saddle: int = -1
     certificate: Certificate | None = None
-
-    @property
-    def exit(self) -> str:
-        """In words: from where to where."""
-        return f"{self.source} → {self.target if self.target >= 0 else 'exit'}"

@@ -1,88 +1,205 @@
-"""Opens saved results: netCDF 3 through SciPy, read as data and never unpickled."""
+"""Saved records: netCDF 3 through SciPy, read as data and never unpickled."""
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Hashable
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 
-from vibrokit.errors import nearest
-from vibrokit.results.action_graph import ActionGraphResult
-from vibrokit.results.action_plot import ActionPlotResult
-from vibrokit.results.content import Content, ResultFileError, open_content, seed_of, taken, versions_of
-from vibrokit.results.continuation import Continuation
-from vibrokit.results.continuation_file import KIND as CONTINUATION
-from vibrokit.results.continuation_file import read_continuation
-from vibrokit.results.energy_file import ENERGIES, RESERVED
-from vibrokit.results.least_action import LeastActionResult
-from vibrokit.results.result import Result
-from vibrokit.results.structure import Structure
-from vibrokit.results.structure_file import KIND as STRUCTURE
-from vibrokit.results.structure_file import read_structure
+from vibrokit.errors import ResultFileError, UnknownNameError, shown
+from vibrokit.registry import Group, load
+from vibrokit.results.arrays import LARGEST_WHOLE, taken
+from vibrokit.results.atomic import write_atomically
+from vibrokit.results.plain import PlainRecord
+from vibrokit.results.provenance import FORMAT, json_data, provenance_from, provenance_text
+from vibrokit.results.record import Record
 
-__all__ = ["ResultFileError", "load_result"]
+__all__ = ["ResultFileError", "load_result", "save_record"]
+
+HEADER = "vibrokit"
+"""The attribute that holds the provenance as JSON."""
+ATTRIBUTES = ("title", "Conventions", "source", "history", "status", HEADER)
+"""Attributes that every file has, besides those of its record's own dataset."""
+
+_READINGS = 2  # a sound file is read once, to the byte
+_INT32 = np.iinfo(np.int32)
 
 
-def load_result(path: str | os.PathLike[str]) -> Result | Structure | Continuation:
-    """Open a saved result.
-
-    Parameters
-    ----------
-    path : str or path
-        A file that `Structure.save`, `Continuation.save` or `Result.save` wrote.
-
-    Returns
-    -------
-    Result, Structure or Continuation
-        Of the class that was saved.
+def save_record(record: Record, path: str | os.PathLike[str]) -> None:
+    """Write a record to a netCDF file, whole or not at all; `load_result` opens it.
 
     Raises
     ------
     ResultFileError
-        The file is no saved result.
+        The record holds something that netCDF 3 cannot hold.
+    FileNotFoundError
+        There is no such folder.
+    """
+    try:
+        content = _content(record)
+    except ResultFileError as error:
+        raise ResultFileError(f"{type(record).__name__} cannot be saved: {str(error).rstrip('.')}.") from error
+    write_atomically(Path(path), content)
+
+
+def load_result(path: str | os.PathLike[str]) -> Any:
+    """Open a saved record: a `Result`, a `Structure` or a `Continuation`.
+
+    Parameters
+    ----------
+    path : str or path
+        A file that `save` wrote.
+
+    Returns
+    -------
+    Record
+        Of the class that was saved. If no installed package registers its kind, a `PlainRecord`.
+
+    Raises
+    ------
+    ResultFileError
+        The file is not a saved record.
     FileNotFoundError
         There is no such file.
     """
     try:
-        content = open_content(path)
-        kind = taken(content.header, "kind", str)
-        if kind not in _READERS:
-            raise ResultFileError(f"it is of unknown kind {kind[:50]!r}{nearest(kind, _READERS).rstrip('.')}")
-        return _READERS[kind](content)
+        dataset, header = _opened(path)
+        kind = taken(header, "kind", str)
+        provenance = provenance_from(header)
+        record = _record_class(kind)
+        if record is None:
+            return PlainRecord.from_dataset(dataset, unknown_kind=kind, **provenance)
+        return record.from_dataset(dataset, **provenance)
     except ResultFileError as error:
         raise ResultFileError(
-            f"{path} is no result that vibrokit saved: {error}. Give a file written by save."
+            f"{path} is not a result that vibrokit saved: {str(error).rstrip('.')}. Give a file written by save."
         ) from error
 
 
-def _result_reader(record: type[Result]) -> Callable[[Content], Result]:
-    def read(content: Content) -> Result:
-        header, dataset = content.header, content.dataset
-        names = [name for name in dataset.variables if RESERVED.match(str(name))]
-        try:
-            data = xarray.decode_cf(dataset.drop_vars(names), decode_times=False).load()
-        except Exception as error:  # attributes of strange files have xarray raise errors of every kind
-            raise ResultFileError(f"{type(error).__name__}: {error}") from error
-        return record(
-            energies=ENERGIES.read(content),
-            data=data,
-            scene=taken(header, "scene", dict),
-            settings=taken(header, "settings", dict),
-            status=taken(header, "status", str),
-            seconds=taken(header, "seconds", float),
-            versions=versions_of(header),
-            seed=seed_of(header),
-            **record.read_extras(content),
+def _record_class(kind: str) -> type[Record] | None:
+    """The class that is registered under a kind; None if there is none."""
+    try:
+        return load(Group.RECORDS, kind, Record)
+    except UnknownNameError:
+        return None
+
+
+# Writing
+
+
+def _content(record: Record) -> bytes:
+    arrays = record.to_dataset()
+    for name in ATTRIBUTES:
+        if name in arrays.attrs:
+            raise ResultFileError(f"its dataset has an attribute {name!r}, a name that files use; give it another name")
+    empty = {str(name): array for name, array in arrays.variables.items() if array.size == 0}
+    text = provenance_text(record, empty={name: _shape(array) for name, array in empty.items()})
+    full = arrays.drop_vars(list(empty)).drop_encoding()
+    full = full.assign({name: _storable(name, array) for name, array in full.variables.items()})
+    full.attrs |= _readable_attributes(record) | {HEADER: text}
+    plain: dict[Hashable, dict[str, Any]] = {name: {"_FillValue": None} for name in full.variables}
+    try:
+        return bytes(full.to_netcdf(path=None, engine="scipy", encoding=plain))
+    except Exception as error:  # what xarray and SciPy raise at what they cannot write is of every kind
+        raise ResultFileError(
+            f"netCDF 3 holds numbers, texts and plain names, and not what it has ({error})"
+        ) from error  # fmt: skip
+
+
+def _readable_attributes(record: Record) -> dict[str, str]:
+    """Attributes for people who look into a file."""
+    document = (type(record).__doc__ or "").strip().partition("\n")[0]
+    software = f"vibrokit {record.versions.get('vibrokit', '')}".strip()
+    seed = "" if record.seed is None else f", seed {record.seed}"
+    return {
+        "title": f"{record.file_kind}: {document}",
+        "Conventions": "CF-1.11",
+        "source": software,
+        "history": f"computed by {software} in {record.seconds:.1f} s{seed}",
+        "status": record.status,
+    }
+
+
+def _storable(name: Hashable, array: xarray.Variable) -> xarray.Variable:
+    """A variable as netCDF 3 holds it: whole numbers of 32 bits, or as floats where that is too short."""
+    if array.dtype.kind not in "iu" or array.dtype.itemsize < 4:
+        return array
+    low, high = int(array.min()), int(array.max())
+    if _INT32.min <= low and high <= _INT32.max:
+        return array.astype(np.int32)
+    if max(-low, high) > LARGEST_WHOLE:
+        raise ResultFileError(f"its array {name!r} goes from {low} to {high}, which netCDF 3 cannot hold exactly")
+    return array.astype(np.float64)
+
+
+def _shape(array: xarray.Variable) -> dict[str, Any]:
+    """What is left to say of an array without an entry, for netCDF 3 takes a length of 0 for something else."""
+    return {"dims": [str(dim) for dim in array.dims], "shape": list(array.shape), "dtype": array.dtype.kind}
+
+
+# Reading
+
+
+class _ReadOnce(io.BytesIO):
+    """Bytes that are read about once: arrays that all claim the same bytes could fill any memory."""
+
+    left = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        content = super().read(size)
+        self.left -= len(content)
+        if self.left < 0:
+            raise ResultFileError("its arrays claim more bytes than it has")
+        return content
+
+
+def _opened(path: str | os.PathLike[str]) -> tuple[xarray.Dataset, Any]:
+    """The arrays of a file and its provenance. Nothing is masked, scaled or taken for a time."""
+    try:
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise
+    except (OSError, TypeError, ValueError) as error:
+        raise ResultFileError(f"it cannot be read ({error})") from error
+    file = _ReadOnce(content)
+    file.left = _READINGS * len(content) + 1024
+    try:
+        dataset = xarray.load_dataset(
+            file, engine="scipy", mask_and_scale=False, decode_times=False, decode_timedelta=False
         )
+    except ResultFileError:
+        raise
+    except Exception as error:  # what SciPy and xarray raise at strange bytes is of every kind
+        raise ResultFileError(f"it is not a netCDF 3 file, or a damaged one ({type(error).__name__})") from error
+    if HEADER not in dataset.attrs:
+        raise ResultFileError(f"it has no attribute {HEADER!r}")
+    header = json_data(dataset.attrs[HEADER])
+    if taken(header, "format", int) != FORMAT:
+        raise ResultFileError(f"it is of format {shown(header['format'])}, and this version reads format {FORMAT}")
+    dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in ATTRIBUTES}
+    return _with_empty(dataset, taken(header, "empty", dict)).drop_encoding(), header
 
-    return read
+
+def _with_empty(dataset: xarray.Dataset, empty: dict[str, Any]) -> xarray.Dataset:
+    """A dataset with the arrays without an entry that its file names."""
+    try:
+        return dataset.assign(
+            {
+                name: (
+                    tuple(map(str, taken(entry, "dims", list))),
+                    np.empty(taken(entry, "shape", list), dtype=_DTYPES[taken(entry, "dtype", str)]),
+                )
+                for name, entry in empty.items()
+                if 0 in taken(entry, "shape", list)
+            }
+        )
+    except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+        raise ResultFileError(f"its empty arrays contradict the others ({error})") from error
 
 
-_RESULTS = (ActionGraphResult, ActionPlotResult, LeastActionResult)
-_READERS: Mapping[str, Callable[[Content], Any]] = {
-    STRUCTURE: read_structure,
-    CONTINUATION: read_continuation,
-    **{record.kind: _result_reader(record) for record in _RESULTS},
-}
+_DTYPES: dict[str, Any] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_, "U": np.dtype("<U1")}

@@ -3,28 +3,49 @@
 from __future__ import annotations
 
 import dataclasses
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+class ManifoldEnd(StrEnum):
+    """Why a branch ends at the last point of its curve; each has a sentence."""
+
+    sentence: str
+
+    def __new__(cls, value: str, sentence: str) -> ManifoldEnd:
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.sentence = sentence
+        return member
+
+    LEAVES_REGION = "leaves-region", "The branch leaves the region, widened by its own size on every side."
+    AT_REST = "at-rest", "The branch converges to a point."
+    ARC_LENGTH = "arc-length", "The branch reaches its arc length."
+    MOST_VERTICES = "most-vertices", "The branch has as many vertices as are kept; give a larger spacing or bend."
+    TOO_SLOW = "too-slow", "The branch grows too slowly."
+    SADDLE_OUTSIDE = "saddle-outside", "The saddle lies outside the region, widened by its own size on every side."
+    TOO_EXTREME = "too-extreme", "The multiplier of the saddle is too extreme to follow the branch over one period."
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Manifold:
     """One branch of a manifold on the section.
 
     Attributes
     ----------
     saddle : int
-        Which of the structure's saddles it belongs to.
+        Place of its saddle among those of the structure.
     point : int
-        From which of the saddle's points it starts.
+        Which of the saddle's points it starts from.
     stable : bool
     side : int
         +1 or −1: along the eigenvector or against it.
     curve : array (count, 2)
         (x, v) along the branch, outwards from the saddle.
-    status : str
-        Why it ends, as a sentence.
+    end : ManifoldEnd
+        Why it ends.
     """
 
     saddle: int
@@ -32,9 +53,13 @@ class Manifold:
     stable: bool
     side: int
     curve: NDArray[np.float64]
-    status: str
+    end: ManifoldEnd
 
     @property
     def arc_length(self) -> float:
         """Length of the curve in the plane of x and v."""
         return float(np.linalg.norm(np.diff(self.curve, axis=0), axis=1).sum())
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.stable else "unstable"
+        return f"Manifold: {kind} branch of saddle {self.saddle}, {len(self.curve)} vertices, ends: {self.end}"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from vibrokit.errors import VibrokitError
 from vibrokit.results.atomic import write_atomically
+
+if TYPE_CHECKING:
+    from vibrokit.plots.artists import Artists
 
 _DPI = 150
 _FORMATS = (".png", ".pdf", ".svg")
@@ -29,8 +31,8 @@ def checked_picture(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
-    """Save the figure that some artists are in; the file's ending chooses the format.
+def save_figure(artists: Artists, path: str | os.PathLike[str]) -> None:
+    """Save the figure of a picture; the file's ending chooses the format.
 
     Raises
     ------
@@ -39,5 +41,5 @@ def save_figure(artists: Sequence[Any], path: str | os.PathLike[str]) -> None:
     """
     target = checked_picture(path)
     content = io.BytesIO()
-    artists[0].get_figure().savefig(content, format=target.suffix[1:], dpi=_DPI)
+    artists.figure.savefig(content, format=target.suffix[1:], dpi=_DPI)
     write_atomically(target, content.getvalue())

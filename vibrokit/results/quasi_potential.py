@@ -1,120 +1,88 @@
-"""The quasi-potential of an attractor on the section, as arrays that results carry along and pictures show."""
+"""Picture of the quasi-potential of a result: collects the arrays that it shows."""
 
 from __future__ import annotations
 
-import dataclasses
-import re
-from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
-from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError
-from vibrokit.results.content import Content, ResultFileError
-from vibrokit.results.energy import ActivationEnergy
+from vibrokit.errors import ResultFileError, StructureError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.labels import label_of
 from vibrokit.results.path_pictures import with_paths
-from vibrokit.results.region import Region
-from vibrokit.results.section import Section
 
-_NAME = re.compile(r"quasi_potential_(\d+)")
-_SHOWN = 1.5  # times the largest energy: what lies beyond the exits needs no shades
+if TYPE_CHECKING:
+    from vibrokit.plots.quasi_potential import QuasiPotentialArtists
+    from vibrokit.results.result import Result
 
-Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class QuasiPotential:
-    """Least action from an attractor to the nodes of a grid.
-
-    Attributes
-    ----------
-    label : int
-        Of the attractor.
-    values : array (nx, nv)
-        Ψ (m² s⁻³); NaN where it is not known.
-    box : array (2, 2)
-        Bounds of x and of v, on which the outermost nodes lie.
-    """
-
-    label: int
-    values: Array
-    box: Array
-
-    @property
-    def data(self) -> xarray.Dataset:
-        """The arrays ``quasi_potential_k`` and ``quasi_potential_box_k``."""
-        k = self.label
-        return xarray.Dataset(
-            {
-                f"quasi_potential_{k}": ((f"node_x_{k}", f"node_v_{k}"), self.values),
-                f"quasi_potential_box_{k}": (("axis", "bound"), self.box),
-            }
-        )
-
-    @classmethod
-    def all_in(cls, data: xarray.Dataset) -> dict[int, QuasiPotential]:
-        """Take all there are out of a result's data, by label.
-
-        Raises
-        ------
-        ResultFileError
-            One is of another shape or kind, or its box is none.
-        """
-        content = Content(data, {})
-        labels = sorted(int(match[1]) for name in data.variables if (match := _NAME.fullmatch(str(name))))
-        return {label: cls._read(content, label) for label in labels}
-
-    @classmethod
-    def _read(cls, content: Content, label: int) -> QuasiPotential:
-        values = content.numbers(f"quasi_potential_{label}", (None, None), finite=False)
-        box = content.numbers(f"quasi_potential_box_{label}", (2, 2))
-        if min(values.shape) < 2:
-            raise ResultFileError(f"its quasi_potential_{label} has fewer than two nodes along a side")
-        try:
-            return cls(label, values, Region(tuple(box[0].tolist()), tuple(box[1].tolist())).bounds)
-        except StructureError as error:
-            raise ResultFileError(f"its quasi_potential_box_{label}: {str(error).rstrip('.')}") from error
+_SHOWN = 1.5  # times the largest energy: above it, all shades are the same
 
 
-def plot_quasi_potential(
-    data: xarray.Dataset, energies: Iterable[ActivationEnergy], source: int | None = None, ax: Any = None
-) -> Any:
+def plot_quasi_potential(result: Result, source: int | str | None = None, ax: Any = None) -> QuasiPotentialArtists:
     """Draw a quasi-potential on the section; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
 
     Parameters
     ----------
-    data : xarray.Dataset
-        With the section and the quasi-potentials.
-    energies : iterable of ActivationEnergy
-        Exit paths of the attractor are drawn over it.
-    source : int, optional
-        Label of the attractor; by default the first that has one.
+    result : Result
+        Its data is as `ActionGraphResult` describes. Exit paths of the attractor are drawn over it.
+    source : int or str, optional
+        Label or name of the attractor; by default the first that has one.
     ax : matplotlib Axes, optional
 
     Raises
     ------
     StructureError
-        It was not computed for this attractor, or for none.
+        It was not computed for this attractor, or for any.
+    ResultFileError
+        The arrays are not those of a quasi-potential.
     """
     from vibrokit.plots.quasi_potential import quasi_potential_map
 
-    known = QuasiPotential.all_in(data)
-    label = source if source is not None else min(known, default=None)
+    known = _potentials(result)
+    if not known:
+        raise StructureError("the result has no quasi-potential.")
+    label = min(known) if source is None else label_of(source, result.names)
     if label not in known:
-        there_are = f"; there are those of {', '.join(map(str, known))}" if known else ""
-        raise StructureError(f"the result has no quasi-potential of attractor {label}{there_are}.")
-    section, shown = Section.in_data(data), known[label]
-    own = [energy for energy in energies if energy.source == label]
-    half = np.diff(shown.box, axis=1) / (np.array(shown.values.shape)[:, None] - 1) / 2
+        have = ", ".join(result.names[other] for other in known)
+        raise StructureError(f"the result has no quasi-potential of {result.names[label]}; it has those of {have}.")
+    values, bounds = known[label]
+    own = [energy for energy in result.energies if energy.source == label]
     return quasi_potential_map(
-        shown.values,
-        shown.box + half * np.array([-1.0, 1.0]),
-        section.points[label],
+        values,
+        bounds,
+        result.section.points[label],
         label=label,
+        names=result.names,
         top=_SHOWN * max(energy.value for energy in own) if own else None,
-        saddles=section.saddles,
+        saddles=result.section.saddles,
         paths=[path.q[path.section] for _, path in with_paths(own)],
         ax=ax,
     )
+
+
+def _potentials(result: Result) -> dict[int, tuple[Any, Any]]:
+    """By label: the quasi-potential on the nodes, and the bounds of the cells around them."""
+    arrays = Arrays(result.data)
+    if "quasi_potential" not in arrays:
+        return {}
+    labels = arrays.wholes("source", (None,), 0, len(result.names) - 1)
+    values = arrays.numbers("quasi_potential", (len(labels), None, None), finite=False)
+    nodes = [arrays.numbers(f"quasi_potential_{axis}", (len(labels), None), finite=False) for axis in ("x", "v")]
+    if values.shape[1:] != (nodes[0].shape[1], nodes[1].shape[1]):
+        raise ResultFileError(f"its quasi_potential has shape {values.shape}, which its nodes contradict")
+    known = {}
+    for label, psi, *axes in zip(labels.tolist(), values, *nodes, strict=True):
+        counts = [int(np.isfinite(axis).sum()) for axis in axes]  # shorter ones end in NaN
+        if not np.isfinite(psi).any():
+            continue
+        bounds = [_bounds(axis[:count]) for axis, count in zip(axes, counts, strict=True)]
+        known[label] = psi[: counts[0], : counts[1]], np.array(bounds)
+    return known
+
+
+def _bounds(nodes: Any) -> tuple[float, float]:
+    """Bounds of the cells around the nodes of one axis."""
+    if len(nodes) < 2 or not np.all(np.diff(nodes) > 0):
+        raise ResultFileError("its quasi_potential needs at least two nodes along each side, in ascending order")
+    half = (nodes[-1] - nodes[0]) / (len(nodes) - 1) / 2
+    return float(nodes[0] - half), float(nodes[-1] + half)

@@ -1,4 +1,4 @@
-"""Region: the rectangle of the section that is looked at."""
+"""Region: a rectangle of the section."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Region:
 
     @classmethod
     def around(cls, points: NDArray[np.float64], margin: float) -> Region:
-        """Return the region round some points, widened on each side by `margin` times its width."""
+        """Return the region around some points, widened on each side by `margin` times its width."""
         low, high = points.min(axis=0), points.max(axis=0)
         width = high - low
         low, high = low - margin * width, high + margin * width
@@ -64,6 +64,11 @@ class Region:
     def size(self) -> float:
         """Width in x or in v, the smaller one."""
         return float(np.min(np.diff(self.bounds)))
+
+    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return for each of some points or states (count, n) whether its x and v are in the region."""
+        bounds, places = self.bounds, points[:, :2]
+        return np.asarray(np.all((places >= bounds[:, 0]) & (places <= bounds[:, 1]), axis=1))
 
     def cell_centres(self, cells: Sequence[int]) -> NDArray[np.float64]:
         """Return the centres of a grid of cells, shape (nx · nv, 2), v running fastest."""

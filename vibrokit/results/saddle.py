@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Saddle:
     """An unstable orbit; on the boundary of two basins, where its branches lead to different attractors.
 
@@ -16,7 +16,7 @@ class Saddle:
     ----------
     kind : str
         ``"saddle"``, ``"flip saddle"`` (its unstable multiplier is negative), ``"repeller"`` (no stable direction), or
-        ``"chaotic"`` for a set on the boundary that has no orbit of its own to name.
+        ``"chaotic"`` for a chaotic set on the boundary.
     period : int
         In forcing periods; 0 for a chaotic set, 1 for an equilibrium or a limit cycle.
     duration : float
@@ -30,8 +30,8 @@ class Saddle:
         Rates (s⁻¹): eigenvalues at an equilibrium, log(multipliers)/duration for an orbit, the largest Lyapunov
         exponent for a chaotic set.
     leads_to : tuple of int
-        Labels of what the two branches of the unstable direction come to; for a chaotic set, of the two basins between
-        which it was found. Negative as in `Basins.labels` where a branch settles on nothing.
+        Labels of the attractors that the two branches of the unstable direction reach; for a chaotic set, of the two
+        basins between which it was found. Negative as in `Basins.labels` where a branch does not settle.
     residual : float
         Distance between the first point and its image after one period of the orbit; NaN for a chaotic set.
     error : float
@@ -52,3 +52,6 @@ class Saddle:
     def on_boundary(self) -> bool:
         """Whether its branches lead to different attractors."""
         return len(set(self.leads_to)) > 1
+
+    def __repr__(self) -> str:
+        return f"Saddle: {self.kind}, period {self.period}, {len(self.points)} points, leads to {self.leads_to}"

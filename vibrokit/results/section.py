@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError
-from vibrokit.results.basins import NOT_FOLLOWED
-from vibrokit.results.columns import Draft, Rows
-from vibrokit.results.content import Content, ResultFileError
+from vibrokit.errors import ResultFileError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.fields import PLANE, STATE, Length, Variable, Vectors, Whole, Word
+from vibrokit.results.grid import grid_variables, read_grid
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
+from vibrokit.results.table import Table
 
 Array = NDArray[np.float64]
 
-_CURVES = Rows()
-_LISTS = {"saddles": "saddle", "chaotic": "chaotic_saddle", "stable": "stable_manifold"}
+_POINTS = Vectors(Length("visit", "points on the section"), STATE)
+_CURVE = Vectors(Length("vertex", "vertices", ragged=True), PLANE, prefixed=False)
+_ATTRACTORS = Table(
+    "attractor",
+    {"label": Whole("label of the attractor"), "name": Word("name of the attractor"), "points": _POINTS},
+    index="label",
+)
+_LISTS = {
+    "saddles": Table("saddle", {"points": _POINTS}),
+    "chaotic": Table("chaotic_saddle", {"points": _POINTS}),
+    "stable": Table("stable_manifold", {"points": _CURVE}),
+}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Section:
     """Basins, attractors and what lies between them.
 
@@ -33,6 +44,8 @@ class Section:
         Bounds of x and v.
     points : tuple of array (count, n)
         Points of each attractor, by label.
+    names : tuple of str
+        Names of the attractors, by label.
     saddles, chaotic : tuple of array (count, n)
         Points of each saddle orbit, and samples of chaotic sets on the boundary.
     stable : tuple of array (count, 2)
@@ -42,6 +55,7 @@ class Section:
     labels: NDArray[np.int16]
     bounds: Array
     points: tuple[Array, ...]
+    names: tuple[str, ...]
     saddles: tuple[Array, ...] = ()
     chaotic: tuple[Array, ...] = ()
     stable: tuple[Array, ...] = ()
@@ -53,57 +67,41 @@ class Section:
             labels=structure.basins.labels,
             bounds=structure.basins.region.bounds,
             points=tuple(attractor.points for attractor in structure.attractors),
+            names=structure.names,
             saddles=tuple(saddle.points for saddle in structure.saddles if saddle.kind != "chaotic"),
             chaotic=tuple(saddle.points for saddle in structure.saddles if saddle.kind == "chaotic"),
             stable=tuple(manifold.curve for manifold in structure.manifolds if manifold.stable),
         )
 
     @classmethod
-    def in_data(cls, data: xarray.Dataset) -> Section:
-        """Take it out of a result's data, where `data` put it.
+    def read(cls, arrays: Arrays) -> Section:
+        """Take the section out of the arrays of a result.
 
         Raises
         ------
         ResultFileError
             Something is missing, of another shape or kind, or contradicts the rest.
         """
-        content = Content(data, {})
-        points: list[Array] = []
-        while (name := f"points_{len(points)}") in data.variables:
-            points.append(content.numbers(name, (None, None)))
-        highest = min(len(points) - 1, np.iinfo(np.int16).max)
-        labels = content.wholes("basin", (None, None), NOT_FOLLOWED, highest, dtype=np.int16)
-        lists = {
-            name: tuple(_CURVES.read(content, record, "points", _count(content, f"{record}_points_count")))
-            for name, record in _LISTS.items()
+        attractors = _ATTRACTORS.read(arrays)
+        region, labels = read_grid(arrays, len(attractors))
+        lists: dict[str, Any] = {
+            name: tuple(values["points"] for values in table.read(arrays)) for name, table in _LISTS.items()
         }
-        narrow = [some.shape for some in (*points, *(array for some in lists.values() for array in some))]
-        if any(shape[1] < 2 for shape in narrow):
-            raise ResultFileError("it has points on the section of one number each, and x and v are needed")
-        return cls(labels, _bounds(data), tuple(points), **lists)
+        points = tuple(values["points"] for values in attractors)
+        if not all(map(len, points)):
+            raise ResultFileError("one of its attractors has no points")
+        return cls(labels, region.bounds, points, tuple(values["name"] for values in attractors), **lists)
 
     @property
-    def data(self) -> xarray.Dataset:
-        """The arrays by flat names: ``basin``, ``points_k``, ``saddle_points`` and so on, bounds as attribute."""
-        draft = Draft()
-        draft.put("basin", ("cell_x", "cell_v"), self.labels)
-        for label, visits in enumerate(self.points):
-            draft.put(f"points_{label}", (f"visit_{label}", "state"), visits)
-        for name, record in _LISTS.items():
-            _CURVES.write(draft, record, "points", getattr(self, name))
-        return xarray.Dataset(draft.arrays, attrs={"region": self.bounds.ravel()})
+    def variables(self) -> dict[str, Variable]:
+        """The arrays that hold the section, by name."""
+        x, v = self.bounds.tolist()
+        found = grid_variables(self.labels, Region((x[0], x[1]), (v[0], v[1])), self.names)
+        found |= _ATTRACTORS.variables(self.points, label=range(len(self.points)), name=self.names, points=self.points)
+        for name, table in _LISTS.items():
+            found |= table.variables(getattr(self, name), points=getattr(self, name))
+        return found
 
-
-def _count(content: Content, name: str) -> int:
-    return content.dataset.variables[name].size if name in content.dataset.variables else 0
-
-
-def _bounds(data: xarray.Dataset) -> Array:
-    bounds = np.asarray(data.attrs.get("region", ()))
-    if bounds.shape != (4,) or bounds.dtype.kind not in "fi":
-        raise ResultFileError("it has no attribute 'region' of four numbers, the bounds of x and v")
-    x_low, x_high, v_low, v_high = bounds.tolist()
-    try:
-        return Region((float(x_low), float(x_high)), (float(v_low), float(v_high))).bounds
-    except StructureError as error:
-        raise ResultFileError(f"its {str(error).rstrip('.')}") from error
+    def __repr__(self) -> str:
+        cells = " × ".join(map(str, self.labels.shape))
+        return f"Section({cells} cells; attractors: {', '.join(self.names) or 'none'}; saddles: {len(self.saddles)})"

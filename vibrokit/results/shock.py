@@ -1,4 +1,4 @@
-"""Shock: the smallest kick that throws a steady state out of its basin."""
+"""Shock: the smallest sudden change of state that leaves a basin."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ class Shock:
     Attributes
     ----------
     source, target : int
-        Labels of the attractor that is kicked and of what the kicked state comes to.
+        Labels of the attractor whose state changes, and of the attractor that is reached.
     size : float
-        √((ω_n Δx)² + Δv²) (m s⁻¹); |Δv| for a kick in velocity alone.
+        √((ω_n Δx)² + Δv²) (m s⁻¹); |Δv| for a change of velocity alone.
     error : float
         How much smaller the smallest one may be: the last step of the search (m s⁻¹).
     kick : array (2,)
         Δx (m) and Δv (m s⁻¹).
     state : array (n,)
-        The state before the kick.
+        The state before the change.
     time : float
-        When it comes, after the section (s).
+        Time after the section (s).
     """
 
     source: int
@@ -39,16 +39,16 @@ class Shock:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ShapeStability:
-    """How stable an attractor is by the shape of its basin, for contrast with its activation energy.
+    """Stability of an attractor by the shape of its basin, to compare with its activation energy.
 
     Attributes
     ----------
     label : int
     basin_fraction, basin_fraction_error : float
     velocity_kick : Shock or None
-        The smallest kick in v alone; None if none up to the size of the region leaves the basin.
+        The smallest change of v alone; None if none up to the size of the region leaves the basin.
     any_kick : Shock or None
-        The smallest kick in x and v.
+        The smallest change of x and v.
     """
 
     label: int

@@ -2,86 +2,84 @@
 
 from __future__ import annotations
 
-import dataclasses
-import os
-from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from vibrokit.errors import StructureError
+import xarray
+
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import Basins
+from vibrokit.results.labels import label_of
 from vibrokit.results.manifold import Manifold
+from vibrokit.results.record import Record
 from vibrokit.results.saddle import Saddle
+from vibrokit.results.structure_table import read_structure, structure_dataset
+from vibrokit.results.summary import Summary, counted
 from vibrokit.results.survival import Survival
 
+if TYPE_CHECKING:
+    from vibrokit.plots.basins import SectionArtists
+    from vibrokit.plots.portraits import MotionArtists
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Structure:
+
+class Structure(Record):
     """Attractors, basins, saddles and manifolds of a scene.
 
     Attributes
     ----------
     attractors : tuple of Attractor
-        Those that run clear of the stops first, then by stop hits.
+        Sorted by stop hits; those that run clear of the stops come first.
+    basins : Basins
     saddles : tuple of Saddle
         Those on the boundaries of the basins.
     manifolds : tuple of Manifold
         Branches of the saddles' stable and unstable manifolds.
-    basins : Basins
     survival : tuple of Survival
-        What became of starts that were long in settling; empty if there were none.
+        How long starts went on without settling; empty if all settled soon.
     settling : float
         Distance at which an attractor counts as reached.
     budget : int
-        Most periods that a trajectory was given to settle.
+        Largest number of periods for which a trajectory was followed.
     stepper : str
-        What carried the cells of the basin grid, as `vibrokit run --stepper` has it: ``"rk4:256"``.
-    complete : bool
-        False if the work was stopped before its end; `status` says what is missing.
-    status : str
-        What was found and what was not, as sentences.
-    scene : dict
-        The scene as plain data, with every parameter.
-    seed : int or None
-    seconds : float
-        Time that it took.
-    versions : dict
-        Versions of the toolkit and of what it stands on.
+        Stepper of the basin grid, as `vibrokit run --stepper` reads it: ``"rk4:256"``.
     """
 
+    kind: ClassVar[str] = "structure"
+
     attractors: tuple[Attractor, ...]
-    saddles: tuple[Saddle, ...]
-    manifolds: tuple[Manifold, ...]
     basins: Basins
-    survival: tuple[Survival, ...]
+    saddles: tuple[Saddle, ...] = ()
+    manifolds: tuple[Manifold, ...] = ()
+    survival: tuple[Survival, ...] = ()
     settling: float
     budget: int
     stepper: str
-    complete: bool
-    status: str
-    scene: Mapping[str, Any]
-    seed: int | None
-    seconds: float
-    versions: Mapping[str, str]
 
-    def __repr__(self) -> str:
-        return f"<Structure: {self.status}>"
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, in the order of their labels."""
+        return tuple(attractor.name for attractor in self.attractors)
 
-    def attractor(self, label: int) -> Attractor:
-        """Return the attractor of a label.
+    def attractor(self, which: int | str) -> Attractor:
+        """Return the attractor of a label or a name; the beginning of a name is enough if it is unique.
 
         Raises
         ------
         StructureError
-            There is none of that label.
+            There is no such attractor.
         """
-        for attractor in self.attractors:
-            if attractor.label == label:
-                return attractor
-        known = ", ".join(str(attractor.label) for attractor in self.attractors)
-        raise StructureError(f"there is no attractor of label {label!r}; there are {known}.")
+        return self.attractors[label_of(which, self.names)]
 
-    def plot(self, ax: Any = None) -> Any:
+    @property
+    def summary(self) -> Summary:
+        """The attractors."""
+        cells = " × ".join(map(str, self.basins.labels.shape))
+        parts = (counted(len(self.attractors), "attractor"), counted(len(self.saddles), "saddle"))
+        return Summary(
+            f"Structure: {', '.join(parts)}, basins on {cells} cells",
+            tuple((attractor.name, *attractor.description) for attractor in self.attractors),
+        )
+
+    def plot(self, ax: Any = None) -> SectionArtists:
         """Draw attractors, saddles and manifolds over the basins; see `vibrokit.plots.basins.section_portrait`."""
         from vibrokit.plots.basins import section_portrait
 
@@ -89,6 +87,7 @@ class Structure:
             self.basins.labels,
             self.basins.region.bounds,
             [attractor.points for attractor in self.attractors],
+            names=self.names,
             kinds=[attractor.kind for attractor in self.attractors],
             saddles=[saddle.points for saddle in self.saddles],
             saddle_kinds=[saddle.kind for saddle in self.saddles],
@@ -98,7 +97,7 @@ class Structure:
             ax=ax,
         )
 
-    def plot_orbits(self, ax: Any = None) -> Any:
+    def plot_orbits(self, ax: Any = None) -> MotionArtists:
         """Draw the steady motions in the phase plane; see `vibrokit.plots.portraits.steady_motions`."""
         from vibrokit.plots.portraits import steady_motions
 
@@ -110,20 +109,22 @@ class Structure:
             ax=ax,
         )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
-        from vibrokit.results.structure_file import save_structure
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays with dimensions, coordinates, units and long names."""
+        return structure_dataset(self)
 
-        save_structure(self, path)
+    @classmethod
+    def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
+        """Make a structure of its arrays; raises ResultFileError."""
+        return cls(**read_structure(dataset), **provenance)
 
 
 def _described(attractor: Attractor) -> str:
-    """An attractor as the legend of a picture names it: label, kind or period, and stop hits."""
+    """What the legend of a picture calls an attractor: name, kind or period, and stop hits."""
     kind = f"period {attractor.period}" if attractor.kind == "periodic" else attractor.kind
-    hits = (
-        "no hits" if attractor.impacts == 0 else f"{attractor.impacts:.3g} hit{'s' if attractor.impacts != 1 else ''}"
-    )
-    pressed = [side for side, depth in attractor.peak_depth.items() if depth > 0 and not attractor.hits.get(side)]
-    if pressed and attractor.impacts == 0:
+    hits = f"{attractor.impacts:.3g} hit{'s' if attractor.impacts != 1 else ''}" if attractor.impacts else "no hits"
+    pressed = sorted(side for side, depth in attractor.peak_depth.items() if depth > 0)
+    if pressed and not attractor.impacts:
         hits = f"pressed on the {pressed[0]} stop"
-    return f"{attractor.label}: {kind}, {hits}" + ("" if attractor.repeats or attractor.impacts == 0 else " a period")
+    per = "" if attractor.repeats or not attractor.impacts else " per period"
+    return f"{attractor.name}: {kind}, {hits}{per}"

@@ -1,4 +1,4 @@
-"""Survival: how long motion went on without settling, the evidence that tells chaos from a long transient."""
+"""Survival: how long motion went on without settling, the evidence that separates chaos from a long transient."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Survival:
-    """Starts that had settled on nothing, followed for long: how many settled after all, and when.
+    """Long runs of starts that had not settled: how many settled after all, and when.
 
     Attributes
     ----------
     stepper : str
-        What carried them.
+        Stepper of the integration.
     starts : int
     periods : int
-        How long each was followed, at most.
+        Largest number of periods for which each was followed.
     survivors : int
-        Starts that had settled on nothing by then.
+        Starts that had not settled by then.
     lifetime : float
-        Mean time until a start settles (periods), by maximum likelihood from all that did and did not; infinite where
-        none did.
+        Mean time until a start settles (periods), by maximum likelihood from those that did and those that did not;
+        infinite if none did.
     lifetime_error : float
         Its standard error.
     settled_after : int array (starts,)
@@ -43,5 +43,5 @@ class Survival:
             f"{self.survivors} of {self.starts} starts had not settled after {self.periods} periods ({self.stepper})"
         )
         if not np.isfinite(self.lifetime):
-            return f"{words}, and none ever did"
-        return f"{words}; those that do, live {self.lifetime:.3g} ± {self.lifetime_error:.2g} periods"
+            return f"{words}, and none ever settled"
+        return f"{words}; mean time until a start settles: {self.lifetime:.3g} ± {self.lifetime_error:.2g} periods"

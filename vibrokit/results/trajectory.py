@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    import xarray
 
-@dataclasses.dataclass(frozen=True, eq=False)
+    from vibrokit.plots.portraits import PortraitArtists
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """A trajectory at equally spaced times.
 
@@ -20,7 +25,7 @@ class Trajectory:
     states : array (count, n)
         Displacement (m), velocity (m s⁻¹), extra noise states.
     stops : tuple of float
-        Places of the stops (m), for pictures.
+        Positions of the stops (m), for pictures.
     """
 
     t: NDArray[np.float64]
@@ -37,7 +42,27 @@ class Trajectory:
         """Velocity (m s⁻¹)."""
         return self.states[:, 1]
 
-    def plot(self, ax: Any = None) -> Any:
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the states with the coordinate t, units and long names."""
+        import xarray
+
+        from vibrokit.results.fields import STATE
+
+        return xarray.Dataset(
+            {STATE[k].name: ("t", values, STATE[k].about) for k, values in enumerate(self.states.T)},
+            coords={"t": ("t", self.t, {"long_name": "time", "units": "s"})},
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"Trajectory: {len(self.t)} samples from t = {self.t[0]:g} to {self.t[-1]:g} s\n"
+            f"  {self.x.min():g} ≤ x ≤ {self.x.max():g} m, {self.v.min():g} ≤ v ≤ {self.v.max():g} m/s"
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{self!r}</pre>"
+
+    def plot(self, ax: Any = None) -> PortraitArtists:
         """Draw the phase portrait; see `vibrokit.plots.portraits.phase_portrait`."""
         from vibrokit.plots.portraits import phase_portrait
 

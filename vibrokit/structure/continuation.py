@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
-from numbers import Integral, Real
+from collections.abc import Callable, Generator, Sequence
+from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import ParameterError, VibrokitError, nearest, shown
+from vibrokit.errors import ParameterError, VibrokitError, shown
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.kernels.ensemble import Progress, carry
+from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator, seed_from
+from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
+from vibrokit.progress import OutOfTime, Progress, Work, advance, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.continuation import Continuation
+from vibrokit.results.finding import TIME_LIMIT, Code, Finding
 from vibrokit.results.region import Region
+from vibrokit.results.steady_states import SteadyStates
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.attractors.names import labelled
+from vibrokit.structure.basins.fractions import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.regions import frame_of
-from vibrokit.structure.request import Request, check_means
-from vibrokit.structure.shares import share_out
-from vibrokit.structure.status import fates_of
-from vibrokit.structure.tracing.branches import Tracing, unshared
-from vibrokit.structure.tracing.continuation_record import recorded
+from vibrokit.structure.request import Request, check_means, plain, seed_of, stepper_of
+from vibrokit.structure.tracing.branches import Tracing, without_fraction
+from vibrokit.structure.tracing.outcome import bifurcations_of, branch_findings, branch_names, thinned
 from vibrokit.symbolic.flow_kind import Flow
 
 _FEW = (2, 2)  # cells where only the attractors are wanted
@@ -38,191 +43,226 @@ Array = NDArray[np.float64]
 
 def continuation(
     osc: Oscillator,
-    path: str,
+    parameter: str,
     values: Sequence[float],
     *,
     region: Any = None,
     cells: tuple[int, int] = (100, 100),
     starts: tuple[int, int] = (24, 24),
-    stepper: Stepper | None = None,
+    stepper: Stepper | str | None = None,
     rng: int | np.random.Generator = 0,
     executor: concurrent.futures.Executor | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
+    time_limit: float | None = None,
 ) -> Continuation:
     """Follow the steady states of a scene along values of one parameter, and locate the bifurcations between.
 
-    At each value the steady states are searched for anew, so that nothing is lost with what was lost before. Every
-    orbit, equilibrium and limit cycle is then followed to the next value by pseudo-arclength continuation of its
-    equations, and those that nothing led to are followed back; this says which belong to one branch, finds attractors
-    that the search missed, and locates the bifurcations on the way. What cannot be followed so (chaotic sets, a period
-    that has doubled) is joined by the least distance between the sets of points. Last, basin fractions are found on a
-    grid.
+    The steady states are searched for at each value independently. Every orbit, equilibrium and limit cycle is then
+    followed to the next value by pseudo-arclength continuation of its equations, and those that were not reached are
+    followed back. This joins them into branches, finds attractors that the search missed, and locates the bifurcations
+    on the way. What cannot be followed so (chaotic sets, a period that has doubled) is joined by the smallest distance
+    between the sets of points. Finally, basin fractions are found on a grid.
+
+    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete; branches that
+    were not followed yet are joined by distance. If nothing is known by then, KeyboardInterrupt is raised.
 
     Parameters
     ----------
     osc : Oscillator
-    path : str
-        Any key of ``osc.parameters`` that does not shape the equations.
+    parameter : str
+        A parameter that does not shape the equations: a key of ``osc.parameters``, or the end of exactly one, such as
+        ``"frequency"`` for ``"excitations.0.frequency"``. The record has the full path.
     values : sequence of float
         Finite and distinct; they are taken in ascending order.
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
-        Where to look, and what basin fractions are shares of, the same at all values so that they compare. By default
-        each search chooses for itself where to look, and the fractions are shares of the smallest region that holds
-        the steady states of all values, and the stops, with room around them.
+        Region of the searches and of the basin fractions, the same at all values so that these can be compared. By
+        default each search chooses its own region, and the fractions are shares of the smallest region that contains
+        the steady states of all values and the stops, with a margin around them.
     cells : (int, int)
         Cells of the basin grid in x and v.
     starts : (int, int)
         Starts of each search in x and v.
-    stepper : Stepper, optional
-        For everything; by default as for `find_structure`.
+    stepper : Stepper or str, optional
+        For everything, or its text; by default as for `find_structure`.
     rng : int or numpy.random.Generator
-        Every value gets the same seed.
+        All values have the same seed.
     executor : concurrent.futures.Executor, optional
-        Carries the searches, then the basins, each value as one task; by default they are done one after the other. The
+        Does the searches, then the basins, each value as one task; by default they are done one after another. The
         result is the same to the last bit.
-    progress : callable, optional
-        Called with (tasks done, tasks in all), two for each value.
+    progress : bool or callable, optional
+        True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
+    time_limit : float, optional
+        In seconds.
 
     Returns
     -------
     Continuation
-        A value at which the scene is refused or nothing is found stands in it with the reason. If the work is stopped
-        (Ctrl-C), it holds what was found so far, and is marked incomplete.
+        A value at which the scene is refused, or nothing is found, has a finding with the reason.
+        Its `settings` are these arguments: ``continuation(osc, **record.settings)`` repeats the call.
 
     Raises
     ------
     ParameterError
-        A path or values that cannot be continued in.
+        An unknown or ambiguous parameter, one that shapes the equations, or values that are not numbers.
     StructureError
-        A region, or counts, that are not what they must be.
+        The region or the counts are not allowed.
     """
-    began = time.perf_counter()
-    check_means(osc, stepper, executor, progress)
-    entry, numbers = _entry(osc, path), _checked(values)
-    request = Request(cells, 0, None, starts, 0.5, None)
-    seed = int(rng) if isinstance(rng, Integral) and not isinstance(rng, bool) else seed_from(rng)
-    frame = None if region is None else Region.of(region)
-    work = _Work(osc, path, numbers.tolist(), stepper, executor, progress)
-    try:
-        work.search({"region": frame, "starts": request.starts, "stepper": stepper, "rng": seed})
-        work.trace()
-        frame = frame or work.common_region()
-        work.share_out(frame, request.cells)
-    except KeyboardInterrupt:
-        work.stopped = True
-        work.trace()
-    record = recorded(work.tracing, work.states(), len(numbers), complete=not work.stopped)
-    return dataclasses.replace(
-        record, symbol=entry.declared.symbol, unit=entry.declared.unit, region=frame, seed=seed,
-        seconds=time.perf_counter() - began,
-    )  # fmt: skip
+    chosen = stepper_of(stepper)
+    check_means(osc, chosen, executor)
+    entry, numbers = _entry(osc, parameter), _checked(values)
+    request = Request(region, cells, 0, None, starts, 0.5, None, False, False, chosen, seed_of(rng))
+    with working(progress, time_limit) as work:
+        run = _Run(osc, entry, numbers.tolist(), request, executor)
+        run.run()
+        return run.record(work)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Found:
-    """What the search found at one value."""
+    """What the search found at one value, and how it was stopped."""
 
     value: float
-    attractors: tuple[Attractor, ...]
-    region: Region | None
-    budget: int
-    complete: bool
-    status: str
+    attractors: tuple[Attractor, ...] = ()
+    region: Region | None = None
+    budget: int = 0
+    findings: tuple[Finding, ...] = ()
+    stopped: Finding | None = None
 
 
-class _Work:
+class _Run:
     """Goes through the stages and keeps what each has found."""
 
     def __init__(
         self,
         osc: Oscillator,
-        path: str,
+        entry: Entry,
         values: list[float],
-        stepper: Stepper | None,
+        request: Request,
         executor: concurrent.futures.Executor | None,
-        progress: Progress | None,
     ) -> None:
-        self.osc, self.path, self.values = osc, path, values
-        self.stepper, self.executor, self.progress = stepper, executor, progress
+        self.osc, self.entry, self.path, self.values = osc, entry, entry.path, values
+        self.request, self.executor, self.region = request, executor, request.region
         self.found: list[_Found] = []
-        self.tracing = self._tracing()
-        self.fates: dict[float, tuple[str, ...]] = {}
-        self.stopped = False
+        self.cell_findings: dict[float, tuple[Finding, ...]] = {}
+        self.stopped: Finding | None = None
 
-    def search(self, settings: dict[str, Any]) -> None:
-        """Look for the steady states at each value."""
-        for found in self._carried(_search, [(self.osc, self.path, value, settings) for value in self.values], 0):
-            self.found.append(found)
-            if not found.complete:
-                raise KeyboardInterrupt
-
-    def trace(self) -> None:
-        """Join what was found into branches; another Ctrl-C leaves the families and has it done by distances alone."""
-        if self.tracing.values:
-            return
-        self.tracing = self._tracing()
+    def run(self) -> None:
+        """Go through the stages; an interrupt ends them once something is known, and is raised before that."""
+        doing = "values"
         try:
+            self._search()
+            doing = "branches"
             self.tracing.run()
-        except KeyboardInterrupt:
-            self.stopped = True
+            doing = "basin fractions"
+            self._find_fractions()
+        except KeyboardInterrupt as interrupt:
+            if not self.found:
+                raise
+            self.stopped = Finding.stopped(doing, interrupt)
             self.tracing.pair_off()
 
-    def common_region(self) -> Region | None:
-        """The smallest region that holds what is seen at every value; None if nothing was found."""
-        tracing = self.tracing
-        frames = [
-            frame_of(self.osc.replace({self.path: value}), attractors).bounds
-            for value, attractors in zip(tracing.values, tracing.found, strict=True)
-        ]
-        return _union(frames)
+    def record(self, work: Work) -> Continuation:
+        """Return the record of all that was found."""
+        tracing, declared, request = self.tracing, self.entry.declared, self.request
+        numbered = tracing.numbered()
+        bifurcations = bifurcations_of(tracing, numbered)
+        states = tuple(self._states(numbered))
+        arguments = {name: getattr(request, name) for name in ("region", "cells", "starts", "stepper", "rng")}
+        arguments |= {"parameter": self.path, "values": tuple(self.values)}
+        nothing = [finding for at in states for finding in at.findings if finding.code is Code.NOTHING_AT]
+        findings = branch_findings(tracing, numbered, bifurcations, len(states))
+        return Continuation(
+            parameter=self.path,
+            symbol=declared.symbol,
+            unit=declared.unit,
+            region=self.region,
+            states=states,
+            branch_names=branch_names(tracing, numbered),
+            bifurcations=bifurcations,
+            complete=self.stopped is None,
+            scene=scene_data(self.osc),
+            settings=plain(arguments),
+            findings=(*findings, *nothing, *([self.stopped] if self.stopped else [])),
+            stats=work.stats,
+            seed=request.rng,
+            seconds=work.seconds,
+        )
 
-    def share_out(self, region: Region | None, cells: tuple[int, int]) -> None:
-        """Find the basin fractions of all attractors at each value."""
-        if region is None or self.stopped:
-            return
-        budgets = {found.value: found.budget for found in self.found}
-        tasks = [
-            (self.osc.replace({self.path: value}), attractors, region, cells, budgets[value], self.stepper)
-            for value, attractors in zip(self.tracing.values, self.tracing.found, strict=True)
-        ]
-        for index, shared in enumerate(self._carried(share_out, tasks, len(self.values))):
-            self.tracing.found[index] = list(shared.attractors)
-            self.fates[self.tracing.values[index]] = shared.words
-            if not shared.complete:
-                raise KeyboardInterrupt
+    def _search(self) -> None:
+        """Search for the steady states at each value."""
+        request = self.request
+        given = {"region": request.region, "starts": request.starts, "stepper": request.stepper, "rng": request.rng}
+        tasks = [(self.osc, self.path, value, given) for value in self.values]
+        with stage("values", unit="values", total=len(tasks)), contextlib.closing(self._each(_search, tasks)) as all_:
+            for found in all_:
+                self.found.append(found)
+                if found.stopped is not None:
+                    raise OutOfTime if found.stopped.values["reason"] == TIME_LIMIT else KeyboardInterrupt
+                advance()
 
-    def states(self) -> list[tuple[float, str]]:
-        """Every value that was looked at, and what there is to say of it."""
-        return [(at.value, " ".join([at.status, *self.fates.get(at.value, ())])) for at in self.found]
-
-    def _carried(self, stage: Callable[..., Any], tasks: list[tuple[Any, ...]], before: int) -> Iterator[Any]:
-        results = (stage(*task) for task in tasks) if self.executor is None else carry(stage, tasks, self.executor)
-        for done, result in enumerate(results, start=before + 1):
-            yield result
-            if self.progress is not None:
-                self.progress(done, 2 * len(self.values))
-
-    def _tracing(self) -> Tracing:
+    @cached_property
+    def tracing(self) -> Tracing:
+        """The branches through what was found."""
         held = [at for at in self.found if at.attractors]
         frame = _union([at.region.bounds for at in held if at.region is not None])
         size = np.ones(2) if frame is None else np.diff(frame.bounds)[:, 0]
-        exact = self.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
-        attractors = [[unshared(attractor) for attractor in at.attractors] for at in held]
-        return Tracing(self.osc, self.path, [at.value for at in held], attractors, size, exact)
+        stepper = self.request.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
+        attractors = [[without_fraction(attractor) for attractor in at.attractors] for at in held]
+        return Tracing(self.osc, self.path, [at.value for at in held], attractors, size, stepper)
+
+    def _find_fractions(self) -> None:
+        """Find the basin fractions of all attractors at each value."""
+        tracing = self.tracing
+        held = list(zip(tracing.values, tracing.found, strict=True))
+        frames = [frame_of(self.osc.replace({self.path: value}), attractors).bounds for value, attractors in held]
+        self.region = self.region or _union(frames)
+        budgets = {found.value: found.budget for found in self.found}
+        tasks = [
+            (
+                self.osc.replace({self.path: value}), labelled(attractors, has_stops=bool(self.osc.barriers)),
+                self.region, self.request.cells, budgets[value], self.request.stepper,
+            )
+            for value, attractors in held
+        ]  # fmt: skip
+        with (
+            stage("basin fractions", unit="values", total=len(tasks)),
+            contextlib.closing(self._each(basin_fractions, tasks)) as each,
+        ):
+            for index, (attractors, findings) in enumerate(each):
+                tracing.found[index] = list(attractors)
+                self.cell_findings[tracing.values[index]] = findings
+                advance()
+
+    def _states(self, numbered: list[list[int]]) -> Generator[SteadyStates, None, None]:
+        """Yield the steady states at each value."""
+        places = {value: index for index, value in enumerate(self.tracing.values)}
+        for at in self.found:
+            index = places.get(at.value)
+            attractors = [] if index is None else self.tracing.found[index]
+            yield SteadyStates(
+                at.value,
+                labelled([thinned(attractor) for attractor in attractors], has_stops=bool(self.osc.barriers)),
+                () if index is None else tuple(numbered[index]),
+                (*at.findings, *self.cell_findings.get(at.value, ())),
+            )
+
+    def _each(self, work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Generator[Any, None, None]:
+        if self.executor is not None:
+            yield from carry(work, tasks, self.executor)
+        else:
+            yield from (work(*task) for task in tasks)
 
 
-def _search(osc: Oscillator, path: str, value: float, settings: dict[str, Any]) -> _Found:
+def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> _Found:
     try:
         there = osc.replace({path: value})
-        structure = find_structure(there, cells=_FEW, saddles=False, manifolds=False, **settings)
+        structure = find_structure(there, cells=_FEW, saddles=False, manifolds=False, **given)
     except VibrokitError as error:
-        return _Found(value, (), None, 0, True, str(error))
-    # The few cells of this grid say nothing of the basins, which are found once all attractors are known.
-    status = structure.status
-    for sentence in fates_of(structure.basins):
-        status = status.replace(f" {sentence}", "")
-    region, budget = structure.basins.region, structure.budget
-    return _Found(value, structure.attractors, region, budget, structure.complete, status)
+        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),))
+    # The few cells of this grid do not resolve the basins, which are found once all attractors are known.
+    findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
+    stopped = next(iter(structure.found(Code.STOPPED)), None)
+    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings, stopped)
 
 
 def _union(bounds: list[Array]) -> Region | None:
@@ -232,28 +272,25 @@ def _union(bounds: list[Array]) -> Region | None:
     return Region.of(np.stack([low, high], axis=1).tolist())
 
 
-def _entry(osc: Oscillator, path: Any) -> Entry:
-    entries = {entry.path: entry for entry in osc.entries()}
-    if not isinstance(path, str) or path not in entries:
-        open_ones = [name for name, entry in entries.items() if not entry.declared.structural]
-        raise ParameterError(f"continuation: the scene has no parameter {shown(path)}{nearest(str(path), open_ones)}")
-    if entries[path].declared.structural:
+def _entry(osc: Oscillator, parameter: str) -> Entry:
+    entry = osc.entry(parameter)
+    if entry.declared.structural:
         raise ParameterError(
-            f"continuation: {path} is {shown(entries[path].value)}, which shapes the equations, and no motion can be "
-            "followed from one value to the next; find the structure at each value instead."
+            f"continuation: {entry.path} shapes the equations, so motion cannot be followed from value to value; "
+            "find the structure at each value."
         )
-    return entries[path]
+    return entry
 
 
 def _checked(values: Any) -> Array:
     listed = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
     if not listed:
-        raise ParameterError(f"continuation: values is {shown(values)}; give a sequence of numbers, one or more.")
+        raise ParameterError(f"continuation: values must be a sequence of numbers, one or more, got {shown(values)}.")
     for value in listed:
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise ParameterError(f"continuation: values has {shown(value)}; give finite numbers.")
+            raise ParameterError(f"continuation: values must be finite numbers, got {shown(value)}.")
     numbers = np.sort(np.array(listed, dtype=float))
     twice = numbers[:-1][np.diff(numbers) == 0]
     if twice.size:
-        raise ParameterError(f"continuation: values has {twice[0]:g} more than once; give distinct numbers.")
+        raise ParameterError(f"continuation: values must be distinct, got {twice[0]:g} more than once.")
     return numbers

@@ -1,4 +1,4 @@
-"""Curves grown as images of a short piece, with a bound on their chords and on how sharply they turn."""
+"""Curves grown as images of a short piece, with bounds on their chords and angles."""
 
 from __future__ import annotations
 
@@ -8,23 +8,25 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-MARGIN = 1.0
-"""How much of its own width and height a region is widened by, on every side, before a curve counts as outside."""
+from vibrokit.results.manifold import ManifoldEnd
 
-_FLOOR = 0.01  # shortest chord that is still divided because it turns, in units of the spacing
-_REST = 1e-5  # length of an image below which a curve has come to rest, as a share of the region
+MARGIN = 1.0
+"""Share of its width and height by which a region is widened on every side; beyond that a curve is outside."""
+
+_FLOOR = 0.01  # shortest chord that is divided because of its angle, in units of the spacing
+_REST = 1e-5  # length of an image, as a share of the region, below which a curve has converged to a point
 _SEEDS = 5
-_THINNING = 1.1  # a curve is at most this much longer than what is left of it when it is thinned
-_MOST_NODES, _MOST_IMAGES = 100_000, 5000
+_THINNING = 1.1  # largest ratio of the lengths of a curve before and after it is thinned
+_MOST_VERTICES, _MOST_IMAGES = 100_000, 5000
 
 Array = NDArray[np.float64]
 Images = Callable[[Array, int], Array]
-"""Images of states (count, 2) under a number of applications of a map; NaN where they ran out of range."""
+"""Images of states (count, 2) under a number of applications of a map; NaN where they diverged."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Limits:
-    """How fine a curve must be, and where it ends; distances in units of the region's width and height."""
+    """Resolution of a curve, and where it ends; distances in units of the region's width and height."""
 
     low: Array
     width: Array
@@ -33,7 +35,7 @@ class Limits:
     arc_length: float
 
     def inside(self, states: Array) -> NDArray[np.bool_]:
-        """Whether states lie in the widened region; NaN does not."""
+        """Whether states lie in the widened region; False for NaN."""
         place = (states - self.low) / self.width
         return np.asarray(((place >= -MARGIN) & (place <= 1.0 + MARGIN)).all(axis=1))
 
@@ -54,16 +56,16 @@ class Limits:
         turning[1:] |= sharp
         return ~(chords <= self.spacing) | (turning & (chords > _FLOOR * self.spacing))
 
-    def needed(self, states: Array, left: float) -> int:
-        """How many of an image's states matter: those up to the first outside the region or beyond a length."""
+    def needed(self, states: Array, remaining: float) -> int:
+        """Number of an image's states up to the first outside the region or beyond a length."""
         kept = self.thinned(states)
         lengths = np.cumsum(np.linalg.norm(np.diff(states[kept], axis=0), axis=1))
         over = ~self.inside(states)
-        over[kept[1:]] |= ~(lengths < left)
+        over[kept[1:]] |= ~(lengths < remaining)
         return int(np.argmax(over)) + 1 if over.any() else len(states)
 
-    def cut(self, states: Array, left: float, room: int) -> tuple[Array, str]:
-        """End a curve where it leaves the region, or at a length, whichever comes first, by linear interpolation."""
+    def cut(self, states: Array, remaining: float, room: int) -> tuple[Array, ManifoldEnd]:
+        """End a curve where it leaves the region, or at a length, whichever is first, by linear interpolation."""
         full = len(states) > room
         states = states[:room]
         outside = ~self.inside(states)
@@ -72,16 +74,16 @@ class Limits:
             last = self._crossing(states[end - 1], states[end])
             states = np.concatenate([states[:end], last[np.isfinite(last).all(axis=1)]])
         lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(states, axis=0), axis=1))])
-        if lengths[-1] >= left:
-            end = int(np.searchsorted(lengths, left))
-            share = (left - lengths[end - 1]) / (lengths[end] - lengths[end - 1])
+        if lengths[-1] >= remaining:
+            end = int(np.searchsorted(lengths, remaining))
+            share = (remaining - lengths[end - 1]) / (lengths[end] - lengths[end - 1])
             last = states[end - 1 : end] + share * (states[end] - states[end - 1])
             states = np.concatenate([states[:end], last])
         elif outside.any():
-            return states, f"It leaves the region, widened by its own size on every side, at {_place(states[-1])}."
+            return states, ManifoldEnd.LEAVES_REGION
         elif full:
-            return states, f"It was cut at {_MOST_NODES} points, the most that are kept; give a larger spacing or bend."
-        return states, f"It was cut at its arc length of {self.arc_length:.6g}."
+            return states, ManifoldEnd.MOST_VERTICES
+        return states, ManifoldEnd.ARC_LENGTH
 
     def _crossing(self, inner: Array, outer: Array) -> Array:
         """Where a chord leaves the widened region, shape (1, 2)."""
@@ -91,11 +93,11 @@ class Limits:
         return (inner + np.min(np.where(step == 0, np.inf, shares)) * (outer - inner))[None]
 
     def same(self, one: Array, other: Array) -> bool:
-        """Whether two states are one, but for rounding."""
+        """Whether two states are the same up to rounding."""
         return bool(np.linalg.norm((one - other) / self.width) < 1e-12)
 
     def thinned(self, states: Array) -> NDArray[np.intp]:
-        """Which states suffice: the rest stands where the curve is finer than it need be."""
+        """Indices of the states that suffice; the others lie where the curve is finer than necessary."""
         kept = np.arange(len(states))
         while len(kept) > 3:
             chords, angles = self.shape(states[kept])
@@ -113,7 +115,7 @@ class Limits:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Domain:
-    """Fundamental domain: from `share` = 0 near the saddle, by equal factors of the distance, to 1 at the image."""
+    """Fundamental domain, from `share` = 0 near the saddle to 1 at the image; the distance grows geometrically."""
 
     point: Array
     reach: Array
@@ -126,67 +128,65 @@ class Domain:
 
     @property
     def resolution(self) -> float:
-        """Least difference of `share` that rounding leaves meaningful."""
+        """Smallest difference of `share` that is not lost in rounding."""
         step = np.abs(self.reach).max() / self.growth * np.log(self.growth)
         return float(8.0 * np.finfo(float).eps * np.abs(self.point).max() / step) + 1e-12
 
 
-def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, str]:
-    """Join the images of a domain to a curve until it is long enough, leaves the region, or comes to rest.
+def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, ManifoldEnd]:
+    """Join the images of a domain to a curve until it is long enough, leaves the region, or converges to a point.
 
     Returns
     -------
     curve : array (count, 2)
-    status : str
-        Why it ends, as a sentence.
+    end : ManifoldEnd
     """
     shares = np.linspace(0.0, 1.0, _SEEDS)
     states = domain(shares)
     curve = [domain.point[None], states]
     if not limits.inside(np.concatenate(curve)).all():
-        return domain.point[None], "Its saddle lies outside the region, widened by its own size on every side."
-    nodes, left = len(states), limits.arc_length - _length(np.concatenate(curve))
-    if left <= 0.0:
-        return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_NODES)
+        return domain.point[None], ManifoldEnd.SADDLE_OUTSIDE
+    vertices, remaining = len(states), limits.arc_length - _length(np.concatenate(curve))
+    if remaining <= 0.0:
+        return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_VERTICES)
     extent = 0.0
     for count in range(1, _MOST_IMAGES + 1):
         before = curve[-1][-2]
-        shares, states = _image(domain, images, count, (shares, images(states, 1)), before, left, limits)
+        shares, states = _image(domain, images, count, (shares, images(states, 1)), before, remaining, limits)
         kept = limits.thinned(states)
         shares, states = shares[kept], states[kept]
         joined = np.concatenate([curve[-1][-1:], states[limits.same(states[0], curve[-1][-1]) :]])
-        room = max(2, _MOST_NODES - nodes)
-        if shares[-1] < 1.0 or not limits.inside(states).all() or _length(joined) >= left or len(joined) > room:
-            piece, status = limits.cut(joined, left, room)
-            return np.concatenate([*curve, piece[1:]]), status
+        room = max(2, _MOST_VERTICES - vertices)
+        if shares[-1] < 1.0 or not limits.inside(states).all() or _length(joined) >= remaining or len(joined) > room:
+            piece, end = limits.cut(joined, remaining, room)
+            return np.concatenate([*curve, piece[1:]]), end
         curve.append(joined[1:])
-        nodes, left = nodes + len(joined) - 1, left - _length(joined)
+        vertices, remaining = vertices + len(joined) - 1, remaining - _length(joined)
         last, extent = extent, float(limits.shape(joined)[0].sum())
         if extent < min(last, _REST):
-            return np.concatenate(curve), f"It comes to rest at {_place(states[-1])}."
-    status = f"It was given up after {_MOST_IMAGES} images, at {_place(states[-1])}: it moves too slowly."
-    return np.concatenate(curve), status
+            return np.concatenate(curve), ManifoldEnd.AT_REST
+    return np.concatenate(curve), ManifoldEnd.TOO_SLOW
 
 
 def _image(
     domain: Domain,
     images: Images,
     count: int,
-    nodes: tuple[Array, Array],
+    known: tuple[Array, Array],
     before: Array,
-    left: float,
+    remaining: float,
     limits: Limits,
 ) -> tuple[Array, Array]:
-    """Insert nodes into an image of the domain until it is fine enough, as far as it is needed.
+    """Insert vertices into an image of the domain until it is fine enough, as far as it is needed.
 
-    Every new node is carried from the domain itself; `before` is the point of the curve before the image begins.
+    Every new vertex is an image of a point of the domain; `before` is the point of the curve before the image begins.
     """
-    shares, states = nodes
+    shares, states = known
     while True:
-        needed = limits.needed(states, _THINNING * left)
+        needed = limits.needed(states, _THINNING * remaining)
         shares, states = shares[:needed], states[:needed]
         coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(shares) > domain.resolution)
-        if not coarse.any() or len(states) > _MOST_NODES:
+        if not coarse.any() or len(states) > _MOST_VERTICES:
             return shares, states
         middle = 0.5 * (shares[:-1] + shares[1:])[coarse]
         places = 1 + np.flatnonzero(coarse)
@@ -196,7 +196,3 @@ def _image(
 
 def _length(states: Array) -> float:
     return float(np.linalg.norm(np.diff(states, axis=0), axis=1).sum())
-
-
-def _place(state: Array) -> str:
-    return f"x = {state[0]:.6g}, v = {state[1]:.6g}"

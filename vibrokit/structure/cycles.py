@@ -1,9 +1,10 @@
-"""Motion of scenes without periodic excitation: limit cycles by Newton's method, and the rates at equilibria."""
+"""Limit cycles of scenes without periodic excitation, by Newton's method."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,19 +14,20 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.equilibria import AT_REST, refuse_forcing
+from vibrokit.structure.linear_map import linear_map
+from vibrokit.structure.newton import Evaluation, newton
+from vibrokit.structure.orbits import CONVERGED
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_ITERATIONS = 30
 _SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are looked for
 _RECURRENCE = 1e-2  # of the extent of the motion: how close it comes to where it was, for Newton's method to begin
 _MOST_TURNS = 256  # turning points in one cycle
 _MOST_TRIALS = 8  # recurrences from which Newton's method may fail
-_CONVERGED = 1e-6
-_FRACTION = 1 / 256  # of the shortest time scale at an equilibrium: one step of any stepper is exact there
-_AT_REST = 1e-6
+_LONGEST_STEP = 0.25  # of the duration: what one Newton step may change in it
 
 Array = NDArray[np.float64]
 
@@ -74,46 +76,61 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
     StructureError
         A scene with periodic excitation, or no cycle so near that the iteration converges to it.
     """
-    _refuse_forcing(osc)
-    point = np.array(state, dtype=float)
-    point[1] = 0.0
-    guess, start = duration, point
-    best: Cycle | None = None
-    for _ in range(_ITERATIONS):
-        image, monodromy = _carried(osc, point, duration, stepper)
-        residual = float(np.linalg.norm(image - point))
-        if not math.isfinite(residual) or (best is not None and residual >= best.residual):
-            break
-        best = Cycle(point, duration, monodromy, residual)
-        # v stays 0 at the turning point, and its column makes room for the derivative with respect to the duration.
-        matrix = monodromy - np.eye(len(point))
-        matrix[:, 1] = _rate(osc, image, stepper)
-        try:
-            step = np.linalg.solve(matrix, point - image)
-        except np.linalg.LinAlgError:
-            break
-        duration += float(np.clip(step[1], -0.25 * duration, 0.25 * duration))
-        step[1] = 0.0
-        point = point + step
-    found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
-    if best is None or best.residual > _CONVERGED * (size_of(osc) + float(np.linalg.norm(start))):
+    refuse_forcing(osc)
+    guess = np.array(state, dtype=float)
+    guess[1] = duration
+
+    def limited(unknowns: Array, steps: Array) -> Array:
+        most = _LONGEST_STEP * unknowns[:, 1]
+        steps[:, 1] = np.clip(steps[:, 1], -most, most)
+        return steps
+
+    (unknowns,), (residual,), (monodromy,) = newton(cycle_equations(osc, stepper), guess[None], limited=limited)
+    start = turning_point(guess)
+    if not residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(start))):
         raise StructureError(
-            f"Newton's method found no cycle of duration {guess:.6g} s near {tuple(np.round(start, 6).tolist())}: "
-            f"{found}. The start is too far off, or the cycle is one of a family; wait longer, take a finer stepper, "
-            "or give the scene damping."
+            f"Newton's method found no cycle of duration {duration:.6g} s near {tuple(np.round(start, 6).tolist())}: "
+            f"the residual is {residual:.1e}. The start is too far away, or the cycle is one of a family; follow the "
+            "motion for longer, take a finer stepper, or give the scene damping."
         )
-    _check_cycle(osc, best, stepper)
-    return best
+    cycle = Cycle(turning_point(unknowns), float(unknowns[1]), monodromy, float(residual))
+    _check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
+    return cycle
 
 
-def _check_cycle(osc: Oscillator, cycle: Cycle, stepper: Stepper) -> None:
-    """Refuse an equilibrium, which repeats after any time, and a derivative that does not carry the flow along."""
-    rate = _rate(osc, cycle.point, stepper)
+def cycle_equations(osc: Oscillator, stepper: Stepper) -> Callable[[Array], Evaluation]:
+    """Return the equations of one cycle; attached is the derivative of the flow over the duration.
+
+    v is 0 at the turning point, so the duration takes its place among the unknowns.
+    """
+    field = VectorField(osc)
+
+    def evaluate(unknowns: Array) -> Evaluation:
+        start, duration = turning_point(unknowns[0])[None], float(unknowns[0, 1])
+        if not duration > 0:
+            raise StructureError(f"Newton's method for a limit cycle reached the duration {duration:g} s.")
+        found = linear_map(osc, start, stepper, interval=duration)
+        jacobians = found.derivatives - np.eye(start.shape[1])
+        jacobians[:, :, 1] = field.rate(found.images)
+        return Evaluation(found.images - start, jacobians, found.derivatives)
+
+    return evaluate
+
+
+def turning_point(unknowns: Array) -> Array:
+    """Return the state that unknowns stand for, with v = 0 in place of the duration."""
+    point = unknowns.copy()
+    point[1] = 0.0
+    return point
+
+
+def _check_cycle(cycle: Cycle, rate: Array, size: float, stepper: Stepper) -> None:
+    """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself."""
     speed = float(np.linalg.norm(rate))
     place = tuple(np.round(cycle.point, 6).tolist())
-    if speed * cycle.duration < _AT_REST * (size_of(osc) + float(np.linalg.norm(cycle.point))):
+    if speed * cycle.duration < AT_REST * (size + float(np.linalg.norm(cycle.point))):
         raise StructureError(
-            f"Newton's method came to the equilibrium {place}, not to a cycle; start farther from the equilibrium."
+            f"Newton's method converged to the equilibrium {place}, not to a cycle; start farther from it."
         )
     carried = float(np.linalg.norm(cycle.monodromy @ rate - rate))
     if carried > 1e-3 * speed * max(1.0, float(np.linalg.norm(cycle.monodromy))):
@@ -146,7 +163,7 @@ def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: floa
     StructureError
         A scene with periodic excitation, or motion that does not repeat within that time.
     """
-    _refuse_forcing(osc)
+    refuse_forcing(osc)
     spacing = osc.time_unit / _SAMPLES
     count = math.ceil(2 * longest / spacing)
     path = record(osc, Flow.STATE, stepper, np.array(state, dtype=float), 0.0, spacing, count)
@@ -187,78 +204,3 @@ def _turn(osc: Oscillator, state: Array, time: float, spacing: float, stepper: S
     end = after(spacing)
     delay = spacing if end[1] >= 0 else float(brentq(lambda delay: after(delay)[1], 0.0, spacing, xtol=1e-9 * spacing))
     return time + delay, after(delay)
-
-
-def equilibrium_exponents(osc: Oscillator, point: Array, stepper: Stepper) -> NDArray[np.complex128]:
-    """Return the eigenvalues of the flow linearised at an equilibrium.
-
-    They are the logarithms of the multipliers over a time so short, against the fastest of them, that no logarithm is
-    off by a turn, divided by that time.
-
-    Parameters
-    ----------
-    osc : Oscillator
-        Without periodic excitation.
-    point : array (n,)
-        The equilibrium.
-    stepper : Stepper
-
-    Returns
-    -------
-    complex array (n,)
-        In s⁻¹, the fastest growing first. A multiple eigenvalue, as at critical damping, is known to about 1e-6 of the
-        fastest one, others to 1e-11.
-
-    Raises
-    ------
-    StructureError
-        A scene with periodic excitation, or a point that is not at rest.
-    """
-    _refuse_forcing(osc)
-    place = np.array(point, dtype=float)
-    time = 1e-12 * osc.time_unit
-    fastest = 0.0
-    for _ in range(_ITERATIONS):
-        image, multipliers = _carried(osc, place, time, stepper)
-        if not np.isfinite(multipliers).all():  # too short a time for the stepper to find its way in a contact
-            time *= 4
-            continue
-        fastest = float(np.abs(np.linalg.eigvals(multipliers) - 1.0).max()) / time
-        if time * fastest > 0.5 * _FRACTION or time > _FRACTION * osc.time_unit:
-            break
-        time = min(4 * time, _FRACTION / max(fastest, 1e-300))
-    moved = float(np.linalg.norm(image - place))
-    if not moved <= _AT_REST * time * max(fastest, 1.0 / osc.time_unit) * (size_of(osc) + float(np.linalg.norm(place))):
-        raise StructureError(
-            f"{tuple(np.round(place, 6).tolist())} is no equilibrium: the state moves at {moved / time:.2e} per second "
-            "there; give a point at rest."
-        )
-    exponents = np.log(np.linalg.eigvals(multipliers).astype(complex)) / time
-    return exponents[np.argsort(-exponents.real, kind="stable")]
-
-
-def _carried(osc: Oscillator, point: Array, duration: float, stepper: Stepper) -> tuple[Array, Array]:
-    """Return the image of a point after some time, and the derivative of the flow."""
-    size = len(point)
-    start = np.concatenate([point, np.eye(size).ravel()])
-    ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], interval=duration)
-    if ended.status[0] != RAN_OUT:
-        return np.full(size, np.nan), np.full((size, size), np.nan)
-    return ended.states[0, :size], ended.states[0, size:].reshape(size, size)
-
-
-def _rate(osc: Oscillator, point: Array, stepper: Stepper) -> Array:
-    """Time derivative of the state, from the flow over a short time and over twice that."""
-    short = 1e-5 * osc.time_unit
-    once, twice = (
-        run_ensemble(osc, Flow.STATE, stepper, point[None], interval=time).states[0] for time in (short, 2 * short)
-    )
-    return (4 * once - 3 * point - twice) / (2 * short)
-
-
-def _refuse_forcing(osc: Oscillator) -> None:
-    if not osc.autonomous:
-        raise StructureError(
-            f"the scene has periodic excitation (period {osc.section_interval:.6g} s), and cycles and equilibria are "
-            "of scenes without; ask for its periodic orbits."
-        )

@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import concurrent.futures
-import dataclasses
 import math
-import time
-from numbers import Integral
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
-from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.named import name_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator, generator_from
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, Work, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import NOT_FOLLOWED, Basins
+from vibrokit.results.finding import Code, Finding
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
-from vibrokit.results.saddle import Saddle
 from vibrokit.results.structure import Structure
-from vibrokit.results.versions import versions
+from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.boundaries.saddles import find_saddles
-from vibrokit.structure.manifolds import grow_manifolds
-from vibrokit.structure.regions import frame_of, search_region, states_at
-from vibrokit.structure.request import Request, check_means
-from vibrokit.structure.search import LONGEST_PERIOD, Means, Search, lasting_carrier
-from vibrokit.structure.settle import Settler, settle_grid
-from vibrokit.structure.shares import with_basin
-from vibrokit.structure.status import lies_in, none_inside, nothing_found, status_of
+from vibrokit.structure.attractors.names import labelled
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.fractions import cell_findings, with_fractions
+from vibrokit.structure.basins.grid import BasinGrid
+from vibrokit.structure.boundaries.saddles import SaddleSearch
+from vibrokit.structure.manifolds import BRANCHES, branch_count, grow_manifolds
+from vibrokit.structure.regions import frame_of, lies_in, search_region, states_at
+from vibrokit.structure.request import Request, check_means, seed_of, stepper_of
+from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.symbolic.flow_kind import Flow
 
 _FOLDS = 30  # e-foldings of the linear damping that a transient is given
@@ -42,7 +41,7 @@ _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients that a cell is given
 _SEARCH_SETTLING = 1e-3
-_MOST_STEPS = 8192  # beyond which locating contacts is as quick
+_MOST_STEPS = 8192  # beyond which locating contacts is as fast
 
 Array = NDArray[np.float64]
 
@@ -59,137 +58,141 @@ def find_structure(
     budget: int | None = None,
     saddles: bool = True,
     manifolds: bool = True,
-    stepper: Stepper | None = None,
+    stepper: Stepper | str | None = None,
     rng: int | np.random.Generator = 0,
     executor: concurrent.futures.Executor | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
+    time_limit: float | None = None,
 ) -> Structure:
     """Find the steady states of the noise-free system, their basins, the saddles between them and their manifolds.
 
     Starts on a grid are followed until they recur; each orbit is refined by Newton's method on the variational
-    equations. What does not recur is watched for 20000 periods at two accuracies of integration, and taken for an
-    attractor only if it survives both; its largest Lyapunov exponent says of which kind. Basins are found on a grid,
-    saddles by following the basins' boundaries, manifolds from the saddles.
+    equations. Motion that does not recur is followed for 20000 periods at two accuracies of integration, and is an
+    attractor only if it survives both; its largest Lyapunov exponent determines its kind. Basins are found on a grid,
+    saddles by tracking the basins' boundaries, manifolds from the saddles.
 
-    If the work is stopped (Ctrl-C) once an attractor is known, what was found so far is returned, marked incomplete.
+    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If no attractor
+    is known by then, KeyboardInterrupt is raised.
 
     Parameters
     ----------
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
-        Where to look; by default a region that holds the steady states and the stops with room around them.
+        Where to search; by default a region that contains the steady states and the stops with a margin around them.
     cells : (int, int)
         Cells of the basin grid in x and v.
     refine : int
-        How many times cells near a boundary are halved; the grid then has ``cells · 2**refine`` cells.
+        How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional
-        Cells on every side that must agree before a coarser cell answers for the trajectories that enter it. More is
-        surer and slower; None has every trajectory followed to its attractor.
+        Cells on every side that must agree before a coarser cell classifies the trajectories that enter it. More is
+        safer and slower; None follows every trajectory to its attractor.
     starts : (int, int)
         Starts of the search in x and v.
     settling : float
         Distance, as a fraction of the region's size, at which an attractor counts as reached.
     budget : int, optional
-        Most periods to wait for a trajectory to settle; by default by the damping, and by the lifetime of chaotic
-        transients where there are some.
+        Largest number of periods that a trajectory is followed; by default it depends on the damping, and on the
+        lifetime of chaotic transients if there are some.
     saddles, manifolds : bool
-        Whether to look for them. Manifolds need saddles.
-    stepper : Stepper, optional
-        For everything; by default fixed steps for many trajectories and located contacts for orbits.
+        Whether to search for them. Manifolds need saddles.
+    stepper : Stepper or str, optional
+        For everything, or its text, such as ``"rk4:512"``; by default fixed steps for many trajectories and located
+        contacts for orbits.
     rng : int or numpy.random.Generator
-        Moves the grid of starts off lattice points of symmetry by a random fraction of a cell.
+        Shifts the grid of starts off the symmetries of the scene by a random fraction of a cell.
     executor : concurrent.futures.Executor, optional
-    progress : callable, optional
-        Called with (work done, work in all) of the stage under way.
+    progress : bool or callable, optional
+        True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
+    time_limit : float, optional
+        In seconds.
 
     Returns
     -------
     Structure
+        Its `settings` are these arguments: ``find_structure(osc, **structure.settings)`` repeats the call.
 
     Raises
     ------
     StructureError
-        No damping, or no attractor in the region.
+        The scene has no damping, or no attractor in the region.
     NoSectionError
         The excitations have no common period.
     """
-    check_means(osc, stepper, executor, progress)
-    for name, flag in (("saddles", saddles), ("manifolds", manifolds)):
-        if not isinstance(flag, bool):
-            raise StructureError(f"{name} is {shown(flag)}; give True or False.")
-    request = Request(cells, refine, margin, starts, settling, budget)
-    finder = _Finder(osc, request, None if region is None else Region.of(region), stepper, executor, progress)
-    generator = generator_from(rng)
-    try:
-        finder.find_attractors(generator)
-        finder.find_basins()
-        if saddles:
-            finder.find_saddles(generator)
-        if saddles and manifolds:
-            finder.grow_manifolds()
-    except KeyboardInterrupt:
-        if not finder.search.attractors:
-            raise
-        finder.stopped = True
-    return finder.structure(int(rng) if isinstance(rng, Integral) else None)
+    chosen = stepper_of(stepper)
+    check_means(osc, chosen, executor)
+    request = Request(
+        region, cells, refine, margin, starts, settling, budget, saddles, manifolds, chosen, seed_of(rng)
+    )  # fmt: skip
+    with working(progress, time_limit) as work:
+        finder = _Finder(osc, request, executor)
+        finder.run()
+        return finder.structure(work)
 
 
 class _Finder:
     """Goes through the stages and keeps what each has found."""
 
-    def __init__(
-        self,
-        osc: Oscillator,
-        request: Request,
-        region: Region | None,
-        stepper: Stepper | None,
-        executor: concurrent.futures.Executor | None,
-        progress: Progress | None,
-    ) -> None:
-        self.began = time.perf_counter()
-        self.osc, self.request, self.region, self.given = osc, request, region, stepper
-        self.executor, self.progress = executor, progress
+    def __init__(self, osc: Oscillator, request: Request, executor: concurrent.futures.Executor | None) -> None:
+        self.osc, self.request, self.region, self.executor = osc, request, request.region, executor
+        self.rng = np.random.default_rng(request.rng)
         self.wait = _wait(osc)
-        self.budget = self.wait if request.budget is None else int(request.budget)
-        self.exact = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
-        self.carrier = stepper or ensemble_stepper(osc, Flow.STATE)
-        self.looked_in = region or search_region(osc)
-        means = Means(self._search_carrier(), self.exact, executor, progress)
-        self.search = Search(osc, means, _SEARCH_SETTLING * self.looked_in.size)
+        self.budget = request.budget or self.wait
+        self.orbit_stepper = request.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
+        self.stepper = request.stepper or ensemble_stepper(osc, Flow.STATE)
+        self.searched = self.region or search_region(osc)
+        self.search = Search(
+            osc, _SEARCH_SETTLING * self.searched.size, self._search_stepper(), self.orbit_stepper, executor
+        )
         self.attractors: tuple[Attractor, ...] = ()
         self.basins: Basins | None = None
-        self.saddles: list[Saddle] = []
+        self.saddle_search: SaddleSearch | None = None
         self.manifolds: tuple[Manifold, ...] = ()
-        self.words: list[str] = []
-        self.stopped = False
-        self.missing = "attractors, basins, saddles and manifolds"
+        self.without_manifolds: list[Finding] = []
+        self.stopped: Finding | None = None
+        self.doing = ""
 
-    def _search_carrier(self) -> Stepper:
-        """Finer than the basins need: a weak attractor must not be lost to the steps."""
-        if self.given is not None or not isinstance(self.carrier, RK4):
-            return self.carrier
-        finer = self.carrier.refined().refined()
-        return finer if finer.steps <= _MOST_STEPS else self.exact
+    def run(self) -> None:
+        """Go through the stages; an interrupt ends them once an attractor is known, and is raised before that."""
+        stages = {"attractors": self._find_attractors, "basins": self._find_basins}
+        stages |= {"saddles": self._find_saddles} if self.request.saddles else {}
+        stages |= {"manifolds": self._grow_manifolds} if self.request.saddles and self.request.manifolds else {}
+        try:
+            for self.doing, find in stages.items():
+                find()
+        except KeyboardInterrupt as interrupt:
+            if not self.search.attractors:
+                raise
+            self.stopped = Finding.stopped(self.doing, interrupt)
+            self._order()
 
-    def find_attractors(self, generator: np.random.Generator) -> None:
-        """Search from a grid of starts, and see for which carrier every attractor is one."""
-        starts = _starts(self.osc, self.looked_in, self.request.starts, generator)
+    def _search_stepper(self) -> Stepper:
+        """A stepper finer than the basins need: too few steps can destroy a weak attractor."""
+        if self.request.stepper is not None or not isinstance(self.stepper, RK4):
+            return self.stepper
+        finer = self.stepper.refined().refined()
+        return finer if finer.steps <= _MOST_STEPS else self.orbit_stepper
+
+    def _find_attractors(self) -> None:
+        """Search from a grid of starts, and choose a stepper with which every attractor persists."""
+        starts = _starts(self.osc, self.searched, self.request.starts, self.rng)
         self.search.run(starts, self.budget, self.budget >= self.wait)
         if not self.search.attractors:
-            hasty = self.budget < self.wait
-            raise StructureError(nothing_found(self.search, self.looked_in, self.budget, hasty, LONGEST_PERIOD))
-        self._settle_order()
+            raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.budget < self.wait))
+        self._order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
-            raise StructureError(none_inside(self.region, self.attractors))
-        if self.given is None:
-            self.carrier = lasting_carrier(self.osc, self.attractors, self.carrier, self.tolerance)
-        lifetimes = [report.lifetime for report in self.search.survival if np.isfinite(report.lifetime)]
+            raise StructureError(_none_inside(self.region, self.attractors))
+        if self.request.stepper is None:
+            self.stepper = persistent_stepper(self.osc, self.attractors, self.stepper, self.tolerance)
+        lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
         if self.request.budget is None and lifetimes:
             self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
 
-    def _settle_order(self) -> None:
+    def _order(self) -> None:
+        """Sort the attractors and name them, unless that was done."""
+        if self.attractors:
+            return
         found = sorted(self.search.attractors, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
-        self.attractors = tuple(dataclasses.replace(attractor, label=n) for n, attractor in enumerate(found))
+        self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
 
     @property
     def frame(self) -> Region:
@@ -199,84 +202,101 @@ class _Finder:
     @property
     def tolerance(self) -> float:
         """Distance at which an attractor counts as reached."""
-        return float(self.request.settling) * self.frame.size
+        return self.request.settling * self.frame.size
 
-    def settler(self) -> Settler:
-        """What says where states lead."""
-        return Settler(self.osc, self.attractors, self.frame, self.tolerance, self.budget, self.carrier, self.executor)
-
-    def find_basins(self) -> None:
-        """Follow every cell of the grid, and note the share of each attractor."""
-        request = self.request
-        self.missing = "basins, saddles and manifolds"
-        self.basins = settle_grid(
-            self.settler(), request.cells, margin=request.margin, refine=request.refine, progress=self.progress
+    @property
+    def classifier(self) -> BasinClassifier:
+        """What finds the attractor that a state leads to."""
+        return BasinClassifier(
+            self.osc, self.attractors, self.frame, self.tolerance, self.budget, self.stepper, self.executor
         )
-        self.attractors = tuple(with_basin(attractor, self.basins) for attractor in self.attractors)
-        if (self.basins.labels == NOT_FOLLOWED).any():
-            raise KeyboardInterrupt
 
-    def find_saddles(self, generator: np.random.Generator) -> None:
-        """Follow the boundaries between basins to the saddles on them."""
+    def _find_basins(self) -> None:
+        """Classify every cell of the grid, and note the basin fraction of each attractor."""
+        request = self.request
+        grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
+        try:
+            grid.fill()
+        finally:
+            self.basins = grid.basins
+            self.attractors = with_fractions(self.attractors, self.basins)
+
+    def _find_saddles(self) -> None:
+        """Track the boundaries between basins to the saddles on them."""
         assert self.basins is not None
-        self.missing = "saddles and manifolds"
-        settler = self.settler().sharing(self.basins, self.request.margin or 2)
-        ordered, words = find_saddles(
-            self.osc, settler, self.basins, self.attractors,
-            carrier=self.carrier, exact=self.exact, rng=generator, found=self.saddles,
-        )  # fmt: skip
-        self.saddles = list(ordered)
-        self.words.append(words)
-        outside = sum(not lies_in(self.frame, saddle) for saddle in ordered)
-        if outside:
-            self.words.append(f"{outside} of these lie outside the region; a wider one shows them.")
+        classifier = self.classifier.sharing(self.basins, self.request.margin or 2)
+        self.saddle_search = SaddleSearch(classifier, self.basins, self.orbit_stepper)
+        self.saddle_search.run(self.rng)
 
-    def grow_manifolds(self) -> None:
+    def _grow_manifolds(self) -> None:
         """Grow the manifolds of each saddle that is an orbit."""
-        self.missing = "manifolds"
-        for index, saddle in enumerate(self.saddles):
-            if saddle.kind not in ("saddle", "flip saddle"):
-                continue
-            try:
-                self.manifolds += grow_manifolds(
-                    self.osc, index, saddle, region=self.frame, stepper=self.given, executor=self.executor
-                )
-            except StructureError as error:
-                self.words.append(f"Saddle {index} has no manifolds: {error}")
+        assert self.saddle_search is not None
+        saddles = {n: s for n, s in enumerate(self.saddle_search.saddles) if s.kind in ("saddle", "flip saddle")}
+        with stage("manifolds", unit=BRANCHES, total=sum(map(branch_count, saddles.values()))):
+            for index, saddle in saddles.items():
+                grown: list[Manifold] = []
+                try:
+                    branches = grow_manifolds(
+                        self.osc, index, saddle,
+                        region=self.frame, stepper=self.request.stepper, executor=self.executor,
+                    )  # fmt: skip
+                    grown.extend(branches)
+                except StructureError as error:
+                    grown = []
+                    self.without_manifolds.append(Finding.of(Code.NO_MANIFOLDS, saddle=index, reason=str(error)))
+                finally:
+                    self.manifolds += tuple(grown)
 
-    def structure(self, seed: int | None) -> Structure:
-        """The record of all that was found."""
-        if not self.attractors:
-            self._settle_order()
-        basins = self.basins
+    def structure(self, work: Work) -> Structure:
+        """Return the record of all that was found."""
+        basins, saddles = self.basins, self.saddle_search
         if basins is None:
             basins = Basins(self.frame, np.full(self.request.cells, NOT_FOLLOWED, dtype=np.int16))
         return Structure(
             attractors=self.attractors,
-            saddles=tuple(self.saddles),
+            saddles=saddles.saddles if saddles else (),
             manifolds=self.manifolds,
             basins=basins,
             survival=self.search.survival,
             settling=self.tolerance,
             budget=self.budget,
-            stepper=name_of(self.carrier),
-            complete=not self.stopped,
-            status=status_of(
-                self.search, len(self.attractors), basins, self.missing if self.stopped else "", self.words
-            ),
+            stepper=name_of(self.stepper),
+            complete=self.stopped is None,
             scene=scene_data(self.osc),
-            seed=seed,
-            seconds=time.perf_counter() - self.began,
-            versions=versions(),
+            settings=self.request.settings,
+            findings=self._findings(basins),
+            stats=work.stats,
+            seed=self.request.rng,
+            seconds=work.seconds,
         )
+
+    def _findings(self, basins: Basins) -> tuple[Finding, ...]:
+        search, saddles = self.search, self.saddle_search
+        found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
+        if search.diverged:
+            found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
+        found += search.findings
+        found += [_survival_finding(survival) for survival in search.survival]
+        found += cell_findings(basins)
+        if saddles is not None:
+            found += saddles.findings
+            outside = sum(not lies_in(basins.region, saddle) for saddle in saddles.saddles)
+            found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
+        return (*found, *self.without_manifolds, *([self.stopped] if self.stopped else []))
+
+
+def _survival_finding(survival: Survival) -> Finding:
+    names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
+    return Finding(Code.SURVIVAL, values={name: getattr(survival, name) for name in names})
 
 
 def _wait(osc: Oscillator) -> int:
+    """Periods that a transient is given, by the damping."""
     rate = osc.damping_ratio * osc.natural_frequency
     if rate == 0 and osc.model.undamped:
         raise StructureError(
-            "nothing in the scene takes energy out (damping_ratio is 0, the stops are elastic), and undamped motion "
-            "has no attractors; give it damping."
+            "the scene has no damping (damping_ratio is 0, the stops are elastic), and undamped motion has no "
+            "attractors; give it damping."
         )
     slowest = rate if osc.damping_ratio < 1 else osc.natural_frequency / (2 * osc.damping_ratio)
     if slowest == 0:
@@ -288,3 +308,24 @@ def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.ra
     low, high = region.bounds.T
     shift = (rng.random(2) - 0.5) * (high - low) / np.array(counts)
     return states_at(osc, region.cell_centres(counts) + shift)
+
+
+def _nothing_found(search: Search, region: Region, budget: int, hasty: bool) -> str:
+    """Return why there is no structure, and what to change; `hasty`: the budget is less than the damping requires."""
+    advice = "raise budget" if hasty else "widen the region or raise budget"
+    if search.diverged > search.starts / 2:
+        advice = "most motions grow without bound; narrow the region, or check the signs of the forces"
+    return (
+        f"no steady state was found from {search.starts} starts in x ∈ {region.x}, v ∈ {region.v}: within {budget} "
+        f"periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "
+        f"{search.diverged} diverged; {advice}."
+    )
+
+
+def _none_inside(region: Region, attractors: Sequence[Attractor]) -> str:
+    """Return that steady states were found, but none in the region."""
+    places = ", ".join(f"({a.points[0, 0]:.6g}, {a.points[0, 1]:.6g})" for a in attractors)
+    return (
+        f"no steady state lies in x ∈ {region.x}, v ∈ {region.v}; starts from there reach those at {places}. Give a "
+        "region that contains one of them, or no region."
+    )

@@ -2,8 +2,8 @@
 
 A branch is the union of the images of a fundamental domain, the piece of its linear approximation from a point near the
 saddle to the image of that point (You, Kostelich & Yorke 1991). Where neighbouring points of an image are too far apart
-or turn too sharply, points are inserted into the domain and carried from there (Hobson 1993), so that no point is ever
-interpolated; when it is sharp enough is decided as by Krauskopf & Osinga (1998).
+or the angle between chords is too large, points are inserted into the domain and mapped from there (Hobson 1993), so
+that no point is interpolated. The criterion for the angle is that of Krauskopf & Osinga (1998).
 
 References
 ----------
@@ -18,9 +18,10 @@ B. Krauskopf and H. Osinga, "Growing 1D and quasi-2D unstable manifolds of maps"
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,27 +29,32 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
-from vibrokit.kernels.ensemble import carry, run_ensemble
+from vibrokit.kernels.ensemble import carry, compiled_kernel, run_ensemble
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.manifold import Manifold
+from vibrokit.progress import advance
+from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.curves import Domain, Limits, grow
+from vibrokit.structure.equilibria import refine_equilibrium
+from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
-_START = 1e-6  # how far the domain reaches from the saddle, as a share of the region
-_CLOSE = 1e-9  # how well the saddle must be known
-_ITERATIONS = 30
-_MOST_STEPS = 1024  # that ensembles are given in a free oscillation, above which located contacts are no slower
-_PARTS = 64  # of 2π/ω_n, over which an equilibrium's rates are found
-_NEAREST = 1e-13  # how near to the saddle it may begin: rounding must not tear it
+BRANCHES = "branches"
+"""Unit of stages that grow manifolds: each branch advances them."""
+_START = 1e-6  # extent of the domain from the saddle, as a share of the region
+_CLOSE = 1e-9  # largest error of the saddle, as a share of the region
+_MOST_STEPS = 1024  # of an ensemble in a free oscillation, above which located contacts are no slower
+_PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
+_NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
 _LENGTH = 10.0  # default arc length, in diagonals of the region
-_LEAST_GROWTH, _MOST_GROWTH = 2.0, 8.0  # of an image over the one before, where that can be chosen
-_WEAKEST = 1e-8  # multiplier, relative to the other one, that is still known to be other than zero
+_LEAST_GROWTH, _MOST_GROWTH = 2.0, 8.0  # ratio of the lengths of an image and the one before, if it can be chosen
+_WEAKEST = 1e-8  # smallest multiplier, relative to the other one, that rounding leaves different from zero
 
 Array = NDArray[np.float64]
 
@@ -79,7 +85,7 @@ def preimages(
     Returns
     -------
     array (count, n)
-        NaN where the motion ran out of range: what damping takes forwards, it gives backwards.
+        NaN where the motion diverged: backwards in time, damping adds energy.
     """
     flip = np.ones(np.shape(states)[1])
     flip[1] = -1.0
@@ -88,6 +94,11 @@ def preimages(
         osc, Flow.STATE_REVERSED, chosen, states * flip, periods, interval=interval, executor=executor
     )  # fmt: skip
     return np.where((ended.status == RAN_OUT)[:, None], ended.states * flip, np.nan)
+
+
+def branch_count(saddle: Saddle) -> int:
+    """Return the number of branches of both manifolds."""
+    return 4 * len(saddle.points)
 
 
 def grow_manifolds(
@@ -102,8 +113,8 @@ def grow_manifolds(
     bend: float = 0.2,
     stable: Sequence[bool] = (True, False),
     executor: concurrent.futures.Executor | None = None,
-) -> tuple[Manifold, ...]:
-    """Grow both branches of the stable and the unstable manifold from each point of a saddle.
+) -> Iterator[Manifold]:
+    """Grow both branches of the stable and the unstable manifold from each point of a saddle, one after another.
 
     Parameters
     ----------
@@ -118,8 +129,8 @@ def grow_manifolds(
     arc_length : float, optional
         Length in the plane of x and v at which a branch is cut; by default 10 diagonals of the region.
     stepper : Stepper, optional
-        Carries the points; also the saddle is refined with it, for a coarse one moves it. By default RK4 with four
-        times the steps that ensembles are given, or what single trajectories are given where that is no slower. On
+        Integrates the points; the saddle is refined with it too, because a coarse stepper moves the saddle. By default
+        RK4 with four times the steps of ensembles, or the stepper of single trajectories if that is no slower. On
         ``hertz-0.570``, against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within
         2e-4 of the curve and all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
     spacing : float
@@ -130,17 +141,17 @@ def grow_manifolds(
     stable : sequence of bool
         Which manifolds: True for the stable one, False for the unstable one.
     executor : concurrent.futures.Executor, optional
-        Carries the branches; threads of this process by default.
+        Grows the branches; threads of this process by default.
 
-    Returns
-    -------
-    tuple of Manifold
+    Yields
+    ------
+    Manifold
         By point of the saddle, then as in `stable`, then against and along the eigenvector, which points to larger x.
 
     Raises
     ------
     StructureError
-        The saddle has no one stable and one unstable direction, or there are more states than x and v.
+        The saddle does not have one stable and one unstable direction, or there are more states than x and v.
     """
     _check(osc, saddle, spacing, bend, arc_length)
     frame = Region.of(region)
@@ -154,28 +165,34 @@ def grow_manifolds(
         for backwards in stable
         for side in (-1, 1)
     ]
-    return tuple(carry(_branch, tasks, executor))
+    for backwards in stable:  # not in several threads at once
+        flow = Flow.STATE_REVERSED if backwards else Flow.STATE
+        compiled_kernel(osc, flow, stepper or _default_stepper(osc, flow))
+    with contextlib.closing(carry(_branch, tasks, executor)) as grown:
+        for branch in grown:
+            yield branch
+            advance(1, BRANCHES)
 
 
 def _check(osc: Oscillator, saddle: Saddle, spacing: float, bend: float, arc_length: float | None) -> None:
     states = saddle.points.shape[1]
     if states != 2:
-        raise StructureError(f"manifolds are curves in the plane of x and v, and this scene has {states} states.")
+        raise StructureError(f"manifolds are curves in the plane of x and v, but this scene has {states} states.")
     if saddle.period == 0:
         raise StructureError(
-            "manifolds are grown from periodic saddles, and this one is a chaotic set without an orbit."
+            "manifolds are grown from periodic saddles, but this one is a chaotic set without an orbit."
         )
     if osc.autonomous and saddle.duration > 0:
-        raise StructureError("manifolds are grown from equilibria of autonomous scenes, and this is a limit cycle.")
+        raise StructureError("manifolds are grown from equilibria of autonomous scenes, but this is a limit cycle.")
     for name, value, most in (("spacing", spacing, 1.0), ("bend", bend, 1.5), ("arc_length", arc_length, math.inf)):
         if value is not None and not (isinstance(value, int | float) and 0 < value <= most):
             allowed = "any number above 0" if most == math.inf else f"a number above 0, at most {most}"
-            raise StructureError(f"{name} is {shown(value)}; give {allowed}.")
+            raise StructureError(f"{name} must be {allowed}, got {shown(value)}.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Carrier:
-    """The map that a manifold grows along, away from the saddle: the section map or its inverse, some times."""
+class _Map:
+    """A power of the section map or of its inverse, along which a manifold grows away from the saddle."""
 
     osc: Oscillator
     stepper: Stepper
@@ -184,7 +201,7 @@ class _Carrier:
     interval: float
 
     def __call__(self, states: Array, images: int = 1) -> Array:
-        """Images of states; NaN where they ran out of range."""
+        """Return images of states; NaN where they diverged."""
         count = images * self.periods
         if self.backwards:
             return preimages(self.osc, states, count, stepper=self.stepper, interval=self.interval)
@@ -203,26 +220,23 @@ def _branch(
     stepper: Stepper | None,
 ) -> Manifold:
     """Grow one branch; a unit of work that an executor may carry."""
-    point, monodromy, length = _linearised(osc, saddle, place)
-    multiplier, direction = _direction(monodromy, backwards, limits)
+    here = _linearised(osc, saddle, place)
+    multiplier, direction = _direction(here, backwards, limits)
     if abs(multiplier) < _WEAKEST or abs(multiplier) > 1.0 / _WEAKEST:
-        status = f"It was not grown: its multiplier of {multiplier:.2g} is too extreme to follow over a whole period."
-        return Manifold(saddle_index, place, backwards, side, point[None], status)
-    rate = abs(math.log(abs(multiplier))) / length
+        return Manifold(saddle_index, place, backwards, side, here.point[None], ManifoldEnd.TOO_EXTREME)
+    point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
     flow = Flow.STATE_REVERSED if backwards else Flow.STATE
     chosen = stepper or _default_stepper(osc, flow)
     if osc.autonomous:
         interval, periods = min(osc.section_interval, math.log(_MOST_GROWTH) / rate), 1
     else:
         interval, periods = osc.section_interval, saddle.period
-        carrier = _Carrier(osc, chosen, backwards, periods, interval)
-        point = _fixed_point(carrier, point, monodromy, limits)
+        point = _fixed_point(_Map(osc, chosen, backwards, periods, interval), here, limits)
     repeats = math.ceil(math.log(_LEAST_GROWTH) / (rate * interval * periods))
     repeats += repeats % 2 if multiplier < 0 else 0
-    images = _Carrier(osc, chosen, backwards, periods * repeats, interval)
+    images = _Map(osc, chosen, backwards, periods * repeats, interval)
     domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
-    curve, status = grow(domain, images, limits)
-    return Manifold(saddle_index, place, backwards, side, curve, status)
+    return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
 
 
 def _default_stepper(osc: Oscillator, flow: Flow) -> Stepper:
@@ -233,53 +247,65 @@ def _default_stepper(osc: Oscillator, flow: Flow) -> Stepper:
     return single_stepper(osc, flow)
 
 
-def _linearised(osc: Oscillator, saddle: Saddle, place: int) -> tuple[Array, Array, float]:
-    """A point of the saddle, the derivative of the map there, and the time that map takes.
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Linearised:
+    """A point of a saddle, the derivative of its map, and the multipliers and eigenvectors over the duration (s)."""
 
-    Without forcing that time is short, so that neither multiplier is lost in rounding.
-    """
-    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    interval = osc.section_interval / (_PARTS if osc.autonomous else 1)
-    orbit = refine_orbit(osc, saddle.points[place], saddle.period, exact, interval=interval)
-    return orbit.point, orbit.monodromy, saddle.period * interval
+    point: Array
+    derivative: Array
+    multipliers: NDArray[Any]
+    vectors: NDArray[Any]
+    duration: float
 
 
-def _direction(monodromy: Array, backwards: bool, limits: Limits) -> tuple[float, Array]:
-    """Multiplier and direction, to larger x and as long as the region is wide, of one of the manifolds."""
-    multipliers, vectors = np.linalg.eig(monodromy)
+def _linearised(osc: Oscillator, saddle: Saddle, place: int) -> _Linearised:
+    """Refine a point of the saddle. The duration of an equilibrium is short, to keep both multipliers moderate."""
+    if osc.autonomous:
+        point, duration = refine_equilibrium(osc, saddle.points[place]).point, osc.section_interval / _PARTS
+        derivative = VectorField(osc).jacobian(point)
+        exponents, vectors = np.linalg.eig(derivative)
+        return _Linearised(point, derivative, np.exp(duration * exponents), vectors, duration)
+    orbit = refine_orbit(osc, saddle.points[place], saddle.period, single_stepper(osc, Flow.STATE_VARIATIONAL))
+    duration = saddle.period * osc.section_interval
+    return _Linearised(orbit.point, orbit.monodromy, *np.linalg.eig(orbit.monodromy), duration)
+
+
+def _direction(here: _Linearised, backwards: bool, limits: Limits) -> tuple[float, Array]:
+    """Multiplier and direction of one of the manifolds; it points to larger x and is as long as the region is wide."""
+    multipliers, vectors = here.multipliers, here.vectors
     order = np.argsort(np.abs(multipliers))
     if np.iscomplexobj(multipliers) or not abs(multipliers[order[0]]) < 1.0 < abs(multipliers[order[1]]):
         listed = ", ".join(f"{multiplier:.4g}" for multiplier in multipliers[order])
         raise StructureError(
-            f"the multipliers of the orbit are {listed}, and only a saddle has manifolds that are curves: give one "
-            "with one multiplier inside the unit circle and one outside."
+            f"the multipliers of the orbit are {listed}, but only a saddle has manifolds that are curves; give an "
+            "orbit with one multiplier inside the unit circle and one outside."
         )
     chosen = order[0 if backwards else 1]
     vector = vectors[:, chosen] / np.linalg.norm(vectors[:, chosen] / limits.width)
     return float(multipliers[chosen]), vector if vector[0] > 0 or (vector[0] == 0 < vector[1]) else -vector
 
 
-def _fixed_point(carrier: _Carrier, point: Array, monodromy: Array, limits: Limits) -> Array:
-    """Fixed point of the very map that carries the curve, by Newton's method with a derivative from nearby."""
-    least, best = math.inf, point
-    inverse = np.linalg.inv(monodromy - np.eye(2))
-    inverse = inverse @ monodromy if carrier.backwards else -inverse
-    for _ in range(_ITERATIONS):
-        step = inverse @ (carrier(point[None])[0] - point)
-        size = float(np.linalg.norm(step / limits.width))
-        if not size < least:
-            break
-        least, best, point = size, point, point + step
-    if not least < _CLOSE:
+def _fixed_point(images: _Map, here: _Linearised, limits: Limits) -> Array:
+    """Fixed point of the map that the curve grows along, by Newton's method with the derivative of a more exact map."""
+    derivative = np.linalg.inv(here.derivative) if images.backwards else here.derivative
+    jacobian = derivative - np.eye(2)
+
+    def evaluate(points: Array) -> Evaluation:
+        offsets = images(points) - points
+        return Evaluation(offsets, jacobian[None], offsets)
+
+    (point,), _, (offset,) = newton(evaluate, here.point[None])
+    error = float(np.linalg.norm(np.linalg.solve(jacobian, offset) / limits.width))
+    if not error < _CLOSE:
         raise StructureError(
-            f"{carrier.stepper} has no saddle near {tuple(np.round(best, 6).tolist())}: Newton's steps fall to "
-            f"{least:.1g} of the region only. Take a finer stepper, or one that locates contacts."
+            f"with {images.stepper} there is no saddle near {tuple(np.round(point, 6).tolist())}: Newton's steps do "
+            f"not fall below {error:.1g} of the region. Use a finer stepper, or one that locates contacts."
         )
-    return best
+    return point
 
 
-def _domain(images: _Carrier, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:
-    """The piece of the linear manifold from a point to its image; less where rounding would tear it."""
+def _domain(images: _Map, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:
+    """The piece of the linear manifold from a point to its image; a shorter one where rounding requires it."""
     reach = _START * direction
     if _START / growth < _NEAREST:
         return Domain(point, reach, _START / _NEAREST, np.zeros(2))

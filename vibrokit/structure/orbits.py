@@ -1,7 +1,8 @@
-"""Periodic orbits: refined by Newton on the variational equations; what is said of every closed orbit."""
+"""Periodic orbits: Newton's method on the section map, and what is computed of every closed orbit."""
 
 from __future__ import annotations
 
+import concurrent.futures
 import dataclasses
 import math
 from collections.abc import Callable
@@ -13,12 +14,15 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.linear_map import linear_map
+from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_ITERATIONS = 30
 EQUAL = 1e-6
 """Distance, relative to the size of an orbit, below which two points are one."""
+CONVERGED = 1e-6
+"""Largest residual, relative to the size of the motion, of an orbit that Newton's method has found."""
 
 Array = NDArray[np.float64]
 
@@ -43,56 +47,42 @@ class Orbit:
     residual: float
 
 
-def section_derivative(
-    osc: Oscillator, point: Array, periods: int, stepper: Stepper, *, interval: float | None = None
-) -> tuple[Array, Array]:
-    """Return the image of a point of the section after some periods, and the derivative of that map.
+def section_equations(
+    osc: Oscillator,
+    period: int,
+    stepper: Stepper,
+    executor: concurrent.futures.Executor | None = None,
+) -> Callable[[Array], Evaluation]:
+    """Return the equations of a fixed point of the section map's power; attached is the derivative of that map."""
 
-    In an autonomous scene the time from section to section may be chosen by `interval`.
-    """
-    size = len(point)
-    start = np.concatenate([point, np.eye(size).ravel()])
-    ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], periods, interval=interval)
-    image = ended.states[0]
-    return image[:size], image[size:].reshape(size, size)
+    def evaluate(points: Array) -> Evaluation:
+        found = linear_map(osc, points, stepper, intervals=period, executor=executor)
+        return Evaluation(found.images - points, found.derivatives - np.eye(points.shape[1]), found.derivatives)
+
+    return evaluate
 
 
-def refine_orbit(
-    osc: Oscillator, guess: Array, period: int, stepper: Stepper, *, interval: float | None = None
-) -> Orbit:
+def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
     """Refine a periodic point by Newton's method until the residual no longer falls.
-
-    A short `interval` finds equilibria of autonomous scenes, however fast deviations from them grow.
 
     Raises
     ------
     StructureError
-        The iteration did not come near any periodic point.
+        The iteration did not converge to a periodic point.
     """
-    best: Orbit | None = None
-    point = np.array(guess, dtype=float)
-    for _ in range(_ITERATIONS):
-        image, monodromy = section_derivative(osc, point, period, stepper, interval=interval)
-        residual = float(np.linalg.norm(image - point))
-        if not np.isfinite(residual) or (best is not None and residual >= best.residual):
-            break
-        best = Orbit(point, period, monodromy, residual)
-        try:
-            point = point - np.linalg.solve(monodromy - np.eye(len(point)), image - point)
-        except np.linalg.LinAlgError:
-            break
-    scale = size_of(osc) + float(np.linalg.norm(guess))
-    if best is None or best.residual > 1e-6 * scale:
-        found = "no finite image" if best is None else f"a residual of {best.residual:.1e}"
+    roots = newton(section_equations(osc, period, stepper), guess[None])
+    orbit = Orbit(roots.places[0], period, roots.attached[0], float(roots.sizes[0]))
+    if not orbit.residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(guess))):
         raise StructureError(
-            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: {found}. "
-            "The start is too far off, or the orbit is not hyperbolic; wait longer or take a finer stepper."
+            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: the "
+            f"residual is {orbit.residual:.1e}. The start is too far away, or the orbit is not hyperbolic; follow the "
+            "motion for longer, or take a finer stepper."
         )
-    return best
+    return orbit
 
 
 def least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
-    """Return the orbit with its least period: recurrences close to a bifurcation can show a multiple of it."""
+    """Return the orbit with its least period; near a bifurcation, recurrences may show a multiple of it."""
     for divisor in range(1, orbit.period):
         if orbit.period % divisor == 0:
             try:
@@ -119,7 +109,7 @@ def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) ->
 
 
 def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:
-    """Return the rates of growth (s⁻¹) that multipliers over some time stand for; −∞ for a multiplier 0."""
+    """Return the growth rates (s⁻¹) of multipliers over a duration; −∞ for a multiplier 0."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(multipliers) / duration, dtype=np.complex128)
 
@@ -131,16 +121,16 @@ def moved_by_tightening(point: Array, refined: Callable[[Stepper], Array], stepp
     ----------
     point : array (n,)
     refined : callable
-        Returns the point as a stepper has it; raises StructureError where there is no such orbit for it.
+        Returns the point that a stepper finds; raises StructureError where it finds no such orbit.
     stepper : Stepper
-        What the point was found with.
+        The one that found the point.
     times : int
         How often the stepper is refined.
 
     Returns
     -------
     float
-        The largest distance; infinite if at a finer setting there is no such orbit.
+        The largest distance; infinite if a finer stepper finds no such orbit.
     """
     furthest, finer = 0.0, stepper
     for _ in range(times):

@@ -1,4 +1,4 @@
-"""Where to look: regions that follow from the scene, and from what was found."""
+"""Regions that follow from the scene and from its attractors."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
+from vibrokit.results.saddle import Saddle
 from vibrokit.structure.scales import length_of
 
 _MARGIN = 0.25  # of the width, on each side
@@ -25,16 +26,16 @@ def states_at(osc: Oscillator, places: Array) -> Array:
 
 
 def search_region(osc: Oscillator) -> Region:
-    """Return a region wide enough for starts: the stops, and the reach of a linear oscillator under the same forces."""
+    """Return a region for starts: it contains the stops, and the reach of a linear oscillator under the same forces."""
     reach = length_of(osc)
     return Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
-    """Return a region that holds the attractors' points and the stops, with room around them.
+    """Return a region that contains the attractors' points and the stops, with a margin around them.
 
-    It is at least as wide as the gap between two stops; elsewhere as the widest motion, or, where all is at rest, as
-    motion may be expected to be, so that it shows more than a single point.
+    It is at least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
+    or, if all attractors are at rest, as the length scale of the scene.
     """
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
@@ -51,3 +52,9 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()))
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
     return Region((float(middle - half), float(middle + half)), (-speed, speed))
+
+
+def lies_in(region: Region, orbit: Attractor | Saddle) -> bool:
+    """Whether some point of an orbit on the section is in a region; of a limit cycle, whether any of its points is."""
+    points = orbit.orbit if isinstance(orbit, Attractor) and orbit.kind == "limit cycle" else orbit.points
+    return bool(region.contains(points).any())

@@ -1,16 +1,22 @@
-"""Request: what the searches are asked for, checked before any work is done."""
+"""Arguments of the searches, checked before any work is done."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import functools
 import json
+from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Any
 
+import numpy as np
+
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
+from vibrokit.kernels.named import name_of, named_stepper
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator
+from vibrokit.oscillator import Oscillator, generator_from
+from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 
@@ -19,28 +25,37 @@ _MOST_CELLS = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """Counts and sizes that `find_structure` was given.
+    """Arguments of `find_structure`.
 
     Raises
     ------
     StructureError
-        One of them is not what it must be.
+        One of them is not allowed.
     """
 
+    region: Any
     cells: Any
     refine: Any
     margin: Any
     starts: Any
     settling: Any
     budget: Any
+    saddles: Any
+    manifolds: Any
+    stepper: Stepper | None
+    rng: int
 
     def __post_init__(self) -> None:
         settling = self.settling
         if isinstance(settling, bool) or not isinstance(settling, Real) or not 0 < float(settling) <= 0.5:
             raise StructureError(
-                f"settling is {shown(settling)}; give a share of the region's size, above 0 and at most 0.5."
+                f"settling must be a fraction of the region's size, above 0 and at most 0.5, got {shown(settling)}."
             )
+        for name in ("saddles", "manifolds"):
+            if not isinstance(getattr(self, name), bool):
+                raise StructureError(f"{name} must be True or False, got {shown(getattr(self, name))}.")
         checked = {
+            "region": None if self.region is None else Region.of(self.region),
             "cells": pair("cells", self.cells),
             "starts": pair("starts", self.starts),
             "settling": float(settling),
@@ -52,8 +67,55 @@ class Request:
             object.__setattr__(self, name, value)
         if self.cells[0] * self.cells[1] * 4**self.refine > _MOST_CELLS:
             raise StructureError(
-                f"refine is {self.refine}, which makes more than {_MOST_CELLS} cells of {self.cells}; take fewer."
+                f"refine = {self.refine} makes more than {_MOST_CELLS} cells of {self.cells}; give a smaller number."
             )
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The arguments as plain data."""
+        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+
+
+def plain(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arguments as plain data, which the same call takes."""
+    return {name: _plain(value) for name, value in arguments.items()}
+
+
+@functools.singledispatch
+def _plain(value: Any) -> Any:
+    return value
+
+
+@_plain.register
+def _(value: Region) -> Any:
+    return value.bounds.tolist()
+
+
+@_plain.register
+def _(value: Stepper) -> Any:
+    return name_of(value)
+
+
+@_plain.register(tuple)
+def _(value: tuple[Any, ...]) -> Any:
+    return list(value)
+
+
+def stepper_of(stepper: Stepper | str | None) -> Stepper | None:
+    """Return the stepper that a text describes; everything else as it is, for `check_means`."""
+    return named_stepper(stepper) if isinstance(stepper, str) else stepper
+
+
+def seed_of(rng: int | np.random.Generator) -> int:
+    """Return a seed, or draw one from a generator.
+
+    Raises
+    ------
+    ParameterError
+        Neither a generator nor a whole number, 0 or more.
+    """
+    generator = generator_from(rng)
+    return int(rng) if isinstance(rng, Integral) else int(generator.integers(2**63))
 
 
 def whole(name: str, number: Any, least: int, most: int) -> int:
@@ -62,10 +124,10 @@ def whole(name: str, number: Any, least: int, most: int) -> int:
     Raises
     ------
     StructureError
-        It is none.
+        It is not a whole number, or out of bounds.
     """
     if isinstance(number, bool) or not isinstance(number, Integral) or not least <= int(number) <= most:
-        raise StructureError(f"{name} is {shown(number)}; give a whole number from {least} to {most}.")
+        raise StructureError(f"{name} must be a whole number from {least} to {most}, got {shown(number)}.")
     return int(number)
 
 
@@ -75,7 +137,7 @@ def pair(name: str, counts: Any, most: int = _MOST_CELLS) -> tuple[int, int]:
     Raises
     ------
     StructureError
-        They are not that.
+        They are something else.
     """
     try:
         first, second = (whole(name, count, 1, most) for count in counts)
@@ -83,52 +145,52 @@ def pair(name: str, counts: Any, most: int = _MOST_CELLS) -> tuple[int, int]:
         first = second = most + 1
     if first * second > most:
         raise StructureError(
-            f"{name} is {shown(counts)}; give two whole numbers, 1 or more, whose product is at most {most}."
+            f"{name} must be two whole numbers, 1 or more, whose product is at most {most}, got {shown(counts)}."
         )
     return first, second
 
 
-def check_means(osc: Any, stepper: Any, executor: Any, progress: Any) -> None:
-    """Refuse what is no oscillator, stepper, executor or callable, before any work is done.
+def check_means(osc: Any, stepper: Any, executor: Any) -> None:
+    """Refuse a wrong oscillator, stepper or executor before any work is done.
 
     Raises
     ------
     SceneError, StepperError, StructureError
-        In this order, what each is of.
+        For each of them, in this order.
     """
     if not isinstance(osc, Oscillator):
-        raise SceneError(f"the oscillator is {shown(osc)}, which is none; compose one, or load_scene a bundled one.")
+        raise SceneError(
+            f"the scene must be an Oscillator, got {shown(osc)}; compose one, or load a bundled one with load_scene."
+        )
     if stepper is not None and not isinstance(stepper, Stepper):
-        raise StepperError(f"the stepper is {shown(stepper)}, which is none; give one, such as RK4(steps=256).")
+        raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
     if executor is not None and not isinstance(executor, concurrent.futures.Executor):
         raise StructureError(
-            f"executor is {shown(executor)}, which is none; give a concurrent.futures.Executor, or None for threads."
+            f"executor must be a concurrent.futures.Executor, or None for threads, got {shown(executor)}."
         )
-    if progress is not None and not callable(progress):
-        raise StructureError(f"progress is {shown(progress)}, which cannot be called; give a function of two numbers.")
 
 
 def check_belongs(osc: Oscillator, structure: Any) -> None:
-    """Refuse a structure that is not one of this oscillator; noise may differ, for a structure knows none.
+    """Refuse a structure that is not one of this oscillator; the noise may differ, because it has no effect on one.
 
     Raises
     ------
     StructureError
-        It is none, or is of another scene.
+        It is not a structure, or one of another scene.
     """
     if not isinstance(structure, Structure):
-        raise StructureError(f"the structure is {shown(structure)}, which is none; give what find_structure returned.")
+        raise StructureError(f"structure must be a Structure from find_structure, got {shown(structure)}.")
     ours, theirs = (_without_noise(data) for data in (scene_data(osc), structure.scene))
     if ours != theirs:
         raise StructureError(
-            "the structure is that of another scene, or of this one with other numbers; give the one that "
+            "the structure is that of another scene, or of this one with other parameters; give the one that "
             "find_structure returns for this oscillator."
         )
     size = 2 + (len(osc.noise.extra_states) if osc.noise else 0)
     if any(attractor.points.shape[1] != size for attractor in structure.attractors):
         raise StructureError(
-            f"the structure was found without the states that the noise has of its own, so its points are not the "
-            f"{size} numbers long that this oscillator needs; find the structure of the scene with this noise."
+            f"the points of the structure do not have {size} states, as those of this oscillator with the extra "
+            "states of its noise; find the structure of the scene with this noise."
         )
 
 

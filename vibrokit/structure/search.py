@@ -1,9 +1,8 @@
-"""The search for steady states: starts are followed until they recur, and those that do not are watched for long."""
+"""The search for steady states: starts are followed until they recur; those that do not are followed for long."""
 
 from __future__ import annotations
 
 import concurrent.futures
-import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -11,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import Progress, run_ensemble
+from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import report, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, UNSETTLED
+from vibrokit.results.finding import Code, Finding
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.bands import separate
 from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit, describe_wandering
@@ -28,104 +29,106 @@ from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
-_LONGER_PERIOD = 256  # looked for among those that are long in settling
+"""Longest period of orbits that are looked for among all starts."""
+_LONGER_PERIOD = 256  # looked for among starts that settle slowly
 _RECURRENCE = 1e-5
-_NEAR = 1e-3  # what a coarse stepper may make of an orbit
-_LOOSE = 1e-2  # recurrences that are worth a try with Newton's method
+_NEAR = 1e-3  # distance, relative to the motion, between an orbit and its approximation by a coarse stepper
+_LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
-_FIRST_WAIT = 64  # periods; doubled from round to round
+_FIRST_ROUND = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for long
 _LEAST_WATCHED = 16
 _WATCH = 20_000  # periods
-_MEASURED = 16  # starts of a Lyapunov exponent; it depends on the steps, so that they are carried exactly
+_MEASURED = 16  # starts of a Lyapunov exponent
 _LEAST_MEASURED = 1000  # periods
 _LEAST_STARTS = 4
-_VISITS = 2048  # of each survivor, to see which are on one attractor
+_VISITS = 2048  # of each survivor, to group survivors by attractor
 _OVERLAP = 4.0  # times the settling distance
 _SAMPLE = 4096  # points of a set that never repeats
-_FAILURES = 8  # states that come to no cycle, after which no more are tried
-_REFINEMENTS = 4  # of a carrier, until every attractor is one for it too
+_FAILURES = 8  # states without a limit cycle after which the search for cycles ends
+_REFINEMENTS = 4  # of a stepper, until every attractor persists with it
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
 Array = NDArray[np.float64]
 
 
-@dataclasses.dataclass(frozen=True)
-class Means:
-    """What the search integrates with.
-
-    Attributes
-    ----------
-    carrier : Stepper
-        For many starts.
-    exact : Stepper
-        For orbits.
-    executor : concurrent.futures.Executor, optional
-    progress : callable, optional
-    """
-
-    carrier: Stepper
-    exact: Stepper
-    executor: concurrent.futures.Executor | None = None
-    progress: Progress | None = None
-
-
 class Search:
-    """Finds the steady states of a scene, one after another; what is found stays if the work is stopped.
+    """Finds the steady states of a scene, one after another; an interrupt leaves those found so far.
 
     Parameters
     ----------
     osc : Oscillator
-    means : Means
     tolerance : float
-        Distance at which a state that is being watched counts as settled on a known orbit.
+        Distance at which a state counts as settled on a known orbit.
+    stepper : Stepper
+        Of ensembles.
+    orbit_stepper : Stepper
+        Of orbits.
+    executor : concurrent.futures.Executor, optional
+
+    Attributes
+    ----------
+    attractors : list of Attractor
+    survival : tuple of Survival
+    starts, diverged : int
+        Number of starts, and of those that diverged.
+    findings : list of Finding
     """
 
-    def __init__(self, osc: Oscillator, means: Means, tolerance: float) -> None:
-        self.osc, self.means, self.tolerance = osc, means, tolerance
+    def __init__(
+        self,
+        osc: Oscillator,
+        tolerance: float,
+        stepper: Stepper,
+        orbit_stepper: Stepper,
+        executor: concurrent.futures.Executor | None = None,
+    ) -> None:
+        self.osc, self.tolerance = osc, tolerance
+        self.stepper, self.orbit_stepper, self.executor = stepper, orbit_stepper, executor
         self.attractors: list[Attractor] = []
         self.survival: tuple[Survival, ...] = ()
-        self.starts = self.lost = 0
-        self.words: list[str] = []
+        self.starts = self.diverged = 0
+        self.findings: list[Finding] = []
 
     def run(self, states: Array, wait: int, patient: bool) -> None:
-        """Follow the states (count, n) until each recurs, is lost, or has shown that it never settles.
+        """Follow the states (count, n) until each recurs, diverges, or has not settled for a long time.
 
         Parameters
         ----------
         states : array (count, n)
         wait : int
-            Periods that a transient is given; twice, for some are slow.
+            Periods that a transient is given; starts are followed for twice as long, for some settle slowly.
         patient : bool
-            Whether that is as long as the damping asks for. If not, and nothing has settled, it was too short, and
-            what goes on says nothing.
+            Whether that is as long as the damping requires. If not, and nothing has settled, motion that goes on is
+            not evidence of an attractor.
         """
         self.starts = len(states)
-        for periods in _schedule(wait):
-            states = self._after(states, periods)
-            states = self._add_orbits(states, LONGEST_PERIOD)
-            if not len(states):
-                return
-        if self.osc.autonomous:
-            states = self._add_cycles(states)
-            some = "Some" if len(states) == _FAILURES else len(states)
-            self.words += [f"{some} starts settled on no equilibrium and no limit cycle."] if len(states) else []
-        elif patient or self.attractors:
-            self._watch(states)
+        with stage("attractors", unit="starts", total=self.starts):
+            for periods in _rounds(wait):
+                states = self._after(states, periods)
+                states = self._add_orbits(states, LONGEST_PERIOD)
+                report(self.starts - len(states))
+                if not len(states):
+                    return
+            if self.osc.autonomous:
+                self._add_cycles(states)
+            elif patient or self.attractors:
+                self._watch(states)
+            report(self.starts)
 
     @property
     def _many(self) -> int:
-        """How many starts are followed for long: fewer where contacts are located, trajectory by trajectory."""
-        return _WATCHED if isinstance(self.means.carrier, RK4) else _LEAST_WATCHED
+        """Number of starts that are followed for long: fewer for steppers that integrate them one by one."""
+        return _WATCHED if isinstance(self.stepper, RK4) else _LEAST_WATCHED
 
     def _after(self, states: Array, periods: int) -> Array:
-        """Where the states are some periods later, without those that came to a known orbit and those that are lost."""
-        means, known = self.means, [attractor.points for attractor in self.attractors]
+        """Return the states some periods later, without those that reached a known orbit and those that diverged."""
+        known = [attractor.points for attractor in self.attractors]
         ended, labels = follow(
-            self.osc, states, known, tolerance=self.tolerance, periods=periods, stepper=means.carrier,
-            executor=means.executor, progress=means.progress,
+            self.osc, states, known,
+            tolerance=self.tolerance, periods=periods, stepper=self.stepper, executor=self.executor,
         )  # fmt: skip
-        self.lost += int(np.sum(labels == LEFT))
+        self.diverged += int(np.sum(labels == LEFT))
         return ended.states[labels == UNSETTLED]
 
     def _known(self, point: Array, tolerance: float) -> bool:
@@ -133,10 +136,7 @@ class Search:
 
     def _add_orbits(self, states: Array, longest: int) -> Array:
         """Add the new stable orbits that states lie on; return the states that lie on none."""
-        history = [states]
-        for _ in range(longest):
-            history.append(run_ensemble(self.osc, Flow.STATE, self.means.carrier, history[-1], 1).states)
-        path = np.array(history)
+        path = _section_path(self.osc, states, self.stepper, longest)
         scale = size_of(self.osc) + np.abs(path).max(axis=(0, 2))
         distance = np.linalg.norm(path[1:] - path[0], axis=2) / scale
         close = distance < _RECURRENCE
@@ -148,7 +148,7 @@ class Search:
         return path[0, ~settled]
 
     def _guess(self, path: Array, distance: Array) -> None:
-        """Try Newton's method where the motion nearly recurs: an orbit known early spares the wait for it."""
+        """Try Newton's method where the motion nearly recurs: an orbit known early saves following starts to it."""
         tried = 0
         for index in np.argsort(distance.min(axis=0)):
             nearest = float(distance[:, index].min())
@@ -160,128 +160,128 @@ class Search:
 
     def _add_orbit(self, point: Array, period: int) -> bool:
         """Add the orbit through a point that recurs, if it is new; return whether the point has settled on it."""
-        exact = self.means.exact
+        stepper = self.orbit_stepper
         try:
-            orbit = least_period(self.osc, refine_orbit(self.osc, point, period, exact), exact)
+            orbit = least_period(self.osc, refine_orbit(self.osc, point, period, stepper), stepper)
         except StructureError:
             return False
         unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1
-        if unstable or not same_point(self.osc, point, visited(self.osc, orbit, exact), _NEAR):
-            return False  # passing by a saddle
+        if unstable or not same_point(self.osc, point, visited(self.osc, orbit, stepper), _NEAR):
+            return False  # the motion passes near a saddle
         if not self._known(orbit.point, EQUAL):
-            self.attractors.append(describe_orbit(self.osc, orbit, exact))
+            self.attractors.append(describe_orbit(self.osc, orbit, stepper))
         return True
 
-    def _add_cycles(self, states: Array) -> Array:
-        """Add the limit cycles that states lie on; return the states that lie on none."""
-        osc, left = self.osc, list[Array]()
+    def _add_cycles(self, states: Array) -> None:
+        """Add the limit cycles that states lie on."""
+        unsettled = 0
         for state in states:
-            if len(left) == _FAILURES:
-                break
             known = [a.orbit for a in self.attractors if a.kind == "limit cycle"]
-            if any(_on(orbit, state) for orbit in known):
+            if any(_is_on(orbit, state) for orbit in known):
                 continue
-            try:
-                longest = _LONGEST_CYCLE * osc.section_interval
-                cycle = find_cycle(osc, state, self.means.exact, longest=longest)
-            except StructureError:
-                left.append(state)
-                continue
-            if np.sort(np.abs(np.linalg.eigvals(cycle.monodromy)))[-2:][0] >= 1:
-                left.append(state)
-            elif not any(_on(orbit, cycle.point) for orbit in known):
-                self.attractors.append(describe_cycle(osc, cycle, self.means.exact))
-        return np.array(left).reshape(-1, states.shape[1])
+            unsettled += not self._add_cycle(state, known)
+            if unsettled == _FAILURES:
+                break
+        if unsettled:
+            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
+
+    def _add_cycle(self, state: Array, known: Sequence[Array]) -> bool:
+        """Add the limit cycle that a state lies on, if it is new; return whether there is a stable one."""
+        try:
+            longest = _LONGEST_CYCLE * self.osc.section_interval
+            cycle = find_cycle(self.osc, state, self.orbit_stepper, longest=longest)
+        except StructureError:
+            return False
+        if np.sort(np.abs(np.linalg.eigvals(cycle.monodromy)))[-2:][0] >= 1:
+            return False
+        if not any(_is_on(orbit, cycle.point) for orbit in known):
+            self.attractors.append(describe_cycle(self.osc, cycle, self.orbit_stepper))
+        return True
 
     def _watch(self, states: Array) -> None:
-        """Tell long transients from motion that never settles, by how many survive, at two accuracies."""
-        osc, means = self.osc, self.means
+        """Distinguish long transients from motion that never settles, by its survival at two accuracies."""
         watched = states[np.linspace(0, len(states) - 1, min(self._many, len(states))).astype(int)]
-        reports, survivors = [], watched[:0]
-        for carrier in (means.carrier, means.carrier.refined()):
+        survivors = watched[:0]
+        for stepper in (self.stepper, self.stepper.refined()):
             points = [attractor.points for attractor in self.attractors]
             survival, survivors, _ = watch(
-                osc, watched, points, tolerance=self.tolerance, periods=_WATCH, stepper=carrier,
-                executor=means.executor, progress=means.progress,
+                self.osc, watched, points,
+                tolerance=self.tolerance, periods=_WATCH, stepper=stepper, executor=self.executor,
             )  # fmt: skip
-            reports.append(survival)
-        self.survival = tuple(reports)
-        if reports[0].survivors and len(survivors):
+            self.survival = (*self.survival, survival)
+        if self.survival[0].survivors and len(survivors):
             self._add_wandering(self._add_orbits(survivors, _LONGER_PERIOD))
-        elif reports[0].survivors:
-            self.words.append("What survived the coarser integration did not survive the finer, and is a transient.")
+        elif self.survival[0].survivors:
+            self.findings.append(Finding.of(Code.CHAOTIC_TRANSIENT))
 
     def _add_wandering(self, survivors: Array) -> None:
         """Add the chaotic and quasiperiodic attractors that survivors are on."""
         if not len(survivors):
             return
-        osc, finer = self.osc, self.means.carrier.refined()
-        clouds = _clouds(osc, survivors, finer)
+        osc, finer = self.osc, self.stepper.refined()
+        clouds = list(_section_path(osc, survivors, finer, _VISITS - 1).transpose(1, 0, 2))
         for group in separate(clouds, _OVERLAP * self.tolerance):
             periods = _measuring_time(osc)
             few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
-            carrier = self.means.exact if osc.barriers else finer  # without contacts to locate, steps do as well
-            estimate = lyapunov_exponent(osc, few, carrier, periods=periods, executor=self.means.executor)
+            stepper = self.orbit_stepper if osc.barriers else finer  # without contacts fixed steps are as accurate
+            estimate = lyapunov_exponent(osc, few, stepper, periods=periods, executor=self.executor)
             kind = kind_of(estimate)
             if kind is None:
-                self.words.append(
-                    f"{len(group)} starts still approach an orbit of period over {_LONGER_PERIOD}, or one of which "
-                    "the multipliers are close to 1; raise budget."
-                )
+                self.findings.append(Finding.of(Code.SLOW_SETTLING, count=len(group), period=_LONGER_PERIOD))
                 continue
             visits = np.concatenate([clouds[index] for index in group])
             sample = visits[:: -(-len(visits) // _SAMPLE)]
             self.attractors.append(describe_wandering(osc, kind, sample, estimate, self.survival, finer))
 
 
-def _schedule(wait: int) -> list[int]:
-    """Rounds of ever more periods, twice the wait together."""
-    rounds, left, periods = [], 2 * wait, _FIRST_WAIT
-    while left > 0:
-        rounds.append(min(periods, left))
-        left, periods = left - rounds[-1], 2 * periods
+def _rounds(wait: int) -> list[int]:
+    """Periods of each round, which double; twice the wait together."""
+    rounds, remaining, periods = [], 2 * wait, _FIRST_ROUND
+    while remaining > 0:
+        rounds.append(min(periods, remaining))
+        remaining, periods = remaining - rounds[-1], 2 * periods
     return rounds
 
 
 def _measuring_time(osc: Oscillator) -> int:
-    """Periods in which motion that settles, however slowly, would be seen to: three e-foldings of the damping."""
+    """Periods in which motion that settles, however slowly, shows it: three e-foldings of the damping."""
     folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
     return _LEAST_MEASURED if folds == 0 else min(_WATCH, max(_LEAST_MEASURED, math.ceil(3 / folds)))
 
 
-def _clouds(osc: Oscillator, states: Array, stepper: Stepper) -> list[Array]:
-    """Points that each state visits, enough to fill a closed curve too."""
+def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: int) -> Array:
+    """Return states (count, n) and their images over some sections, shape (sections + 1, count, n)."""
     visits = [states]
-    for _ in range(_VISITS - 1):
+    for _ in range(sections):
         visits.append(run_ensemble(osc, Flow.STATE, stepper, visits[-1], 1).states)
-    return list(np.array(visits).transpose(1, 0, 2))
+    return np.array(visits)
 
 
-def _on(orbit: Array, point: Array) -> bool:
-    """Whether a point lies on a closed curve, as far as its samples tell."""
+def _is_on(orbit: Array, point: Array) -> bool:
+    """Whether a point lies on a closed curve, within the spacing of its samples."""
     spacing = np.linalg.norm(np.diff(orbit, axis=0), axis=1).max()
     return bool(np.linalg.norm(orbit - point[:2], axis=1).min() <= spacing)
 
 
-def lasting_carrier(osc: Oscillator, attractors: Sequence[Attractor], carrier: Stepper, tolerance: float) -> Stepper:
-    """Return a carrier, refined until every attractor is one for it too, or as often as is worth it."""
+def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, tolerance: float) -> Stepper:
+    """Return a stepper, refined until every attractor persists with it, at most four times."""
     for _ in range(_REFINEMENTS):
-        if all(_persists(osc, attractor, carrier, tolerance) for attractor in attractors):
+        if all(_persists(osc, attractor, stepper, tolerance) for attractor in attractors):
             break
-        carrier = carrier.refined()
-    return carrier
+        stepper = stepper.refined()
+    return stepper
 
 
-def _persists(osc: Oscillator, attractor: Attractor, carrier: Stepper, tolerance: float) -> bool:
-    """Whether what starts on an attractor is on it after long."""
+def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, tolerance: float) -> bool:
+    """Whether motion that starts on an attractor is on it after a long time."""
     states, periods = attractor.points[:1], 2000
     if attractor.kind == "limit cycle":
-        (end,) = run_ensemble(osc, Flow.STATE, carrier, states, periods).states
-        return _on(attractor.orbit, end)
+        (end,) = run_ensemble(osc, Flow.STATE, stepper, states, periods).states
+        return _is_on(attractor.orbit, end)
     if attractor.repeats:
         known, periods = attractor.points, 512 * attractor.period
     else:
         known, states = attractor.points, attractor.points[:: max(1, len(attractor.points) // _WATCHED)]
-    ends = run_ensemble(osc, Flow.STATE, carrier, states, periods).states[:, :2]
+    ends = run_ensemble(osc, Flow.STATE, stepper, states, periods).states[:, :2]
     distance = np.linalg.norm(ends[:, None] - known[None, :, :2], axis=2).min(axis=1)
     return bool(np.mean(distance <= 2 * tolerance) > 0.9)

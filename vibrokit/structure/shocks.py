@@ -1,4 +1,4 @@
-"""Minimal fatal shocks: the smallest kick that leaves a basin (Klinshov, Nekorkin & Kurths, New J. Phys. 18, 2015)."""
+"""Minimal fatal shocks, the smallest kicks that leave a basin (Klinshov, Nekorkin & Kurths, New J. Phys. 18, 2015)."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels.ensemble import Progress, run_ensemble
+from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.shock import ShapeStability, Shock
 from vibrokit.results.structure import Structure
+from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.request import check_belongs, check_means, whole
-from vibrokit.structure.settle import Settler
 from vibrokit.symbolic.flow_kind import Flow
 
-_RADII = 64  # looked at along each direction, before the first fatal one is bracketed
+_RADII = 64  # sizes along each direction, of which the first fatal one and the one before are a bracket
 _HALVINGS = 30
-_ZOOMS = 4  # rounds of a finer look round the best direction and time
+_ZOOMS = 4  # refinements around the best direction and time
 _ZOOM = 4.0
 _SETS = 64  # points of an attractor that never repeats
 _MOST = 10**5
@@ -40,14 +41,17 @@ def shape_stability(
     directions: int = 90,
     stepper: Stepper | None = None,
     executor: concurrent.futures.Executor | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
+    time_limit: float | None = None,
 ) -> tuple[ShapeStability, ...]:
     """Return for each attractor its basin fraction and the smallest kicks that leave its basin.
 
     Kicks are tried at `phases` equally spaced times of the orbit, in `directions` directions, at sizes up to the size
-    of the region; the smallest that is fatal is then approached by looking ever finer round its time, direction and
-    size. A kick is fatal if the motion after it comes to another attractor or leaves for good. Basins can have holes
-    finer than this sees, so the size is an upper bound.
+    of the region; the smallest fatal kick is then refined around its time, direction and size. A kick is fatal if it
+    leads to another attractor or out of the region for good. Basins can have holes that these kicks miss, so the size
+    is an upper bound.
+
+    Ctrl-C and the time limit raise KeyboardInterrupt.
 
     Parameters
     ----------
@@ -55,12 +59,14 @@ def shape_stability(
     structure : Structure
         Of this oscillator.
     phases, directions : int
-        How finely times and directions are looked at first.
+        Number of times and of directions that are tried first.
     stepper : Stepper, optional
-        By default the one that the basins were made with.
+        By default that of the basins.
     executor : concurrent.futures.Executor, optional
-    progress : callable, optional
-        Called with (searches done, searches in all).
+    progress : bool or callable, optional
+        True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
+    time_limit : float, optional
+        In seconds.
 
     Returns
     -------
@@ -71,29 +77,32 @@ def shape_stability(
     StructureError
         Counts that are not whole numbers, 1 or more; a structure of another scene.
     """
-    check_means(osc, stepper, executor, progress)
+    check_means(osc, stepper, executor)
     check_belongs(osc, structure)
     phases, directions = whole("phases", phases, 1, _MOST), whole("directions", directions, 4, _MOST)
-    carrier = stepper or named_stepper(structure.stepper)
-    settler = Settler(
-        osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, carrier, executor
-    ).sharing(structure.basins, 2)
+    classifier = BasinClassifier(
+        osc, structure.attractors, structure.basins.region, structure.settling, structure.budget,
+        stepper or named_stepper(structure.stepper), executor,
+    )  # fmt: skip
     angles = 2 * np.pi * (np.arange(directions) + 0.5) / directions
-    done, found = 0, []
-    for attractor in structure.attractors:
-        kicks: list[Shock | None] = []
-        for looked_at, width in ((np.array([0.5, 1.5]) * np.pi, 0.0), (angles, 2 * np.pi / directions)):
-            kicks.append(_Hunt(osc, settler, attractor).smallest(looked_at, width, phases))
-            done += 1
-            if progress is not None:
-                progress(done, 2 * len(structure.attractors))
-        found.append(ShapeStability(attractor.label, attractor.basin_fraction, attractor.basin_fraction_error, *kicks))
+    searches = {"velocity_kick": (np.array([0.5, 1.5]) * np.pi, 0.0), "any_kick": (angles, 2 * np.pi / directions)}
+    found = []
+    with working(progress, time_limit), stage("kicks", unit="searches", total=2 * len(structure.attractors)):
+        classifier = classifier.sharing(structure.basins, 2)
+        for attractor in structure.attractors:
+            kicks: dict[str, Shock | None] = {}
+            for name, (tried, width) in searches.items():
+                kicks[name] = _KickSearch(osc, classifier, attractor).smallest(tried, width, phases)
+                advance()
+            found.append(
+                ShapeStability(attractor.label, attractor.basin_fraction, attractor.basin_fraction_error, **kicks)
+            )
     return tuple(found)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Moment:
-    """A state of the attractor, and how it is come to.
+    """A state of the attractor, and how it is reached.
 
     Attributes
     ----------
@@ -103,7 +112,7 @@ class _Moment:
         Time from there to the state (s).
     state : array (n,)
     time : float
-        Of the state after the section (s): the lag, but 0 in an autonomous scene, where all times are alike.
+        Of the state after the section (s): the lag; 0 in an autonomous scene.
     """
 
     origin: Array
@@ -114,7 +123,7 @@ class _Moment:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Rays:
-    """Straight lines out of the attractor: which of some moments each starts at, and which way it goes."""
+    """Straight lines from the attractor: index of the moment at which each starts, and its angle."""
 
     moments: list[_Moment]
     starts: NDArray[np.intp]
@@ -122,7 +131,7 @@ class _Rays:
 
     @classmethod
     def from_each(cls, moments: list[_Moment], angles: Array) -> _Rays:
-        """All angles at every moment."""
+        """Return rays of all angles at every moment."""
         return cls(moments, np.repeat(np.arange(len(moments)), len(angles)), np.tile(angles, len(moments)))
 
     def __len__(self) -> int:
@@ -140,44 +149,44 @@ class _Rays:
         return _Rays(self.moments, self.starts[which], self.angles[which])
 
     def only(self) -> tuple[_Moment, float]:
-        """Where a single ray starts, and its angle."""
+        """Return the start of a single ray, and its angle."""
         return self.moments[int(self.starts[0])], float(self.angles[0])
 
 
-class _Hunt:
+class _KickSearch:
     """The search for the smallest fatal kick to one attractor."""
 
-    def __init__(self, osc: Oscillator, settler: Settler, attractor: Attractor) -> None:
-        self.osc, self.settler, self.attractor = osc, settler, attractor
-        widths = np.diff(settler.region.bounds).ravel()
+    def __init__(self, osc: Oscillator, classifier: BasinClassifier, attractor: Attractor) -> None:
+        self.osc, self.classifier, self.attractor = osc, classifier, attractor
+        widths = np.diff(classifier.region.bounds).ravel()
         self.reach = math.hypot(osc.natural_frequency * widths[0], widths[1])
 
     def smallest(self, angles: Array, width: float, phases: int) -> Shock | None:
-        """Look at all times and angles first, then ever closer round the best; `width` is the angle between two."""
+        """Try all times and angles first, then refine around the best; `width` is the angle between two."""
         moments, step = self._moments(phases)
         rays = _Rays.from_each(moments, angles)
-        low, high, fates = self._bracket(rays, np.zeros(len(rays)), np.full(len(rays), self.reach))
+        low, high, limits = self._bracket(rays, np.zeros(len(rays)), np.full(len(rays), self.reach))
         if not np.isfinite(high).any():
             return None
-        best = self._best(rays, low, high, fates)
+        best = self._best(rays, low, high, limits)
         for _ in range(_ZOOMS if self.attractor.repeats else 0):
             width, step = width / _ZOOM, step / _ZOOM
             offsets = np.arange(-_ZOOM, _ZOOM + 1)
             moment, angle = best[1].only()
             rays = _Rays.from_each(self._near(moment, step * offsets), np.unique(angle + width * offsets))
             around = best[2] * (1 + 1e-9), 0.5 * best[2]
-            low, high, fates = self._bracket(rays, np.full(len(rays), around[1]), np.full(len(rays), around[0]))
+            low, high, limits = self._bracket(rays, np.full(len(rays), around[1]), np.full(len(rays), around[0]))
             if np.isfinite(high).any():
-                found = self._best(rays, low, high, fates)
+                found = self._best(rays, low, high, limits)
                 error = max(best[2] - found[2], found[3])
                 best = (found[0], found[1], found[2], error) if found[2] <= best[2] else best
-        fate, ray, size, error = best
+        target, ray, size, error = best
         moment, _ = ray.only()
         kick = self._kick(ray.angles, np.array([size]))[0]
-        return Shock(self.attractor.label, fate, size, error, kick, moment.state, moment.time)
+        return Shock(self.attractor.label, target, size, error, kick, moment.state, moment.time)
 
     def _moments(self, phases: int) -> tuple[list[_Moment], float]:
-        """States of the attractor all along it; and the time between two."""
+        """Return states all along the attractor, and the time between two."""
         attractor = self.attractor
         if attractor.kind == "equilibrium":
             return [_Moment(attractor.points[0], 0.0, attractor.points[0], 0.0)], 0.0
@@ -186,7 +195,7 @@ class _Hunt:
         return [self._moment(point, k * step) for point in points for k in range(phases)], step
 
     def _near(self, moment: _Moment, offsets: Array) -> list[_Moment]:
-        """The same motion a little earlier and later, within the period that the moment is in."""
+        """Return the same motion a little earlier and later, within the period of the moment."""
         kind, duration = self.attractor.kind, self.attractor.duration
         if kind == "equilibrium":
             return [moment]
@@ -199,51 +208,51 @@ class _Hunt:
     def _moment(self, origin: Array, lag: float) -> _Moment:
         state = origin
         if lag > 0:
-            ended = run_ensemble(self.osc, Flow.STATE, self.settler.stepper, origin[None], interval=lag)
+            ended = run_ensemble(self.osc, Flow.STATE, self.classifier.stepper, origin[None], interval=lag)
             state = ended.states[0]
         return _Moment(origin, lag, state, 0.0 if self.attractor.kind == "limit cycle" else lag)
 
     def _kick(self, angles: Array, sizes: Array) -> Array:
         return np.stack([sizes * np.cos(angles) / self.osc.natural_frequency, sizes * np.sin(angles)], axis=1)
 
-    def _fates(self, rays: _Rays, sizes: Array) -> NDArray[np.int64]:
-        """Where the states at some distance along the rays lead, time by time."""
+    def _limits(self, rays: _Rays, sizes: Array) -> NDArray[np.int64]:
+        """Return the labels that states at some distance along the rays lead to."""
         states, times = rays.states, rays.times
         states[:, :2] += self._kick(rays.angles, sizes)
-        fates = np.empty(len(rays), dtype=np.int64)
+        limits = np.empty(len(rays), dtype=np.int64)
         for time in np.unique(times):
             now = times == time
-            fates[now] = self.settler.labels(states[now], start_time=float(time))
-        return fates
+            limits[now] = self.classifier.labels(states[now], start_time=float(time))
+        return limits
 
-    def _fatal(self, fates: NDArray[np.int64]) -> NDArray[np.bool_]:
-        return (fates != self.attractor.label) & (fates != UNSETTLED)
+    def _fatal(self, limits: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return (limits != self.attractor.label) & (limits != UNSETTLED)
 
     def _bracket(self, rays: _Rays, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.int64]]:
-        """For each ray: a size that is not fatal, the next one that is (infinite if none), and where that leads."""
+        """Return for each ray a size that is not fatal, the next one that is or infinity, and the label it leads to."""
         shares = np.arange(1, _RADII + 1) / _RADII
         sizes = low[:, None] + (high - low)[:, None] * shares
         every = rays.chosen(np.repeat(np.arange(len(rays)), _RADII))
-        fates = self._fates(every, sizes.ravel()).reshape(sizes.shape)
-        fatal = self._fatal(fates)
+        limits = self._limits(every, sizes.ravel()).reshape(sizes.shape)
+        fatal = self._fatal(limits)
         first = np.argmax(fatal, axis=1)
         row = np.arange(len(rays))
         before = np.where(first > 0, sizes[row, np.maximum(first - 1, 0)], low)
         none = ~fatal.any(axis=1)
-        return np.where(none, high, before), np.where(none, np.inf, sizes[row, first]), fates[row, first]
+        return np.where(none, high, before), np.where(none, np.inf, sizes[row, first]), limits[row, first]
 
-    def _best(self, rays: _Rays, low: Array, high: Array, fates: NDArray[np.int64]) -> tuple[int, _Rays, float, float]:
-        """Narrow the brackets that could hold the smallest size; return its fate, its ray, the size and its error."""
+    def _best(self, rays: _Rays, low: Array, high: Array, limits: NDArray[np.int64]) -> tuple[int, _Rays, float, float]:
+        """Narrow the brackets that can contain the smallest size; return its label, its ray, the size and its error."""
         could = np.flatnonzero(low <= high.min())
         could = could[np.argsort(high[could])]
-        near, low, high, fates = rays.chosen(could), low[could], high[could], fates[could]
+        near, low, high, limits = rays.chosen(could), low[could], high[could], limits[could]
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            seen = self._fates(near, middle)
-            fatal = self._fatal(seen)
+            reached = self._limits(near, middle)
+            fatal = self._fatal(reached)
             low, high = np.where(fatal, low, middle), np.where(fatal, middle, high)
-            fates = np.where(fatal, seen, fates)
-            open_ones = low <= high.min()
-            near, low, high, fates = near.chosen(open_ones), low[open_ones], high[open_ones], fates[open_ones]
+            limits = np.where(fatal, reached, limits)
+            kept = low <= high.min()
+            near, low, high, limits = near.chosen(kept), low[kept], high[kept], limits[kept]
         best = int(np.argmin(high))
-        return int(fates[best]), near.chosen([best]), float(high[best]), float(high[best] - low[best])
+        return int(limits[best]), near.chosen([best]), float(high[best]), float(high[best] - low[best])

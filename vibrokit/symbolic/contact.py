@@ -1,4 +1,4 @@
-"""What can be derived from a contact law, so that nobody has to declare it."""
+"""Properties of a contact law that are derived from its formula."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
-from vibrokit.symbolic.formulas import ask
+from vibrokit.symbolic.formulas import derived_formula
 
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
@@ -18,28 +18,25 @@ _ANALYTIC = (sympy.exp, sympy.sin, sympy.cos, sympy.sinh, sympy.cosh, sympy.tanh
 
 @dataclasses.dataclass(frozen=True)
 class DerivedContact:
-    """The law of one stop as a formula, and what follows from it.
+    """The formula of the law of one stop, and its properties.
 
     Attributes
     ----------
     law : sympy.Expr
-        Push as a function of DEPTH > 0 and RATE.
-    conservative : bool
-        True if the force does not depend on the rate.
+        Force as a function of DEPTH > 0 and RATE.
     jumps : bool
         True if the force jumps at first touch: its limit for depth → 0 at non-zero rate is not zero.
     clamped : bool
-        True if the law could pull and the barrier is not adhesive, so that the force is cut at zero.
+        True if the law may pull and the barrier is not adhesive, so that negative forces are set to zero.
     exponent : sympy.Expr or None
-        Leading power of depth at first touch at non-zero rate; None where it could not be found.
+        Leading power of depth at first touch at non-zero rate; None if unknown.
     rooted : bool
         True if the force is smooth in √depth but not in depth.
     smooth : bool
-        True if the force is smooth in √depth at all, so that located contacts keep a stepper's full order.
+        True if the force is smooth in depth or √depth, so that located contacts keep the full order of a stepper.
     """
 
     law: sympy.Expr
-    conservative: bool
     jumps: bool
     clamped: bool
     exponent: sympy.Expr | None
@@ -47,32 +44,34 @@ class DerivedContact:
     smooth: bool
 
     @property
+    def conservative(self) -> bool:
+        """True if the force does not depend on the rate."""
+        return RATE not in self.law.free_symbols
+
+    @property
     def bends(self) -> bool:
-        """True if first derivatives of the force jump: at first touch, or where the force is cut at zero."""
+        """True if first derivatives of the force jump, at first touch or where the force is set to zero."""
         return self.clamped or self.jumps or _bends(self.law)
 
 
 def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol]) -> DerivedContact:
-    """Ask the law of a barrier for its formula and derive its properties."""
-    law = ask(barrier.law, "force", symbols, (DEPTH, RATE))
-    conservative = RATE not in law.free_symbols
+    """Derive the formula and the properties of the law of a barrier."""
+    law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
     analytic = _analytic(law, DEPTH)
     root = sympy.Symbol("root", positive=True)
     smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)
-    exponent = _leading_power(law)
     return DerivedContact(
         law=law,
-        conservative=conservative,
         jumps=_jumps(law),
         clamped=not barrier.adhesive and not law.is_nonnegative,
-        exponent=exponent,
+        exponent=_leading_power(law),
         rooted=smooth and not analytic,
         smooth=smooth,
     )
 
 
 def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
-    """Whether an expression has a power series in `variable` at 0: nothing in it is singular there."""
+    """Whether an expression has a power series in `variable` at 0: no part of it is singular there."""
     for node in sympy.preorder_traversal(expression):
         if variable not in node.free_symbols:
             continue
@@ -92,35 +91,35 @@ def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
             singular = {sympy.log: at_touch, sympy.tan: sympy.cos(at_touch)}.get(node.func, 1 - at_touch**2)
             if singular.is_zero is not False:
                 return False
-        else:  # kinks, jumps, and functions of which nothing is known
+        else:  # kinks, jumps and unknown functions
             return False
     return True
 
 
 def _jumps(law: sympy.Expr) -> bool:
-    try:
-        at_touch = law.subs(DEPTH, 0)
-        if at_touch.has(sympy.nan, sympy.zoo, sympy.oo):
-            at_touch = sympy.limit(law, DEPTH, 0, "+")
-    except (NotImplementedError, ValueError):
+    at_touch = _at_touch(law)
+    if at_touch is None:
         return True
     if at_touch.has(sympy.oo, -sympy.oo, sympy.zoo):
         raise DerivationError(
-            f"the contact force {law} has no bound at first touch, and no motion can be followed through it; give a "
+            f"the contact force {law} is unbounded at first touch, so no motion can be integrated through it; give a "
             "law that is finite at depth 0."
         )
     return sympy.simplify(at_touch) != 0
 
 
 def _bends(law: sympy.Expr) -> bool:
-    slope = sympy.diff(law, DEPTH)
+    at_touch = _at_touch(sympy.diff(law, DEPTH))
+    return at_touch is None or (at_touch.is_infinite is not True and sympy.simplify(at_touch) != 0)
+
+
+def _at_touch(expression: sympy.Expr) -> sympy.Expr | None:
+    """Limit at first touch from inside; None if SymPy cannot find it."""
     try:
-        at_touch = slope.subs(DEPTH, 0)
-        if at_touch.has(sympy.nan, sympy.zoo, sympy.oo):
-            at_touch = sympy.limit(slope, DEPTH, 0, "+")
+        value = expression.subs(DEPTH, 0)
+        return sympy.limit(expression, DEPTH, 0, "+") if value.has(sympy.nan, sympy.zoo, sympy.oo) else value
     except (NotImplementedError, ValueError):
-        return True
-    return at_touch.is_infinite is not True and sympy.simplify(at_touch) != 0
+        return None
 
 
 def _leading_power(law: sympy.Expr) -> sympy.Expr | None:

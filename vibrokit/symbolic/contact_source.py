@@ -1,4 +1,4 @@
-"""Writes contact forces and their derivatives as text, in the two forms that steppers need."""
+"""Source text of contact forces and their derivatives, in the two forms that steppers need."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class ContactWriter:
 
     @property
     def merged(self) -> bool:
-        """Whether two stops share one law, so that lanes need to evaluate it once only.
+        """Whether two stops share one law, so that lanes evaluate it only once, for the nearer stop.
 
-        A mass is never in both stops at once, for they are not crossed: the nearer one is chosen first.
+        The mass never touches both stops at once, because they are not crossed.
         """
         if len(self.stops) != 2:
             return False
@@ -48,7 +48,7 @@ class ContactWriter:
         return symbols
 
     def guarded(self) -> tuple[list[str], set[sympy.Symbol]]:
-        """Lines without a branch, for lanes; and the contact terms that are zero because another holds their sum."""
+        """Branch-free lines for lanes, and the contact terms that are zero because another term holds their sum."""
         if self.merged:
             second = {symbol for symbol, (stop, _, _) in self.needed.items() if stop == self.stops[1]}
             return self._merged_lines(), second
@@ -59,14 +59,14 @@ class ContactWriter:
         return [line for stop in self.stops for line in self._switched_lines(stop)]
 
     def _partners(self) -> list[tuple[sympy.Symbol, sympy.Symbol]]:
-        """Parameters of the first law with those of the second that stand in the same place."""
+        """Parameters of the first law, each with the same parameter of the second."""
         first, second = (f"barriers.{stop}.law." for stop in self.stops)
         symbols = self.model.symbols
         pairs = [(symbols[p], symbols.get(second + p.removeprefix(first))) for p in symbols if p.startswith(first)]
         return [(one, other) for one, other in pairs if other is not None]
 
     def _terms(self, stop: int, side: sympy.Expr) -> dict[str, sympy.Expr]:
-        """Each needed derivative of a stop's force: −side^(1 + orders) times that of the law."""
+        """Each needed derivative of the force of a stop: −side^(1 + orders) times that of the law."""
         law = self.model.contacts[stop].law
         terms = {}
         for symbol, (index, in_x, in_v) in self.needed.items():
@@ -82,7 +82,7 @@ class ContactWriter:
         return f"{position} - x", "-v"
 
     def _guard(self, stop: int, terms: dict[str, sympy.Expr], rate: str) -> list[str]:
-        """Lines that make ``touching`` true where the stop pushes, and depth positive everywhere."""
+        """Lines that set ``touching`` to whether the stop pushes, and make depth positive."""
         clamped = self.model.contacts[stop].clamped
         lines = ["    touching = depth > 0.0", "    depth = depth if touching else 1.0"]
         if clamped or _uses_rate(terms):

@@ -1,4 +1,4 @@
-"""Free flight: where the motion between stops is linear, its Taylor series to rounding error."""
+"""Free flight: the Taylor series of linear motion between stops, to rounding error."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sympy
 from vibrokit.errors import StepperError
 from vibrokit.symbolic.flow import FORCING, FlowEquations
 from vibrokit.symbolic.model import Model
-from vibrokit.symbolic.printer import SourcePrinter
+from vibrokit.symbolic.printer import SourcePrinter, unpack
 
 ORDER = 22
 
@@ -15,8 +15,8 @@ ORDER = 22
 class FlightWriter:
     """Writes `flight_rate` and `taylor` for a flow without contact.
 
-    A linear system under sinusoidal forces is solved by its Taylor series: at order 22 a step of 1.5 over the largest
-    rate is exact to rounding, whatever the damping, at resonance too.
+    The Taylor series solves a linear system under sinusoidal forces: at order 22, a step of 1.5 divided by the largest
+    rate is exact to rounding, at any damping and at resonance.
 
     Parameters
     ----------
@@ -26,14 +26,14 @@ class FlightWriter:
     Raises
     ------
     StepperError
-        The motion between stops is not linear, or a force is no sum of sinusoids.
+        The motion between stops is not linear, or a force is not a sum of sinusoids.
     """
 
     def __init__(self, model: Model, equations: FlowEquations) -> None:
         self.model = model
         self.variables = equations.variables
-        nothing = dict.fromkeys(equations.contacts, sympy.Integer(0))
-        self.rates = [sympy.expand(rate.xreplace(nothing)) for rate in equations.rates]
+        no_contact = dict.fromkeys(equations.contacts, sympy.Integer(0))
+        self.rates = [sympy.expand(rate.xreplace(no_contact)) for rate in equations.rates]
         self.waves = sinusoids(model)
         self.polynomials = [
             self._polynomial(variable, rate) for variable, rate in zip(self.variables, self.rates, strict=True)
@@ -47,7 +47,7 @@ class FlightWriter:
             polynomial = None
         if polynomial is None or polynomial.total_degree() > allowed or self._inexact(polynomial):
             raise StepperError(
-                f"FreeFlight needs linear motion between the stops, and here {variable}' = {rate}; take Order8 or RK4."
+                f"FreeFlight needs linear motion between the stops, got {variable}' = {rate}; use Order8 or RK4."
             )
         return polynomial
 
@@ -55,12 +55,8 @@ class FlightWriter:
         return any(coefficient.free_symbols & {*self.variables, FORCING} for coefficient in polynomial.coeffs())
 
     def text(self, places: dict[sympy.Symbol, int]) -> str:
-        """Both functions; `places` says where each parameter is in ``theta``."""
+        """Both functions; `places` has the index of each parameter in ``theta``."""
         return f"ORDER = {ORDER}\n\n\n{self._rate(places)}\n\n{self._taylor(places)}"
-
-    def _unpack(self, expressions: list[sympy.Expr], places: dict[sympy.Symbol, int]) -> list[str]:
-        used = set().union(*(expression.free_symbols for expression in expressions))
-        return [f"    {symbol} = theta[{place}]" for symbol, place in places.items() if symbol in used]
 
     def _rate(self, places: dict[sympy.Symbol, int]) -> str:
         x, v, *extra = self.model.state
@@ -69,21 +65,21 @@ class FlightWriter:
         bounds += [sympy.Abs(frequency) for frequency, _, _ in self.waves]
         for row in range(2, 2 + len(extra)):
             bounds.append(sum(sympy.Abs(sympy.diff(self.rates[row], variable)) for variable in self.model.state))
-        # A covariance decays at sums of two rates of the motion.
+        # A covariance decays at the sum of two rates of the motion.
         pairs = [(v, rate) for v, rate in zip(self.variables, self.rates, strict=True) if str(v).startswith("W")]
         bounds += [sympy.Abs(own) for own in dict.fromkeys(sympy.diff(rate, v) for v, rate in pairs) if own != 0]
         printer = SourcePrinter()
         text = printer.doprint(bounds[0])
         for bound in bounds[1:]:
             text = f"max({text}, {printer.doprint(bound)})"
-        unpack = self._unpack(bounds, places)
-        return "\n".join(["@njit(**OPTIONS)", "def flight_rate(theta):", *unpack, f"    return {text}", ""])
+        lines = [*unpack(bounds, places), f"    return {text}", ""]
+        return "\n".join(["@njit(**OPTIONS)", "def flight_rate(theta):", *lines])
 
     def _taylor(self, places: dict[sympy.Symbol, int]) -> str:
         printer = SourcePrinter()
         coefficients = [c for polynomial in self.polynomials for c in polynomial.coeffs()]
         waves = [part for wave in self.waves for part in wave]
-        lines = self._unpack([*coefficients, *waves], places)
+        lines = unpack([*coefficients, *waves], places)
         for index, (frequency, even, odd) in enumerate(self.waves):
             lines += [f"    rate{index} = {printer.doprint(frequency)}", f"    even{index} = {printer.doprint(even)}"]
             lines += [f"    odd{index} = {printer.doprint(odd)}"]
@@ -117,12 +113,12 @@ class FlightWriter:
 
 
 def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
-    """Split the forcing into sinusoids: (ω, value, quarter-period shifted value) of each, so that even′ = ω·odd.
+    """Split the forcing into sinusoids: (ω, value, value shifted by a quarter period) of each, so that even′ = ω·odd.
 
     Raises
     ------
     StepperError
-        The forcing is no sum of sinusoids.
+        The forcing is not a sum of sinusoids.
     """
     time = model.time
     forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing
@@ -133,7 +129,7 @@ def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
         factor, wave = term.as_independent(time)
         if not isinstance(wave, sympy.cos | sympy.sin) or not _is_linear(wave.args[0], time):
             raise StepperError(
-                f"FreeFlight needs excitations that are sums of sinusoids, and one has {term}; take Order8 or RK4."
+                f"FreeFlight needs excitations that are sums of sinusoids, got {term}; use Order8 or RK4."
             )
         angle = wave.args[0]
         odd = -sympy.sin(angle) if isinstance(wave, sympy.cos) else sympy.cos(angle)

@@ -1,4 +1,4 @@
-"""Derives the equations that a flow integrates."""
+"""Equations of each flow, derived from the model."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ FORCING = sympy.Symbol("f", real=True)
 
 @dataclasses.dataclass(frozen=True)
 class FlowEquations:
-    """Rates of a flow, with the stops as plain symbols.
+    """Rates of a flow, with one symbol per contact term.
 
     Attributes
     ----------
     variables : tuple of Symbol
     rates : tuple of Expr
-        In the variables, parameters, FORCING, and symbols of `contacts`.
+        In the variables, the parameters, FORCING and the symbols of `contacts`.
     contacts : dict
-        Symbol → (stop index, orders of differentiation in x and in v) of each contact term that is needed.
+        Symbol → (stop index, orders of differentiation in x and in v) of each needed contact term.
     """
 
     variables: tuple[sympy.Symbol, ...]
@@ -34,12 +34,12 @@ class FlowEquations:
 
 
 class ReversedModel(Model):
-    """The motion of a scene backwards in time, as a model of its own.
+    """The motion of a scene backwards in time.
 
-    In s = −t and w = −v the motion is again x′ = w, w′ = f(x, −w, −s): the acceleration does not change its sign, so
-    that steppers follow it, and locate its contacts, as that of any scene. What is called v and t here is w and s.
-    A law is asked with the rate of the motion forwards, which decides where it would pull. Forces that jump at first
-    touch jump at release instead; the state crosses both, for x′ is continuous there, so the way back is unique.
+    With s = −t and w = −v the motion is again x′ = w, w′ = f(x, −w, −s): the acceleration keeps its sign, so steppers
+    integrate it and locate its contacts as for any scene. The symbols v and t of this model stand for w and s. A law
+    is evaluated at the rate of the forward motion, which decides where it would pull. Forces that jump at first touch
+    jump at release instead; x′ is continuous at both, so the backward motion is unique.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ class ReversedModel(Model):
 
     @cached_property
     def contacts(self) -> tuple[DerivedContact, ...]:
-        """What was derived from the law of each stop, with the rate reversed in the law."""
+        """Derived contact of each stop, with the rate reversed in the law."""
         return tuple(dataclasses.replace(c, law=c.law.xreplace({RATE: -RATE})) for c in super().contacts)
 
     @cached_property
     def smooth_force(self) -> sympy.Expr:
-        """Acceleration without stops and without what depends on time."""
+        """Acceleration without stops and without time-dependent excitations."""
         return self._reversed(super().smooth_force)
 
     @cached_property
@@ -67,7 +67,7 @@ class ReversedModel(Model):
 
     @cached_property
     def amplitude(self) -> sympy.Matrix:
-        """Column σ(q): what multiplies √D dW."""
+        """Column σ(q), the factor of √D dW."""
         return super().amplitude.applyfunc(self._reversed)
 
     def _reversed(self, expression: sympy.Expr) -> sympy.Expr:
@@ -75,29 +75,19 @@ class ReversedModel(Model):
 
 
 def model_for(scene: Scene, flow: Flow) -> Model:
-    """Return the model whose equations a flow integrates: that of the scene, or of the scene backwards in time."""
+    """Return the model of a flow: that of the scene, or of the scene backwards in time."""
     return ReversedModel(scene) if flow.reversed else Model(scene)
 
 
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
-    """Derive the equations of a flow from the model that `model_for` gives for it."""
+    """Derive the equations of a flow from its model, as returned by `model_for`."""
     opaque = model.opaque_forces
     forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
     drift = model.drift_with(forcing, opaque)
     variables: tuple[sympy.Symbol, ...] = model.state
     rates = list(drift)
-    linear: sympy.Matrix | None = None
-    if flow is Flow.STATE_VARIATIONAL:
-        linear = drift.jacobian(list(model.state))
-    elif flow.has_covariance:
-        size = len(model.state)
-        places = [(row, column) for row in range(size) for column in range(row, size)]
-        covariance = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"W{min(i, j)}{max(i, j)}", real=True))
-        carried = drift.jacobian(list(model.state)) * covariance
-        gathered = carried + carried.T + model.diffusion
-        variables = (*model.state, *(covariance[place] for place in places))
-        rates += [gathered[place] for place in places]
-    elif flow.has_momenta:
+    linear = drift.jacobian(list(model.state)) if flow.has_derivatives else None
+    if flow.has_momenta:
         hamiltonian = model.hamiltonian_with(drift)
         phase = (*model.state, *model.momenta)
         rates = [sympy.diff(hamiltonian, p) for p in model.momenta]
@@ -111,6 +101,14 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
         matrix = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"m_{i}{j}", real=True))
         variables = (*variables, *matrix)
         rates += list(linear * matrix)
+    if flow.has_covariance:
+        size = len(model.state)
+        places = [(row, column) for row in range(size) for column in range(row, size)]
+        covariance = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"W{min(i, j)}{max(i, j)}", real=True))
+        carried = drift.jacobian(list(model.state)) * covariance
+        gathered = carried + carried.T + model.diffusion
+        variables = (*variables, *(covariance[place] for place in places))
+        rates += [gathered[place] for place in places]
     return _with_plain_contacts(model, opaque, variables, rates)
 
 

@@ -4,32 +4,34 @@ import enum
 
 
 class Flow(enum.Enum):
-    """Sets of equations; each becomes a compiled kernel of its own when first asked for.
+    """Sets of equations; each is compiled to its own kernel on first use.
 
-    In all of them the state q (x, v, extra noise states) comes first.
+    The state q (x, v, extra noise states) comes first in all of them.
     """
 
     STATE = "state"
     """q"""
     STATE_VARIATIONAL = "state_variational"
-    """q, then ∂q/∂q₀ row by row"""
+    """q, then M = ∂q/∂q₀ row by row"""
     STATE_REVERSED = "state_reversed"
-    """q backwards in time, with −v in place of v; time t₀ is started from as −t₀"""
-    GRAMIAN = "gramian"
-    """q, then the upper triangle, row by row, of the covariance C that noise gathers per D: C′ = A C + C Aᵀ + a"""
-    GRAMIAN_REVERSED = "gramian_reversed"
-    """the same of the motion backwards; with R = diag(1, −1, 1, …), R C R is then M⁻¹ C M⁻ᵀ of the motion forwards"""
+    """q backwards in time, with −v in place of v; a start at time t₀ is given as −t₀"""
+    LINEARISED = "linearised"
+    """q, then M row by row, then the upper triangle, row by row, of the covariance C of the noise per unit D:
+    C′ = A C + C Aᵀ + a with A = ∂b/∂q"""
+    COVARIANCE_REVERSED = "covariance_reversed"
+    """q backwards in time as in STATE_REVERSED, then the upper triangle of its covariance C per unit D; with
+    R = diag(1, −1, 1, …), R C R is M⁻¹ C M⁻ᵀ of the forward motion"""
     HAMILTONIAN = "hamiltonian"
     """q, p, S"""
     HAMILTONIAN_VARIATIONAL = "hamiltonian_variational"
     """q, p, S, then ∂(q, p)/∂(q, p)₀ row by row"""
     NOISY = "noisy"
-    """q under noise"""
+    """q with noise"""
 
     @property
     def reversed(self) -> bool:
-        """Whether the motion is followed backwards in time."""
-        return self in (Flow.STATE_REVERSED, Flow.GRAMIAN_REVERSED)
+        """Whether time runs backwards."""
+        return self in (Flow.STATE_REVERSED, Flow.COVARIANCE_REVERSED)
 
     @property
     def has_momenta(self) -> bool:
@@ -39,4 +41,9 @@ class Flow(enum.Enum):
     @property
     def has_covariance(self) -> bool:
         """Whether the covariance C is among the variables."""
-        return self in (Flow.GRAMIAN, Flow.GRAMIAN_REVERSED)
+        return self in (Flow.LINEARISED, Flow.COVARIANCE_REVERSED)
+
+    @property
+    def has_derivatives(self) -> bool:
+        """Whether M = ∂q/∂q₀, without momenta, is among the variables."""
+        return self in (Flow.STATE_VARIATIONAL, Flow.LINEARISED)

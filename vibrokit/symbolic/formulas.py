@@ -1,4 +1,4 @@
-"""Asks a part for its formula: calls its method on a twin of symbols and checks what comes back."""
+"""The formula of a part: its method is called on a twin with symbols, and the result is checked."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from vibrokit.errors import DerivationError
 _LARGEST_DENOMINATOR = 64
 
 
-def ask(part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tuple[sympy.Symbol, ...]) -> sympy.Expr:
-    """Return the formula of `part` as an expression of `arguments` and its parameters' symbols.
+def derived_formula(
+    part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tuple[sympy.Symbol, ...]
+) -> sympy.Expr:
+    """Return the formula of `part` as an expression in `arguments` and the symbols of its parameters.
 
     Parameters
     ----------
@@ -22,13 +24,13 @@ def ask(part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tup
     method : str
         Name of the formula method.
     values : mapping
-        Symbol of each parameter that is a number; structural ones stay as they are.
+        Symbol of each numeric parameter; structural parameters keep their values.
     arguments : tuple of Symbol
 
     Raises
     ------
     DerivationError
-        The method failed on symbols, or used a symbol that it was not given.
+        The method failed for symbols, or the result is not an expression in the given symbols.
     """
     named = {d.name: values.get(d.name, exact(part.parameters[d.name])) for d in part.declared()}
     title = f"{type(part).__name__}.{method}"
@@ -36,22 +38,22 @@ def ask(part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tup
         answer = sympy.sympify(getattr(part.twin(named), method)(*arguments), strict=True)
     except Exception as error:
         raise DerivationError(
-            f"{title} failed when it was called with symbols ({type(error).__name__}: {error}); write it with "
-            "arithmetic and the functions of vibrokit.parts.functions or SymPy, without branches on values."
+            f"{title} failed when called with symbols ({type(error).__name__}: {error}); use arithmetic and functions "
+            "of vibrokit.parts.functions or SymPy, without branches on values."
         ) from error
     if not isinstance(answer, sympy.Expr):
-        raise DerivationError(f"{title} returned {answer!r}, which is no expression; return the force as one.")
+        raise DerivationError(f"{title} must return a SymPy expression, got {answer!r}.")
     strange = answer.free_symbols - set(arguments) - {s for s in values.values() if isinstance(s, sympy.Symbol)}
     if strange:
         raise DerivationError(
-            f"{title} uses {', '.join(sorted(map(str, strange)))}, which is neither an argument nor a parameter; "
-            "declare it as a field with parameter(...)."
+            f"{title} uses {', '.join(sorted(map(str, strange)))}, neither an argument nor a parameter; declare it as "
+            "a field with parameter(...)."
         )
     return with_exact_exponents(answer)
 
 
 def exact(value: Any) -> Any:
-    """Return a number as an exact fraction if it is a simple one, so that exponents such as 1.5 stay exact."""
+    """Return a float such as 1.5, with a denominator of at most 64, as an exact fraction."""
     if isinstance(value, float):
         fraction = Fraction(value)
         if fraction.denominator <= _LARGEST_DENOMINATOR:
@@ -61,7 +63,7 @@ def exact(value: Any) -> Any:
 
 
 def with_exact_exponents(expression: sympy.Expr) -> sympy.Expr:
-    """Replace exponents that are simple floating-point numbers, as in ``depth**1.5``, by fractions."""
+    """Replace floating-point exponents, as in ``depth**1.5``, by the result of `exact`."""
 
     def is_float_power(node: sympy.Basic) -> bool:
         return isinstance(node, sympy.Pow) and isinstance(node.exp, sympy.Float)

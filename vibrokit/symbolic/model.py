@@ -9,15 +9,15 @@ import sympy
 from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
-from vibrokit.symbolic.formulas import ask
+from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.reading import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
 
 
 class Model:
-    """Drift, diffusion, Hamiltonian and everything that follows from them, as SymPy expressions.
+    """Drift, diffusion, Hamiltonian and derived quantities, as SymPy expressions.
 
-    The convention is that of large deviations: ε = D, dq = b(q, t) dt + √D σ(q) dW, a = σσᵀ, and
+    Large-deviation convention: ε = D, dq = b(q, t) dt + √D σ(q) dW, a = σσᵀ, and
 
         H(q, p, t) = p·b(q, t) + ½ pᵀ a(q) p,   q′ = ∂H/∂p,   p′ = −∂H/∂q,   S′ = ½ pᵀ a p
 
@@ -45,25 +45,25 @@ class Model:
 
     @cached_property
     def contacts(self) -> tuple[DerivedContact, ...]:
-        """What was derived from the law of each stop."""
+        """Derived contact of each stop."""
         return tuple(
             derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"))
             for index, barrier in enumerate(self.scene.barriers)
         )
 
     def depth(self, index: int) -> sympy.Expr:
-        """Depth at stop `index`, as an expression of x; negative when apart."""
+        """Depth at stop `index` as an expression in x; negative without contact."""
         return self.scene.barriers[index].sign * (self.state[0] - self.symbols[f"barriers.{index}.position"])
 
     def contact_force(self, index: int) -> sympy.Expr:
-        """Force of stop `index` on the mass where they touch and the stop pushes, as an expression of x and v."""
+        """Force of stop `index` on the mass during contact, as an expression in x and v."""
         sign = self.scene.barriers[index].sign
         return -sign * self.contacts[index].law.subs({DEPTH: self.depth(index), RATE: sign * self.state[1]})
 
     def guarded_force(self, index: int, in_x: int = 0, in_v: int = 0) -> sympy.Expr:
-        """Force of stop `index` on the mass everywhere: zero when apart, and where a law would pull.
+        """Force of stop `index` on the mass: zero without contact, and where a clamped law would pull.
 
-        With `in_x` and `in_v`, its derivative of these orders in x and in v.
+        `in_x` and `in_v` are orders of differentiation in x and in v.
         """
         x, v = self.state[:2]
         barrier, force = self.scene.barriers[index], self.contact_force(index)
@@ -75,35 +75,36 @@ class Model:
 
     @cached_property
     def smooth_force(self) -> sympy.Expr:
-        """Acceleration without stops and without what depends on time."""
+        """Acceleration without stops and without time-dependent excitations."""
         x, v, *extra = self.state
         omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
         spring = omega**2 * x
         if self.scene.spring is not None:
-            spring = ask(self.scene.spring, "force", self._symbols_of("spring"), (x, v))
-        constant = sum((f for f in self._excitations if self.time not in f.free_symbols), sympy.Integer(0))
-        push = ask(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
+            spring = derived_formula(self.scene.spring, "force", self._symbols_of("spring"), (x, v))
+        constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
+        push = derived_formula(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
         return -2 * zeta * omega * v - spring + constant + push
 
     @cached_property
-    def _excitations(self) -> tuple[sympy.Expr, ...]:
+    def excitations(self) -> tuple[sympy.Expr, ...]:
+        """Force of each excitation as an expression in time."""
         forces = []
         for index, part in enumerate(self.scene.excitations):
-            forces.append(ask(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,)))
+            forces.append(derived_formula(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,)))
             if part.period is None and self.time in forces[-1].free_symbols:
                 raise DerivationError(
-                    f"{type(part).__name__}.period is None, as of a constant, but its force depends on time; give the "
-                    "period, or math.inf if it never repeats."
+                    f"{type(part).__name__}.period is None, which means a constant, but its force depends on time; "
+                    "return the period, or math.inf if it never repeats."
                 )
         return tuple(forces)
 
     @cached_property
     def forcing(self) -> sympy.Expr:
         """Sum of the excitations that depend on time."""
-        return sum((f for f in self._excitations if self.time in f.free_symbols), sympy.Integer(0))
+        return sum((f for f in self.excitations if self.time in f.free_symbols), sympy.Integer(0))
 
     def drift_with(self, forcing: sympy.Expr, contacts: tuple[sympy.Expr, ...]) -> sympy.Matrix:
-        """Drift b in terms of a given forcing and given forces of the stops."""
+        """Drift b for a given forcing and given forces of the stops."""
         v = self.state[1]
         acceleration = self.smooth_force + forcing + sum(contacts, sympy.Integer(0))
         return sympy.Matrix([v, acceleration, *self._extra_drift])
@@ -118,24 +119,24 @@ class Model:
 
     @cached_property
     def drift(self) -> sympy.Matrix:
-        """Drift b(q, t), stops as `Piecewise`, column of length n."""
+        """Drift b(q, t) with stops as `Piecewise`, a column of length n."""
         return self.drift_with(
             self.forcing, tuple(self.guarded_force(index) for index in range(len(self.scene.barriers)))
         )
 
     @cached_property
     def amplitude(self) -> sympy.Matrix:
-        """Column σ(q): what multiplies √D dW."""
+        """Column σ(q), the factor of √D dW."""
         column = [sympy.Integer(0)] * len(self.state)
         if self.scene.noise is not None:
-            column[-1 if len(self.state) > 2 else 1] = ask(
+            column[-1 if len(self.state) > 2 else 1] = derived_formula(
                 self.scene.noise, "amplitude", self._symbols_of("noise"), self.state[:2]
             )
         return sympy.Matrix(column)
 
     @cached_property
     def diffusion(self) -> sympy.Matrix:
-        """Diffusion matrix a = σσᵀ, n × n; D stands before it."""
+        """Diffusion matrix a = σσᵀ, n × n, without the factor D."""
         return self.amplitude * self.amplitude.T
 
     @cached_property
@@ -163,10 +164,10 @@ class Model:
 
     @cached_property
     def equations(self) -> dict[sympy.Symbol, sympy.Expr]:
-        """Rate of every variable: Hamilton's equations with noise, the equations of motion without."""
+        """Rate of every variable: Hamilton's equations if the scene has noise, otherwise the equations of motion."""
         if not self.momenta:
             return dict(zip(self.state, self.drift, strict=True))
-        # The stops stay closed while H is differentiated: their formulas come out as their authors wrote them.
+        # H is differentiated with opaque stop forces, so that their formulas keep the form in which they were written.
         x, v = self.state[:2]
         forces = self.opaque_forces
         hamiltonian = self.hamiltonian_with(self.drift_with(self.forcing, forces))
@@ -175,16 +176,16 @@ class Model:
             p: sum(sympy.expand_mul(term, deep=False) for term in sympy.Add.make_args(-sympy.diff(hamiltonian, q)))
             for q, p in zip(self.state, self.momenta, strict=True)
         }
-        opened = {
+        written_out = {
             sympy.diff(force, (x, a), (v, b)): self.guarded_force(index, a, b)
             for index, force in enumerate(forces)
             for a, b in ((1, 0), (0, 1), (0, 0))
         }
-        return {variable: rate.xreplace(opened) for variable, rate in rates.items()}
+        return {variable: rate.xreplace(written_out) for variable, rate in rates.items()}
 
     @property
     def opaque_forces(self) -> tuple[sympy.Expr, ...]:
-        """The force of each stop as a function of x and v that is not looked into."""
+        """The force of each stop as an undefined function of x and v."""
         return tuple(sympy.Function(f"C{index}")(*self.state[:2]) for index in range(len(self.scene.barriers)))
 
     @cached_property
@@ -194,17 +195,12 @@ class Model:
 
     @cached_property
     def undamped(self) -> bool:
-        """Whether nothing takes energy out, at the scene's parameters: no friction, and stops that give all back."""
+        """Whether the motion conserves energy at the parameters of the scene: no friction, and conservative stops."""
         values = self.scene.parameters
         numbers = {symbol: values[path] for path, symbol in self.symbols.items()}
         friction = sympy.diff(self.smooth_force, self.state[1]).subs(numbers)
         laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
         return friction == 0 and all(law == 0 for law in laws)
-
-    @cached_property
-    def hessian(self) -> sympy.Matrix:
-        """Second derivatives of H in (q, p), 2n × 2n: the variational equations of a path are Jᵀ times this."""
-        return sympy.hessian(self.hamiltonian, (*self.state, *self.momenta))
 
     @property
     def latex(self) -> str:

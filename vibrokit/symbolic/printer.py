@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -11,16 +11,16 @@ _LARGEST_PRODUCT = 16
 
 
 class SourcePrinter(PythonCodePrinter):
-    """Python printer that writes powers so that loops over lanes can be vectorised.
+    """Python printer for loops over lanes that the compiler can vectorise.
 
-    Whole powers become products and half-integer ones products with a square root: a call of ``pow`` would keep
-    the loop scalar and cost eight times as much. The compiler keeps the order of sums and products, so square roots
-    and the symbols that arrive last are written last: nothing that need not wait for them does.
+    Integer powers become products, and half-integer powers products with a square root: a call to ``pow`` prevents
+    vectorisation and costs eight times as much. The compiler keeps the order of sums and products, so square roots
+    and the symbols whose values arrive last are written last, and other operations need not wait for them.
 
     Parameters
     ----------
     arrival : dict, optional
-        Symbols with their places in the order in which values become known; 0 for those not named.
+        Position of symbols in the order in which their values become known; 0 for the others.
     """
 
     def __init__(self, arrival: Mapping[sympy.Symbol, int] | None = None) -> None:
@@ -109,9 +109,15 @@ def _is_root(factor: sympy.Expr) -> bool:
 
 
 def printable(expression: sympy.Expr) -> sympy.Expr:
-    """Rewrite what differentiation leaves behind and no compiler knows: steps and spikes at kinks."""
+    """Replace the step and delta functions that differentiation yields at kinks; compilers do not know them."""
     expression = expression.replace(sympy.DiracDelta, lambda *arguments: sympy.Integer(0))
     return expression.replace(sympy.Heaviside, lambda argument, *rest: sympy.Piecewise((1, argument > 0), (0, True)))
+
+
+def unpack(expressions: Iterable[sympy.Expr], places: Mapping[sympy.Symbol, int], indent: str = "    ") -> list[str]:
+    """Assignments of the parameters in some expressions from ``theta``; `places` has the index of each parameter."""
+    used = set().union(*(expression.free_symbols for expression in expressions))
+    return [f"{indent}{symbol} = theta[{place}]" for symbol, place in places.items() if symbol in used]
 
 
 def assignments(
@@ -120,14 +126,14 @@ def assignments(
     indent: str = "    ",
     arrival: Mapping[sympy.Symbol, int] | None = None,
 ) -> tuple[list[str], dict[str, str]]:
-    """Print expressions with their common parts taken out.
+    """Print expressions after common subexpression elimination.
 
     Returns
     -------
     lines : list of str
-        Assignments of the common parts, to names made of an underscore, `temporary` and a number.
+        Assignments of the common subexpressions, to names made of an underscore, `temporary` and a number.
     texts : dict of str
-        Text of each target in terms of these.
+        Text of each target in terms of these names.
     """
     printer = SourcePrinter(arrival)
     names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))  # no parameter begins with "_"

@@ -1,4 +1,4 @@
-"""Prints equations for people: sums begin with what is added, conditions with the variable."""
+"""Prints equations for people: positive terms come first in sums, the variable in conditions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sympy.printing.str import StrPrinter
 
 
 class _Reading:
-    """What text and LaTeX share: ``x - b``, where SymPy writes ``-b + x``."""
+    """Order of terms in text and LaTeX: ``x - b`` instead of the ``-b + x`` of SymPy."""
 
     def _as_ordered_terms(self, expression: sympy.Expr, order: Any = None) -> list[sympy.Expr]:
         terms = super()._as_ordered_terms(expression, order=order)  # type: ignore[misc]
@@ -36,7 +36,7 @@ class _Latex(_Reading, LatexPrinter):
 
 
 def as_text(expression: sympy.Expr) -> str:
-    """Return an expression as one line of text; cases read ``(force if x > b else 0)``."""
+    """Return an expression as one line of text, cases as ``(force if x > b else 0)``."""
     return _Text().doprint(expression)
 
 

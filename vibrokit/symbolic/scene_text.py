@@ -1,4 +1,4 @@
-"""SceneText: the scene part of a kernel, as plain text. Reading it needs no SymPy."""
+"""SceneText: the scene part of a kernel as plain text, so that using it needs no SymPy."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from vibrokit.symbolic.flow_kind import Flow
 
 @dataclasses.dataclass(frozen=True)
 class SceneText:
-    """The scene part of a kernel, as text.
+    """The scene part of a kernel as text.
 
     Attributes
     ----------
     flow : Flow
     variables : tuple of str
-        Names of the numbers that are integrated.
+        Names of the integrated variables.
     parameters : dict of str to int
-        Names of the parameters that the right-hand side takes, and their places in `theta`.
+        Parameters of the right-hand side by name, with their indices in `theta`.
     states : int
-        How many of the variables are the state q.
+        Number of variables that belong to the state q.
     forced : bool
-        Whether anything depends on time.
+        Whether the forcing depends on time.
     jumps : bool
         Whether a contact force jumps at first touch.
     breaks : bool
-        Whether something that the flow integrates jumps at an event: derivatives, covariances and momenta where a
-        contact force does, derivatives of momenta where the derivatives of one do.
-    preamble, constants, forcing, derivative, rhs, stops, flight, amplitude, slope : str
-        Pieces of the module; empty where the scene has no need of them.
+        Whether an integrated variable jumps at an event: derivatives, covariances and momenta jump where a contact
+        force does, derivatives of momenta where its derivatives do.
+    preamble, constants, forcing, excitations, derivative, rhs, stops, flight, amplitude, slope : str
+        Pieces of the module; empty if the scene does not need them.
     """
 
     flow: Flow
@@ -41,6 +41,7 @@ class SceneText:
     preamble: str
     constants: str
     forcing: str
+    excitations: str
     derivative: str
     rhs: str
     stops: str

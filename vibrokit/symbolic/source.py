@@ -1,8 +1,7 @@
-"""Writes the scene part of a kernel: a model's flow as Python text. SymPy ends here.
+"""The scene part of a kernel: the flow of a model as Python text. Layers above this one do not use SymPy.
 
-Two forms of the same right-hand side are written: one for steppers that pack trajectories in lanes
-(`derivative`: numbers in, numbers out, stops as branch-free guards) and one for steppers that locate every
-contact (`rhs`: arrays, each stop switched on or off by the caller).
+The right-hand side has two forms: `derivative` for steppers that pack trajectories in lanes (scalars in and out, stops
+as branch-free guards) and `rhs` for steppers that locate every contact (arrays, each stop switched by the caller).
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from vibrokit.symbolic.flight import FlightWriter
 from vibrokit.symbolic.flow import FlowEquations, derive_flow, model_for
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
-from vibrokit.symbolic.printer import assignments
+from vibrokit.symbolic.printer import assignments, unpack
 from vibrokit.symbolic.scene_text import SceneText
 
 _PREAMBLE = '''"""{title}
@@ -32,26 +31,26 @@ import numpy as np
 from numba import njit
 
 OPTIONS = {{"nogil": True, "cache": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
-# A function that is compiled into its callers and once by itself may round differently in the two, and which one is
-# called depends on whether this process compiled the module or found it on disk.
+# A function that is compiled both inline and on its own may round differently in the two versions. Which one is called
+# would depend on whether this process compiled the module or loaded it from disk.
 INLINED = {{**OPTIONS, "forceinline": True}}
 '''
 
 
 def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
-    """Derive the equations of a scene and write them down for one flow; with the series of its free flight, if asked.
+    """Derive the equations of one flow of a scene and write them as text, with the series of free flight if `flight`.
 
     Raises
     ------
     StepperError
-        The free flight was asked for and is not linear.
+        `flight` is true and the motion between stops is not linear.
     """
     writer = _SceneWriter(model_for(scene, flow), flow)
     amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
     return SceneText(
         flow=flow,
         variables=tuple(writer.variables),
-        parameters={name: writer.place(name) for name in writer.parameter_names()},
+        parameters=writer.parameters(),
         states=len(writer.model.state),
         forced=writer.forced,
         jumps=any(contact.jumps for contact in writer.model.contacts),
@@ -59,6 +58,7 @@ def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
         preamble=writer.preamble(f"The {flow.value} flow of a scene."),
         constants=writer.constants(),
         forcing=writer.forcing(),
+        excitations=writer.excitations(),
         derivative=writer.derivative(),
         rhs=writer.rhs(),
         stops=writer.stops(),
@@ -93,7 +93,7 @@ class _SceneWriter:
         return _PREAMBLE.format(title=title, legend=legend)
 
     def constants(self) -> str:
-        """Sizes, and what is known of each stop."""
+        """Sizes, and properties of each stop."""
         contacts = self.model.contacts
         rows = {
             "STATES": len(self.model.state),
@@ -110,34 +110,48 @@ class _SceneWriter:
             rows = {name: value for name, value in rows.items() if name not in ("SIDES", "CLAMPED", "ROOTED", "JUMPS")}
         elif self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
+        elif self.breaks and not self.flow.has_momenta:  # where M and the triangle of C begin; 0 for none
+            rows |= {"DERIVATIVES": self._place_of("m_00"), "COVARIANCE": self._place_of("W00")}
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
+
+    def _place_of(self, variable: str) -> int:
+        return self.variables.index(variable) if variable in self.variables else 0
 
     @property
     def forced(self) -> bool:
-        """Whether anything depends on time."""
+        """Whether the forcing depends on time."""
         return bool(self.model.forcing != 0)
 
     @property
     def breaks(self) -> bool:
-        """Whether something that the flow integrates jumps at an event."""
+        """Whether an integrated variable jumps at an event."""
         if self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             return any(contact.bends for contact in self.model.contacts)
         follows = self.flow not in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY)
         return follows and any(contact.jumps for contact in self.model.contacts)
 
     def forcing(self) -> str:
-        """Function `forcing(t, theta)`; nothing for a scene that does not depend on time."""
+        """Function `forcing(t, theta)`; empty for an autonomous scene."""
         if not self.forced:
             return ""
-        lines, texts = assignments({"f": self.model.forcing}, "c")
-        body = [*self._unpack(self.model.forcing), *lines, f"    return {texts['f']}"]
-        return "\n".join(["@njit(**INLINED)", "def forcing(t, theta):", *body, ""])
+        return self._function("forcing", "t", self.model.forcing)
+
+    def excitations(self) -> str:
+        """Function `excitation(i, t, theta)`: the force of one excitation; empty for a scene without any."""
+        if not self.model.excitations:
+            return ""
+        lines = ["@njit(**OPTIONS)", "def excitation(i, t, theta):"]
+        for index, force in enumerate(self.model.excitations):
+            shared, texts = assignments({"force": force}, "c", indent="        ")
+            values = unpack([force], self.index, indent="        ")
+            lines += [f"    if i == {index}:", *values, *shared, f"        return {texts['force']}"]
+        return "\n".join([*lines, "    return np.nan", ""])
 
     def derivative(self) -> str:
-        """Function `derivative(x, v, …, f, parameters…)`, and the names of the parameters it takes."""
+        """Function `derivative(x, v, …, f, parameters…)`."""
         contact_lines, zero = self.contacts.guarded()
         lines, texts = self._rates(zero)
-        arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameter_names()]
+        arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameters()]
         head = f"def derivative({', '.join(arguments)}):"
         values = ", ".join(texts[name] for name in self.variables)
         return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
@@ -149,11 +163,11 @@ class _SceneWriter:
         body += ["    f = forcing(t, theta)"] if self.forced else []
         body += self.contacts.switched()
         body += [*lines, *(f"    out[{index}] = {texts[name]}" for index, name in enumerate(self.variables))]
-        unpack = [f"    {name} = theta[{self.place(name)}]" for name in self.parameter_names()]
-        return "\n".join(["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", *unpack, *body, ""])
+        head = [f"    {name} = theta[{place}]" for name, place in self.parameters().items()]
+        return "\n".join(["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", *head, *body, ""])
 
     def stops(self) -> str:
-        """Functions `stop(i, theta)` and `law(i, depth, rate, theta)`; nothing for a scene without stops."""
+        """Functions `stop(i, theta)` and `law(i, depth, rate, theta)`; empty for a scene without stops."""
         if not self.model.contacts:
             return ""
         stop, law = ["@njit(**OPTIONS)", "def stop(i, theta):"], ["@njit(**OPTIONS)", "def law(i, depth, rate, theta):"]
@@ -161,8 +175,8 @@ class _SceneWriter:
             position = self.model.symbols[f"barriers.{index}.position"]
             stop += [f"    if i == {index}:", f"        return theta[{self.index[position]}]"]
             lines, texts = assignments({"force": contact.law}, "c", indent="        ")
-            unpack = ["    " + line for line in self._unpack(contact.law)]
-            law += [f"    if i == {index}:", *unpack, *lines, f"        return {texts['force']}"]
+            lines = [*unpack([contact.law], self.index, indent="        "), *lines]
+            law += [f"    if i == {index}:", *lines, f"        return {texts['force']}"]
         nowhere = "    return np.nan"
         return "\n".join([*stop, nowhere, "", "", *law, nowhere, ""])
 
@@ -171,35 +185,26 @@ class _SceneWriter:
         return FlightWriter(self.model, self.equations).text(self.index)
 
     def noise(self) -> tuple[str, str]:
-        """Functions `amplitude` = √D g(x, v), and `slope`, its rate in the state that it drives, unless that is 0."""
+        """Functions `amplitude` = √D g(x, v), and `slope`, its derivative in the driven state, unless that is 0."""
         driven = self.model.state[-1]
         intensity = self.model.symbols["noise.intensity"]
         size = sympy.sqrt(intensity) * self.model.amplitude[len(self.model.state) - 1]
         slope = sympy.diff(size, driven)
-        return self._of_state("amplitude", size), "" if slope == 0 else self._of_state("slope", slope)
+        return self._function("amplitude", "x, v", size), "" if slope == 0 else self._function("slope", "x, v", slope)
 
-    def _of_state(self, name: str, value: sympy.Expr) -> str:
+    def _function(self, name: str, arguments: str, value: sympy.Expr) -> str:
         lines, texts = assignments({name: value}, "c")
-        body = [*self._unpack(value), *lines, f"    return {texts[name]}"]
-        return "\n".join(["@njit(**INLINED)", f"def {name}(x, v, theta):", *body, ""])
+        body = [*unpack([value], self.index), *lines, f"    return {texts[name]}"]
+        return "\n".join(["@njit(**INLINED)", f"def {name}({arguments}, theta):", *body, ""])
 
-    def parameter_names(self) -> list[str]:
-        """Names of the parameters that the right-hand side uses, in the order of `theta`."""
-        used = set().union(*(rate.free_symbols for rate in self.equations.rates))
-        used |= self.contacts.used()
-        return [str(symbol) for symbol in self.index if symbol in used]
-
-    def place(self, name: str) -> int:
-        """Index of a parameter in `theta`."""
-        return next(index for symbol, index in self.index.items() if str(symbol) == name)
-
-    def _unpack(self, expression: sympy.Expr) -> list[str]:
-        used = [symbol for symbol in self.index if symbol in expression.free_symbols]
-        return [f"    {symbol} = theta[{self.index[symbol]}]" for symbol in used]
+    def parameters(self) -> dict[str, int]:
+        """Parameters of the right-hand side by name, with their indices in `theta`."""
+        used = self.contacts.used().union(*(rate.free_symbols for rate in self.equations.rates))
+        return {str(symbol): place for symbol, place in self.index.items() if symbol in used}
 
     def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:
-        nothing = dict.fromkeys(zero, sympy.Integer(0))
-        rates = [rate.xreplace(nothing) for rate in self.equations.rates]
+        zeros = dict.fromkeys(zero, sympy.Integer(0))
+        rates = [rate.xreplace(zeros) for rate in self.equations.rates]
         arrival = {**dict.fromkeys(self.equations.variables, 1), **dict.fromkeys(self.equations.contacts, 2)}
         return assignments(dict(zip(self.variables, rates, strict=True)), "c", arrival=arrival)
 

@@ -1,4 +1,4 @@
-"""A symbol for every parameter of a scene, each name used once."""
+"""A unique symbol for every parameter of a scene."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import sympy
 
 from vibrokit.parts.scene import Entry, Scene
 
-_SPELLED = {"lambda": "lamda"}  # SymPy's own spelling; the other is a word of Python
-# What generated code calls its own: variables, momenta, matrix entries, stops, arrays, functions. None of it ends in
-# an underscore, so that one can be added to tell a parameter from it.
+_SPELLED = {"lambda": "lamda"}  # the spelling of SymPy; lambda is a Python keyword
+# Names in generated code: variables, momenta, matrix entries, stops, arrays, functions. None ends in an underscore, so
+# that a parameter with such a name gets one.
 _IN_CODE = re.compile(
     r"(?!.*_$)(_.*|[xvtzfhS]|[A-Z]{3,}|[pm]_\d+|[CUW]\d+(_\w+)?|k\d_\w+|f\d|(even|odd|rate)\d*|depth|other|nearer|side"
     r"|touching|pushing|lane|theta|out|series|once|share|product|first|second|later|half|size|start|table"
-    r"|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
+    r"|rates|excitation|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
     r"|njit|np|min|max|abs|range|sign|a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
 )
 
 
 def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
-    """Map the path of every parameter that is a number to its symbol.
+    """Map the path of every numeric parameter to its symbol.
 
-    A letter that several parts share gets the part's index, or the side of its stop: k_r, k_l; f_0, f_1.
+    A symbol that several parts declare gets the index of the part or the side of its stop: k_r, k_l; f_0, f_1.
     """
     entries = [entry for entry in scene.entries() if not entry.declared.structural]
     letters = Counter(entry.declared.symbol for entry in entries)

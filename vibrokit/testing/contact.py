@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
 
 import mpmath
@@ -16,12 +18,13 @@ from vibrokit.registry import Group
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
-from vibrokit.testing.derivatives import ORDERS, check_compiled, check_derivatives, derivative
+from vibrokit.testing.derivatives import ORDERS, Reference, derivative
 from vibrokit.testing.part_checks import PartChecks
-from vibrokit.testing.precise import Function, function, rounding
+from vibrokit.testing.precise import Function
 from vibrokit.testing.report import Check, ConformanceError
 
-_NEAREST = mpmath.mpf(10) ** -4000  # a depth at which even the 200th root of it is next to nothing
+_SIDES = (("right", 1), ("left", -1))
+_NEAREST = mpmath.mpf(10) ** -4000  # a depth whose 200th root is negligible
 _ORDERS_AT_TOUCH = range(1, 9)
 _TOUCH_DIGITS = 250
 _NEAR, _NEARER = mpmath.mpf("1e-6"), mpmath.mpf("1e-12")
@@ -59,7 +62,7 @@ class ContactLawChecks(PartChecks[ContactLaw]):
         return scene.barriers[0].law
 
     def points(self) -> list[tuple[float, ...]]:
-        """Depths from 1e-9 to 1, the ends included, at random rates."""
+        """Depths from 1e-9 to 1 at random rates."""
         powers = [-9.0, *self.rng.uniform(-9, 0, 7), 0.0]
         return [(float(10**power), float(rate)) for power in powers for rate in self._rates()]
 
@@ -67,40 +70,40 @@ class ContactLawChecks(PartChecks[ContactLaw]):
         return [float(sign * 10**power) for sign, power in zip((1, -1), self.rng.uniform(-3, 1, 2), strict=True)]
 
     def contact(self, part: ContactLaw) -> DerivedContact:
-        """What the model derives of a law."""
+        """The contact that the model derives from a law."""
         self.expression(part)
         return self.scene(part).model.contacts[0]
 
     # -- force ----------------------------------------------------------------------------------------------------
 
     def no_force_at_rest(self) -> str:
-        """No force at zero depth and zero rate: the limit from inside."""
+        """The force at zero rate tends to 0 with depth."""
         for part, force in self.each():
             least = force(_NEAREST, 0)
             if abs(least) > 1e-12 * abs(force(1, 0)):
                 raise ConformanceError(
-                    f"{part!r} pushes with {mpmath.nstr(least, 6)} at rest at the stop; a law must begin at 0."
+                    f"The force of {part!r} at zero depth and rate must be 0, got {mpmath.nstr(least, 6)}."
                 )
         return ""
 
     def pushes_back(self) -> str:
-        """The force is not negative while going deeper."""
+        """The force is not negative while depth increases."""
         for part, force in self.each():
             for depth, rate in self.points():
                 for deeper in (0.0, abs(rate)):
                     push = force(depth, deeper)
                     if push < 0:
                         raise ConformanceError(
-                            f"{part!r} pulls with {mpmath.nstr(push, 6)} at depth {depth:g} while going deeper at rate "
-                            f"{deeper:g}; positive is a push back."
+                            f"The force of {part!r} at depth {depth:g} and rate {deeper:g} must not be negative, got "
+                            f"{mpmath.nstr(push, 6)}; a positive force pushes the mass back."
                         )
         return ""
 
     def never_pulls(self) -> str:
-        """As compiled for a barrier that is not adhesive, the force never pulls, and is 0 where nothing touches."""
+        """The compiled force at a barrier that is not adhesive never pulls, and is 0 without contact."""
         for part in self.samples:
             self.expression(part)
-            for side, sign in (("right", 1.0), ("left", -1.0)):
+            for side, sign in _SIDES:
                 code = Compiled(_bare(part, side), Flow.STATE)
                 for depth, rate in self.points():
                     for faster in (rate, -abs(rate), -100.0 * abs(rate)):
@@ -108,48 +111,41 @@ class ContactLawChecks(PartChecks[ContactLaw]):
                         if not push >= 0:
                             raise ConformanceError(
                                 f"{part!r} on the {side} side pulls with {-push:g} at depth {depth:g} and rate "
-                                f"{faster:g}, though its barrier is not adhesive: the model does not see that it can "
-                                "pull. Declare the ranges of its parameters truly."
+                                f"{faster:g}, although its barrier is not adhesive: by the declared ranges it cannot "
+                                "pull. Correct the ranges of its parameters."
                             )
-                        if (apart := code.derivative((-sign * depth, sign * faster))[1]) != 0:
-                            raise ConformanceError(f"{part!r} pushes with {apart:g}, {depth:g} away from the stop.")
+                        if (remote := code.derivative((-sign * depth, sign * faster))[1]) != 0:
+                            raise ConformanceError(
+                                f"{part!r} pushes with {remote:g} at a distance of {depth:g} from the stop."
+                            )
         return ""
-
-    def derivatives(self) -> str:
-        """Derivatives agree with differences of the force."""
-        worst = 0.0
-        for part, force in self.each():
-            formula = self.expression(part)
-            derived = [(orders, self.precise(part, derivative(formula, self.arguments, orders))) for orders in ORDERS]
-            worst = max(worst, check_derivatives(part, force, derived, self.points()))
-        return f"within {worst:.1g} of differences at 60 digits"
 
     # -- first touch ----------------------------------------------------------------------------------------------
 
     def jump(self) -> str:
-        """The force does not jump at first touch, unless the model says so."""
-        told = []
+        """The force does not jump at first touch unless the model derives a jump."""
+        results = []
         for part, force in self.each():
             may_jump = self.contact(part).jumps
-            told.append("jumps" if may_jump else "continuous")
+            results.append("jumps" if may_jump else "continuous")
             for rate in () if may_jump else self._rates():
                 at_touch = force(_NEAREST, rate)
                 if abs(at_touch) > 1e-12 * abs(force(1, rate)):
                     raise ConformanceError(
                         f"The force of {part!r} jumps to {mpmath.nstr(at_touch, 6)} at first touch at rate {rate:g}, "
-                        "but the model says that it is continuous there."
+                        "but the model derives a continuous force. Correct the ranges of its parameters."
                     )
-        return ", ".join(dict.fromkeys(told))
+        return ", ".join(dict.fromkeys(results))
 
     @staticmethod
     def _may_vanish(part: ContactLaw) -> bool:
-        """Whether a parameter is 0 and may be, so that a term of the formula is absent from this instance."""
+        """Whether a parameter has the allowed value 0, so that this instance may lack a term of the formula."""
         numbers = [d for d in part.declared() if not d.structural and part.parameters[d.name] == 0]
         return any(d.above is None or d.above < 0 for d in numbers)
 
     def leading_power(self) -> str:
-        """Near the stop the force goes like the derived power of depth."""
-        told = []
+        """Near the stop the force varies like the derived power of depth."""
+        results = []
         for part, force in self.each():
             exponent = self.contact(part).exponent
             if exponent is None or self._may_vanish(part):
@@ -157,30 +153,30 @@ class ContactLawChecks(PartChecks[ContactLaw]):
             rate = self._rates()[0]
             ratio = abs(force(_NEAREST, rate) / force(_NEAREST / 10, rate)) if force(_NEAREST, rate) else mpmath.inf
             found = float(mpmath.log10(ratio))
-            told.append(f"{float(exponent):g}")
+            results.append(f"{float(exponent):g}")
             if abs(found - float(exponent)) > 1e-6:
                 raise ConformanceError(
-                    f"The force of {part!r} goes like depth^{found:g} at first touch, but the model says "
-                    f"depth^{float(exponent):g}."
+                    f"The force of {part!r} varies like depth^{found:g} at first touch, but the model derives "
+                    f"depth^{float(exponent):g}. Correct the ranges of its parameters."
                 )
-        return ", ".join(dict.fromkeys(told)) or "none is claimed"
+        return ", ".join(dict.fromkeys(results)) or "unknown"
 
     def smoothness(self) -> str:
-        """Near the stop the force has a power series in depth, or in its root, if the model says so."""
-        told = []
+        """Near the stop the force has the derived power series, in depth or √depth."""
+        results = []
         for part, force in self.each():
             contact = self.contact(part)
-            told.append("none is claimed" if not contact.smooth else "√depth" if contact.rooted else "depth")
+            results.append("not smooth" if not contact.smooth else "√depth" if contact.rooted else "depth")
             if not contact.smooth:
                 continue
             for order in _ORDERS_AT_TOUCH:
                 slopes = [self._slope(force, order, size, rooted=contact.rooted) for size in (_NEARER, _NEAR)]
                 if abs(slopes[0]) > 30 * abs(slopes[1]) + 1e-9 * abs(force(1, 1)):
                     raise ConformanceError(
-                        f"The model says that the force of {part!r} is smooth in {told[-1]} at first touch, but its "
-                        f"derivative of order {order} grows without bound there."
+                        f"The model derives a force smooth in {results[-1]} at first touch for {part!r}, but its "
+                        f"derivative of order {order} is unbounded there. Correct the ranges of its parameters."
                     )
-        return ", ".join(dict.fromkeys(told))
+        return ", ".join(dict.fromkeys(results))
 
     @staticmethod
     def _slope(force: Function, order: int, size: Any, *, rooted: bool) -> Any:
@@ -195,64 +191,48 @@ class ContactLawChecks(PartChecks[ContactLaw]):
 
     # -- compiled code --------------------------------------------------------------------------------------------
 
-    def compiled(self) -> str:
-        """Force and derivatives as compiled agree with the formula, on both sides."""
-        worst = 0.0
-        for part in self.samples:
-            for side in ("right", "left"):
-                worst = max(worst, _CompiledSide(self, part, side).check())
-        return f"within {worst:.1g}"
+    def compiled_distances(self, part: ContactLaw) -> Iterator[float]:
+        """Compare force and derivatives on both sides."""
+        formula, clamped = self.expression(part), self.contact(part).clamped
+        for side, sign in _SIDES:
+            code, points = Compiled(_bare(part, side), Flow.HAMILTONIAN_VARIATIONAL), self.points()
+            references = {
+                orders: self.reference(part, derivative(formula, self.arguments, orders))
+                for orders in ((0, 0), *ORDERS)
+            }
+            law = references[0, 0]
+            for point in points:
+                yield law.check(f"the force of {part!r}", point, code.call("law", 0, *point))
+                force = law.exact(*point)
+                variants: list[tuple[Callable[[Any], Any], bool]]
+                variants = [(functools.partial(code.rhs, pushing=(on,)), on) for on in (True, False)]
+                if not clamped or abs(force) > law.bound(*point):  # otherwise rounding decides whether it pushes
+                    variants.append((code.derivative, not clamped or force > 0))
+                for rates, pushing in variants:
+                    yield from _rates_distances(part, references, sign, point, rates, pushing=pushing)
 
 
-class _CompiledSide:
-    """One law on one side: its compiled code, and the exact formulas that it is held against."""
-
-    def __init__(self, checks: ContactLawChecks, part: ContactLaw, side: str) -> None:
-        self.part, self.sign = part, 1 if side == "right" else -1
-        self.points = checks.points()
-        self.code = Compiled(_bare(part, side), Flow.HAMILTONIAN_VARIATIONAL)
-        self.clamped = checks.contact(part).clamped
-        formula, values = checks.expression(part), checks.values(part)
-        self.exact: dict[tuple[int, int], tuple[Function, Function]] = {}
-        for orders in ((0, 0), *ORDERS):
-            derived = derivative(formula, checks.arguments, orders)
-            bound = function(rounding(derived), checks.arguments, values)
-            self.exact[orders] = (function(derived, checks.arguments, values), bound)
-
-    def check(self) -> float:
-        """Return the largest relative distance."""
-        worst = 0.0
-        for depth, rate in self.points:
-            force, bound = (f(depth, rate) for f in self.exact[0, 0])
-            found = self.code.call("law", 0, depth, rate)
-            worst = max(worst, check_compiled(self.part, "the force", (depth, rate), found, force, bound))
-            pushing = not self.clamped or force > 0
-            if abs(force) > bound or not self.clamped:
-                worst = max(worst, self._check_rates(depth, rate, self.code.derivative, pushing=pushing))
-            for switch in (True, False):
-                worst = max(worst, self._check_rates(depth, rate, self._switched(switch), pushing=switch))
-        return worst
-
-    def _switched(self, switch: bool) -> Any:
-        return lambda z: self.code.rhs(z, (switch,))
-
-    def _check_rates(self, depth: float, rate: float, rates: Any, *, pushing: bool) -> float:
-        state = (self.sign * depth, self.sign * rate)
-        without, with_momentum = (rates(hamiltonian_start(state, p)) for p in (0.0, 1.0))
-        worst = 0.0
-        for orders, (exact, bound) in self.exact.items():
-            index, turned = (1, without) if orders == (0, 0) else (ENTRIES[orders], with_momentum)
-            # The force on the mass is −sign · law; p′ and the lower half of the matrix hold minus its derivatives.
-            sign = (-1 if orders == (0, 0) else 1) * self.sign ** (1 + sum(orders))
-            expected = exact(depth, rate) if pushing else mpmath.mpf(0)
-            what = f"the derivative of orders {orders}" if sum(orders) else "the guarded force"
-            found = sign * float(turned[index])
-            worst = max(worst, check_compiled(self.part, what, (depth, rate), found, expected, bound(depth, rate)))
-        return worst
+def _rates_distances(
+    part: ContactLaw,
+    references: Mapping[tuple[int, int], Reference],
+    sign: int,
+    point: tuple[float, ...],
+    rates: Callable[[Any], Any],
+    *,
+    pushing: bool,
+) -> Iterator[float]:
+    state = (sign * point[0], sign * point[1])
+    without, with_momentum = (rates(hamiltonian_start(state, momentum)) for momentum in (0.0, 1.0))
+    for orders, reference in references.items():
+        # The force on the mass is −sign · law; p′ and the lower half of the matrix hold minus its derivatives.
+        index, found, minus = (ENTRIES[orders], with_momentum, 1) if any(orders) else (1, without, -1)
+        factor = minus * sign ** (1 + sum(orders)) if pushing else 0
+        what = f"the derivative of orders {orders} of {part!r}"
+        yield reference.check(what, point, found[index], factor)
 
 
 def _bare(part: ContactLaw, side: Any) -> Oscillator:
-    """A scene in which nothing but a stop at 0 acts."""
+    """A scene with a stop at 0 and no other force."""
     return Oscillator(
         natural_frequency=1.0,
         damping_ratio=0.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import ClassVar
 
 import mpmath
@@ -14,13 +15,11 @@ from vibrokit.parts.spring.cubic import CubicSpring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import Compiled
-from vibrokit.testing.derivatives import check_compiled
 from vibrokit.testing.part_checks import PartChecks
-from vibrokit.testing.precise import rounding
 from vibrokit.testing.report import Check, ConformanceError
 
 _PERIODS = 10
-_SAME = 1e-12
+_SAME = 1e-12  # largest relative change of the force after a period
 
 
 class ExcitationChecks(PartChecks[Excitation]):
@@ -30,6 +29,7 @@ class ExcitationChecks(PartChecks[Excitation]):
     group = Group.EXCITATIONS
     arguments = (sympy.Symbol("t", real=True),)
     place = "excitations.0"
+    reach, count = 50.0, 20
 
     def physics(self) -> tuple[Check, ...]:
         return (
@@ -44,23 +44,12 @@ class ExcitationChecks(PartChecks[Excitation]):
     def part_in(self, scene: Oscillator) -> Excitation:
         return scene.excitations[0]
 
-    def points(self) -> list[tuple[float, ...]]:
-        """Random times."""
-        return [(float(time),) for time in self.rng.uniform(-50, 50, 20)]
-
-    def finite(self) -> str:
-        """The force is finite and real at all times, the start too."""
-        for _, force in self.each():
-            for point in [*self.points(), (0.0,)]:
-                force(*point)
-        return ""
-
     def period(self) -> str:
-        """The force repeats after `period`; without one it is constant; after an infinite one, it need not."""
-        told = []
+        """The force repeats after a finite `period`, and is constant if it is None."""
+        periods = []
         for part in self.samples:
             period = self._declared_period(part)
-            told.append("constant" if period is None else f"{period:.6g} s")
+            periods.append("constant" if period is None else f"{period:.6g} s")
             if period == math.inf:
                 continue
             force = self.precise(part)
@@ -70,13 +59,12 @@ class ExcitationChecks(PartChecks[Excitation]):
             for t in times:
                 change = abs(force(t + shift) - force(t))
                 if change > _SAME * size:
-                    claim = "says that it is constant" if period is None else f"gives {period:.10g} as its period"
                     raise ConformanceError(
-                        f"{part!r} {claim}, but its force changes by {mpmath.nstr(change, 6)} from t = "
-                        f"{mpmath.nstr(t, 6)} to {mpmath.nstr(t + shift, 6)}; return a time after which it repeats, "
-                        "or None if it never changes."
+                        f"{part!r} has the period {period}, but its force changes by {mpmath.nstr(change, 6)} from t = "
+                        f"{mpmath.nstr(t, 6)} to {mpmath.nstr(t + shift, 6)}; return a period of the force, or None if "
+                        "it is constant."
                     )
-        return ", ".join(dict.fromkeys(told))
+        return ", ".join(dict.fromkeys(periods))
 
     @staticmethod
     def _declared_period(part: Excitation) -> float | None:
@@ -86,27 +74,20 @@ class ExcitationChecks(PartChecks[Excitation]):
             raise ConformanceError(f"{part!r}.period raises {type(error).__name__}: {error}.") from error
         if period is not None and not (isinstance(period, (int, float)) and period > 0):
             raise ConformanceError(
-                f"{part!r}.period is {period!r}; return a positive number of seconds, None for a constant force, or "
-                "math.inf for one that never repeats."
+                f"{part!r}.period must be a positive number of seconds, None for a constant force, or math.inf for one "
+                f"that never repeats, got {period!r}."
             )
         return period
 
-    def compiled(self) -> str:
-        """The force as compiled agrees with the formula."""
-        worst = 0.0
-        for part, exact in self.each():
-            scene = Oscillator(
-                natural_frequency=1.0,
-                damping_ratio=0.0,
-                spring=CubicSpring(linear=0.0, cubic=0.0),
-                excitations=(part,),
-            )
-            code = Compiled(scene, Flow.STATE)
-            bound = self.precise(part, rounding(self.expression(part)))
-            for (time,) in self.points():
-                forcing = code.call("forcing", time) if code.offers("forcing") else 0.0
-                start = (0.0, 0.0)
-                for found in (code.derivative(start, forcing)[1], code.rhs(start, time=time)[1]):
-                    distance = check_compiled(part, "the force", time, float(found), exact(time), bound(time))
-                    worst = max(worst, distance)
-        return f"within {worst:.1g}"
+    def compiled_distances(self, part: Excitation) -> Iterator[float]:
+        scene = Oscillator(
+            natural_frequency=1.0,
+            damping_ratio=0.0,
+            spring=CubicSpring(linear=0.0, cubic=0.0),
+            excitations=(part,),
+        )
+        code, reference, start = Compiled(scene, Flow.STATE), self.reference(part), (0.0, 0.0)
+        for (time,) in self.points():
+            forcing = code.call("forcing", time) if code.has("forcing") else 0.0
+            for found in (code.derivative(start, forcing)[1], code.rhs(start, time=time)[1]):
+                yield reference.check(f"the force of {part!r}", (time,), found)

@@ -1,4 +1,4 @@
-"""Checks that every part must pass, whatever its kind."""
+"""Checks for parts of every kind."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.part import Part
 from vibrokit.registry import Group, name_of
 from vibrokit.scene_file import load_scene, save_scene
-from vibrokit.symbolic.formulas import ask
-from vibrokit.testing.elsewhere import outcome, outcomes_elsewhere
-from vibrokit.testing.precise import CLOSE, DIGITS, Function, apart, function, rounding
+from vibrokit.symbolic.formulas import derived_formula
+from vibrokit.testing.derivatives import ORDERS, Reference, check_derivatives, derivative
+from vibrokit.testing.other_process import outcome, outcomes_in_other_process
+from vibrokit.testing.precise import DIGITS, Function, function
 from vibrokit.testing.ranges import check_inside, check_refused, outside
-from vibrokit.testing.report import Check, ConformanceError, told
+from vibrokit.testing.report import Check, ConformanceError, guarded
 from vibrokit.testing.samples import samples
 
 P = TypeVar("P", bound=Part)
@@ -39,40 +40,42 @@ class PartChecks(ABC, Generic[P]):
     ----------
     part : Part, or a class of parts
     rng : int or numpy.random.Generator, optional
-        For the random parameters and points.
+        For random parameter values and points.
     """
 
     kind: ClassVar[type[Part]]
     group: ClassVar[Group]
     method: ClassVar[str] = "force"
     arguments: ClassVar[tuple[sympy.Symbol, ...]]
+    place: ClassVar[str]
+    """Path of the part in its scene."""
+    reach: ClassVar[float] = 2.0
+    count: ClassVar[int] = 12
+    """Range and number of random points."""
 
     def __init__(self, part: P | type[P], rng: Rng = 0) -> None:
         cls = part if isinstance(part, type) else type(part)
         if not issubclass(cls, self.kind):
-            raise TypeError(f"{part!r} is no {self.kind.__name__}; give an instance or a subclass of it.")
+            raise TypeError(f"part must be an instance or a subclass of {self.kind.__name__}, got {part!r}.")
         self.part = part
         self.cls = cls
         self.rng = np.random.default_rng(rng)
 
     def checks(self) -> tuple[Check, ...]:
         """Every check, as (name, function)."""
-        general = (
+        checks = (
             Check("construction", self.construction),
             Check("symbols and units", self.declared),
             Check("ranges", self.ranges),
             Check("formula", self.formula),
             Check("numbers as symbols", self.numbers),
-        )
-        return tuple(Check(name, told(make)) for name, make in (*general, *self.physics(), *self._travels()))
-
-    def _travels(self) -> tuple[Check, ...]:
-        return (
+            *self.physics(),
             Check("frozen", self.frozen),
             Check("pickle", self.pickled),
             Check("parameters and back", self.round_trip),
-            Check("another process", self.elsewhere),
+            Check("another process", self.other_process),
         )
+        return tuple(Check(name, guarded(perform)) for name, perform in checks)
 
     @abstractmethod
     def physics(self) -> tuple[Check, ...]:
@@ -80,29 +83,33 @@ class PartChecks(ABC, Generic[P]):
 
     @abstractmethod
     def scene(self, part: P) -> Oscillator:
-        """A small scene in which the part acts."""
+        """A small scene that contains the part."""
 
     @abstractmethod
+    def part_in(self, scene: Oscillator) -> P:
+        """The checked part of a scene."""
+
+    @abstractmethod
+    def compiled_distances(self, part: P) -> Iterator[float]:
+        """Compare compiled code with the formula; yield relative distances."""
+
     def points(self) -> list[tuple[float, ...]]:
         """Random arguments of the formula."""
+        return [
+            tuple(map(float, p)) for p in self.rng.uniform(-self.reach, self.reach, (self.count, len(self.arguments)))
+        ]
 
     @cached_property
     def samples(self) -> tuple[P, ...]:
-        """Instances with random parameters."""
+        """Instances with random parameter values."""
         return samples(self.part, self.rng)  # type: ignore[return-value]
 
-    # -- what follows from a formula ------------------------------------------------------------------------------
+    # -- formulas -------------------------------------------------------------------------------------------------
 
     def symbols(self, part: P) -> dict[str, sympy.Symbol]:
-        """A symbol for each parameter that is a number, with the assumptions that its range allows."""
+        """A symbol for each numeric parameter, with the assumptions that its range allows."""
         model = self.scene(part).model
-        place = self.place
-        return {d.name: model.symbols[f"{place}.{d.name}"] for d in part.declared() if not d.structural}
-
-    @property
-    @abstractmethod
-    def place(self) -> str:
-        """Path of the part in its scene."""
+        return {d.name: model.symbols[f"{self.place}.{d.name}"] for d in part.declared() if not d.structural}
 
     def values(self, part: P) -> dict[sympy.Symbol, float]:
         """Value of each symbol."""
@@ -110,41 +117,44 @@ class PartChecks(ABC, Generic[P]):
 
     def expression(self, part: P) -> sympy.Expr:
         """The formula of a part."""
-        return ask(part, self.method, self.symbols(part), self.arguments)
+        return derived_formula(part, self.method, self.symbols(part), self.arguments)
 
     def precise(self, part: P, formula: sympy.Expr | None = None) -> Function:
-        """The formula, or one that was derived from it, as a function at sixty digits."""
+        """The formula of a part, or another in its symbols, as a function at sixty digits."""
         return function(self.expression(part) if formula is None else formula, self.arguments, self.values(part))
+
+    def reference(self, part: P, formula: sympy.Expr | None = None) -> Reference:
+        """As `precise`, with a bound on rounding errors."""
+        return Reference(self.expression(part) if formula is None else formula, self.arguments, self.values(part))
 
     def each(self) -> Iterator[tuple[P, Function]]:
         """Each sample with its formula."""
         for part in self.samples:
             yield part, self.precise(part)
 
-    # -- the checks -----------------------------------------------------------------------------------------------
+    # -- checks of every part -------------------------------------------------------------------------------------
 
     def construction(self) -> str:
-        """The class can be made from any values that its declared ranges allow."""
+        """The class accepts any values in its declared ranges."""
         return f"{len(self.samples)} sets of parameters"
 
     def declared(self) -> str:
-        """Every parameter has a symbol that can stand in code, and a unit."""
+        """Every parameter has a unit, and a symbol that is valid in code."""
         for declared in self.samples[0].declared():
+            name = f"{self.cls.__name__}.{declared.name}"
             if declared.unit is None:
                 raise ConformanceError(
-                    f"{self.cls.__name__}.{declared.name} has no unit; declare it with parameter(symbol, unit), "
-                    'where the unit "" is dimensionless.'
+                    f'{name} has no unit; declare it with parameter(symbol, unit), with unit "" if dimensionless.'
                 )
             symbol = declared.symbol
             if not symbol.isidentifier() or (keyword.iskeyword(symbol) and symbol != "lambda"):
                 raise ConformanceError(
-                    f"{self.cls.__name__}.{declared.name} has the symbol {symbol!r}, which is no name; give a letter "
-                    'or a word as SymPy writes it, such as "k" or "omega".'
+                    f'{name}: symbol must be a name that SymPy can print, such as "k" or "omega", got {symbol!r}.'
                 )
         return ", ".join(f"{d.symbol} [{d.unit or '1'}]" for d in self.samples[0].declared() if not d.structural)
 
     def ranges(self) -> str:
-        """Values are kept as given, and those outside the declared range are refused."""
+        """Values in the declared range are kept, and values outside it are refused."""
         count = 0
         for part in self.samples:
             for declared in part.declared():
@@ -158,30 +168,30 @@ class PartChecks(ABC, Generic[P]):
         return f"{count} wrong values refused"
 
     def formula(self) -> str:
-        """The formula is made of arguments and parameters only."""
+        """The formula has no symbols other than its arguments and parameters."""
         return "; ".join(dict.fromkeys(str(self.expression(part)) for part in self.samples))
 
     def numbers(self) -> str:
-        """The formula gives for numbers what it gives for symbols: it does not ask which of them it was given."""
+        """The formula has the same value for numbers as for symbols."""
         worst = 0.0
-        for part, exact in self.each():
+        for part in self.samples:
             values = {d.name: _as_number(part.parameters[d.name]) for d in part.declared()}
-            bound = self.precise(part, rounding(self.expression(part)))
+            reference = self.reference(part)
             for point in self.points():
                 given = [sympy.Float(number, DIGITS) for number in point]
                 found = sympy.sympify(getattr(part.twin(values), self.method)(*given)).evalf(DIGITS)
-                right = exact(*point)
-                worst = max(worst, distance := apart(mpmath.mpmathify(found), right))
-                if distance > CLOSE and not abs(mpmath.mpmathify(found) - right) <= bound(*point):
+                distance, accepted = reference.compare(point, mpmath.mpmathify(found))
+                worst = max(worst, distance)
+                if not accepted:
                     raise ConformanceError(
-                        f"{part!r} gives {mpmath.nstr(found, 17)} for the numbers {point}, but its formula for "
-                        f"symbols, {self.expression(part)}, gives {mpmath.nstr(right, 17)} there; write one formula "
-                        "for all values, without asking what an argument or a field is."
+                        f"{part!r} returns {mpmath.nstr(found, 17)} for the numbers {point}, but "
+                        f"{mpmath.nstr(reference.exact(*point), 17)} from its formula for symbols, "
+                        f"{self.expression(part)}; write a formula that does not depend on the type of an argument."
                     )
         return f"within {worst:.1g}"
 
     def frozen(self) -> str:
-        """A part cannot be changed; equal parts are one key of a dict."""
+        """A part cannot be changed, and equal parts have the same hash."""
         for part in self.samples:
             twin = type(part)(**part.parameters) if self._remakes(part) else copy.copy(part)
             for field in dataclasses.fields(part):  # type: ignore[arg-type]
@@ -189,13 +199,15 @@ class PartChecks(ABC, Generic[P]):
                     setattr(twin, field.name, None)
                 except AttributeError:
                     continue
-                raise ConformanceError(f"{part!r} lets its field {field.name!r} be changed; parts must be frozen.")
+                raise ConformanceError(f"The field {field.name!r} of {part!r} can be changed; parts must be frozen.")
             try:
                 same = twin == part and hash(twin) == hash(part)
             except TypeError as error:
-                raise ConformanceError(f"{part!r} cannot be hashed ({error}); hold tuples, not lists.") from error
+                raise ConformanceError(f"{part!r} has no hash ({error}); use tuples instead of lists.") from error
             if not same:
-                raise ConformanceError(f"{part!r} differs from its own copy, in == or in hash; write neither by hand.")
+                raise ConformanceError(
+                    f"A copy of {part!r} is not equal to it or has another hash; do not define __eq__ or __hash__."
+                )
         return ""
 
     @staticmethod
@@ -207,7 +219,7 @@ class PartChecks(ABC, Generic[P]):
         return True
 
     def pickled(self) -> str:
-        """A part comes back from pickling as it was."""
+        """Pickling preserves a part."""
         for part in self.samples:
             try:
                 again = pickle.loads(pickle.dumps(part))
@@ -217,11 +229,11 @@ class PartChecks(ABC, Generic[P]):
                     "of a module."
                 ) from error
             if again != part or again.parameters != part.parameters:
-                raise ConformanceError(f"{part!r} comes back from pickling as {again!r}.")
+                raise ConformanceError(f"Pickling changes {part!r} into {again!r}.")
         return ""
 
     def round_trip(self) -> str:
-        """A part comes back from its parameters and, if its class is registered, from a scene file."""
+        """A part can be made again from its parameters and, if its class is registered, from a scene file."""
         registered = ":" not in name_of(self.group, self.cls)
         for part in self.samples:
             try:
@@ -232,10 +244,10 @@ class PartChecks(ABC, Generic[P]):
                     f"{error}); let the constructor take the parameters by their names."
                 ) from error
             if again != part:
-                raise ConformanceError(f"{part!r} comes back from its own parameters as {again!r}.")
+                raise ConformanceError(f"{part!r}, made again from its own parameters, becomes {again!r}.")
             if registered:
                 self._check_scene_file(part)
-        return "scene file too" if registered else "not registered, so in no scene file"
+        return "also from a scene file" if registered else "no scene file, because the class is not registered"
 
     def _check_scene_file(self, part: P) -> None:
         scene = self.scene(part)
@@ -244,28 +256,46 @@ class PartChecks(ABC, Generic[P]):
             save_scene(scene, path)
             again = load_scene(path)
         if again != scene:
-            raise ConformanceError(f"A scene file gives back {again!r} for {scene!r}.")
+            raise ConformanceError(f"A scene file changes {scene!r} into {again!r}.")
 
-    def elsewhere(self) -> str:
+    def other_process(self) -> str:
         """Another process derives the same code from the part, and computes the same bits."""
         if self.cls.__module__ == "__main__":
-            return "not told: the class is defined in the main script, which no other process can import"
+            return "not checked: another process cannot import a class that is defined in the main script"
         scenes = [self.scene(part) for part in self.samples]
         for scene in scenes:
             self.expression(self.part_in(scene))
-        for scene, there in zip(scenes, outcomes_elsewhere(scenes), strict=True):
+        for scene, there in zip(scenes, outcomes_in_other_process(scenes), strict=True):
             here = outcome(scene)
             if here != there:
                 what = "numbers" if here[0] == there[0] else "code"
                 raise ConformanceError(
-                    f"Another process has other {what} for {self.part_in(scene)!r}; let its formula depend on its "
-                    "fields alone, not on the hash of a text, the time, or the process."
+                    f"Another process has other {what} for {self.part_in(scene)!r}; let its formula depend only on its "
+                    "fields, not on the hash of a text, the time or the process."
                 )
         return f"{len(scenes)} scenes, same bits"
 
-    @abstractmethod
-    def part_in(self, scene: Oscillator) -> P:
-        """The part that a scene was made for."""
+    # -- checks for several kinds ---------------------------------------------------------------------------------
+
+    def finite(self) -> str:
+        """The formula is finite and real at random points and at zero."""
+        for _, value in self.each():
+            for point in [*self.points(), (0.0,) * len(self.arguments)]:
+                value(*point)
+        return ""
+
+    def derivatives(self) -> str:
+        """Derivatives agree with finite differences of the formula."""
+        worst = 0.0
+        for part, value in self.each():
+            formula = self.expression(part)
+            derived = [(orders, self.precise(part, derivative(formula, self.arguments, orders))) for orders in ORDERS]
+            worst = max(worst, check_derivatives(part, value, derived, self.points()))
+        return f"within {worst:.1g} of differences at 60 digits"
+
+    def compiled(self) -> str:
+        """Compiled code agrees with the formula."""
+        return f"within {max(max(self.compiled_distances(part)) for part in self.samples):.1g}"
 
 
 def _as_number(value: Any) -> Any:

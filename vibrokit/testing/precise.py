@@ -1,4 +1,4 @@
-"""Formulas at sixty digits, and differences of them: what derivatives and compiled code are held against."""
+"""Formulas and finite differences at sixty digits, as references for derivatives and compiled code."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from vibrokit.testing.report import ConformanceError
 
 DIGITS = 60
 CLOSE = 1e-12
-_STEP = mpmath.mpf("1e-10")  # relative; a central difference errs by its square, rounding by 1e-60 over it
+_STEP = mpmath.mpf("1e-10")  # relative; errors of a central difference: its square, and rounding, 1e-60 divided by it
 _EPSILON = 2.0**-52
-_ROUNDINGS = 64  # of a formula's every operation, that compiled code may add up
+_ROUNDINGS = 64  # allowed per operation of a formula
 _FUNCTIONS = {"Max": max, "Min": min, "Abs": abs, "sign": mpmath.sign}
 
 Function = Callable[..., Any]
@@ -29,12 +29,12 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
     formula : Expr
     arguments : sequence of Symbol
     values : mapping of Symbol to float
-        Of the parameters.
+        Values of the parameters.
 
     Returns
     -------
     callable
-        What it returns is an mpmath number; it raises ConformanceError where the formula has no finite real value.
+        Returns an mpmath number, and raises ConformanceError where the formula has no finite real value.
     """
     raw = sympy.lambdify([*arguments, *values], formula, modules=[_FUNCTIONS, "mpmath"])
 
@@ -51,8 +51,8 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
                 place = ", ".join(f"{a} = {mpmath.nstr(p, 6)}" for a, p in zip(arguments, point, strict=True))
                 shown = {str(symbol): number for symbol, number in values.items()}
                 raise ConformanceError(
-                    f"The formula {formula} is {mpmath.nstr(value, 6)} at {place}, with {shown}; it must be finite "
-                    "and real."
+                    f"The formula {formula} must be finite and real, got {mpmath.nstr(value, 6)} at {place} with "
+                    f"{shown}."
                 )
             return mpmath.re(value)
 
@@ -67,9 +67,9 @@ def difference(of: Function, point: Sequence[float], orders: Sequence[int], size
     of : callable
     point : sequence of float
     orders : sequence of int
-        Times that each argument is differentiated, 0 to 2.
+        Order of differentiation in each argument, 0 to 2.
     sizes : sequence of float
-        Scale of each argument, of which the steps are 1e-10.
+        Scale of each argument; steps are 1e-10 times it.
     """
     with mpmath.workdps(DIGITS):
         weights: list[tuple[Any, list[Any]]] = [(mpmath.mpf(1), [])]
@@ -85,9 +85,9 @@ def difference(of: Function, point: Sequence[float], orders: Sequence[int], size
 
 
 def rounding(formula: sympy.Expr) -> sympy.Expr:
-    """Return what a double-precision evaluation of a formula may err by, to first order, as a formula again.
+    """Return a first-order bound on the error of evaluating a formula in double precision, as a formula.
 
-    Every operation rounds, and passes on what its operands erred by: cancellation is no mistake of a compiler.
+    Every operation rounds and propagates the errors of its operands, so cancellation is included.
     """
     return sympy.Float(_ROUNDINGS * _EPSILON) * _in_roundings(formula)
 
@@ -116,8 +116,8 @@ def _in_roundings(node: sympy.Expr) -> sympy.Expr:
     return abs(node) + sum(passed_on)
 
 
-def apart(found: Any, exact: Any) -> float:
-    """Relative distance of two numbers; 0 where neither is more than 1e-300."""
+def relative_distance(found: Any, exact: Any) -> float:
+    """Relative distance of two numbers; 0 if both are below 1e-300 in size."""
     if not mpmath.isfinite(found):
         return math.inf
     with mpmath.workdps(DIGITS):

@@ -1,4 +1,4 @@
-"""Do constructors hold to the ranges that parameters declare?"""
+"""Checks that constructors enforce the declared ranges of parameters."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from vibrokit.testing.report import ConformanceError
 
 
 def check_inside(owner: str, declared: Parameter, value: Any) -> None:
-    """Raise ConformanceError if a part holds a value that its parameter may not have."""
+    """Raise ConformanceError if a part holds a value outside the range of its parameter."""
     try:
         declared.checked(owner, value)
     except VibrokitError as error:
-        raise ConformanceError(f"{error} The instance holds it all the same: call super().__post_init__().") from error
+        raise ConformanceError(f"{error} The constructor accepted it; call super().__post_init__().") from error
 
 
 def outside(declared: Parameter) -> list[Any]:
-    """Values that a parameter must not have."""
+    """Values outside the range of a parameter."""
     wrong: list[Any] = [math.nan, math.inf, "1", None]
     wrong += [] if declared.minimum is None else [declared.minimum - 1.0]
     wrong += [] if declared.above is None else [declared.above]
@@ -28,14 +28,16 @@ def outside(declared: Parameter) -> list[Any]:
 
 
 def check_refused(part: Part, declared: Parameter, wrong: Any) -> None:
-    """Raise ConformanceError unless the constructor refuses a value with a sentence."""
+    """Raise ConformanceError unless the constructor refuses a value with an error of the toolkit."""
     try:
         made = type(part)(**(part.parameters | {declared.name: wrong}))
     except VibrokitError:
         return
     except Exception as error:
         raise ConformanceError(
-            f"{type(part).__name__} with {declared.name} = {wrong!r} raises {type(error).__name__}: {error}; let the "
-            "range check refuse it with a sentence, before anything is computed."
+            f"{type(part).__name__} with {declared.name} = {wrong!r} raises {type(error).__name__}: {error}; check the "
+            "range first, so that a ParameterError is raised."
         ) from error
-    raise ConformanceError(f"{made!r} was made, though {declared.name} must be {declared.allowed}.")
+    raise ConformanceError(
+        f"The constructor must refuse {declared.name} = {wrong!r} (allowed: {declared.allowed}), but made {made!r}."
+    )

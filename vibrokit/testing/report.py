@@ -1,4 +1,4 @@
-"""What a conformance check says: one sentence for each thing that does not hold."""
+"""Results of conformance checks."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from vibrokit.errors import VibrokitError
 
 
 class ConformanceError(AssertionError):
-    """A part does not behave as parts must; the text says in sentences what does not hold."""
+    """A part fails a conformance check; the message says which requirement it violates."""
 
 
 class Check(NamedTuple):
-    """One check of one part, a pair: its name, and a function that makes it.
+    """One check of one part: its name, and the function that performs it.
 
-    The function returns a remark (what was measured), or raises ConformanceError.
+    The function returns a remark (a measured value), or raises ConformanceError.
     """
 
     name: str
-    make: Callable[[], str]
+    perform: Callable[[], str]
 
 
 @dataclasses.dataclass(frozen=True)
-class Finding:
-    """What came of one check.
+class Outcome:
+    """Result of one check.
 
     Attributes
     ----------
     subject : str
-        The part that was checked.
+        The checked part.
     name : str
     passed : bool
     text : str
-        What was measured, or what does not hold.
+        The remark of the check, or the reason of its failure.
     """
 
     subject: str
@@ -51,43 +51,43 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Report:
-    """What came of all checks of one part, or of several of one name.
+    """Results of all checks of one part, or of all parts of one name.
 
     Attributes
     ----------
-    findings : tuple of Finding
+    outcomes : tuple of Outcome
     """
 
-    findings: tuple[Finding, ...]
+    outcomes: tuple[Outcome, ...]
 
     @property
     def passed(self) -> bool:
-        """True if everything held."""
-        return all(finding.passed for finding in self.findings)
+        """True if every check passed."""
+        return all(outcome.passed for outcome in self.outcomes)
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Each part that was checked, and under it one line for each check."""
+        """A heading for each checked part, followed by one line per check."""
         lines: list[str] = []
         subject = None
-        for finding in self.findings:
-            if finding.subject != subject:
-                subject = finding.subject
+        for outcome in self.outcomes:
+            if outcome.subject != subject:
+                subject = outcome.subject
                 lines.append(subject)
-            lines.append(f"  {finding.line}")
+            lines.append(f"  {outcome.line}")
         return tuple(lines)
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
 
 
-def told(make: Callable[[], str]) -> Callable[[], str]:
-    """Return a check that fails with a sentence, whatever the part does."""
+def guarded(perform: Callable[[], str]) -> Callable[[], str]:
+    """Return a check that raises ConformanceError whatever exception the part raises."""
 
-    @functools.wraps(make)
-    def made() -> str:
+    @functools.wraps(perform)
+    def performed() -> str:
         try:
-            return make()
+            return perform()
         except ConformanceError:
             raise
         except VibrokitError as error:
@@ -95,27 +95,27 @@ def told(make: Callable[[], str]) -> Callable[[], str]:
         except Exception as error:
             raise ConformanceError(f"The part raised {type(error).__name__}: {error}.") from error
 
-    return made
+    return performed
 
 
-def make_all(subject: str, checks: Iterable[Check]) -> Report:
-    """Make every check; one failure does not hide the others, but its consequences are not told twice."""
-    findings: list[Finding] = []
-    told: dict[str, str] = {}
-    for name, make in checks:
+def run_checks(subject: str, checks: Iterable[Check]) -> Report:
+    """Perform every check; a failure with the same message as an earlier one refers to that one."""
+    outcomes: list[Outcome] = []
+    first_with: dict[str, str] = {}
+    for name, perform in checks:
         try:
-            findings.append(Finding(subject, name, True, make()))
+            outcomes.append(Outcome(subject, name, True, perform()))
         except ConformanceError as error:
-            first = told.setdefault(str(error), name)
-            text = str(error) if first == name else f"cannot be told before {first!r} holds."
-            findings.append(Finding(subject, name, False, text))
-    return Report(tuple(findings))
+            first = first_with.setdefault(str(error), name)
+            text = str(error) if first == name else f"not checked, because {first!r} failed."
+            outcomes.append(Outcome(subject, name, False, text))
+    return Report(tuple(outcomes))
 
 
 def raise_failures(report: Report) -> Report:
-    """Return a report in which everything held, or raise ConformanceError with what did not."""
-    failed = [f"{finding.name}: {finding.text}" for finding in report.findings if not finding.passed]
+    """Return a report if every check passed; otherwise raise ConformanceError with all failures."""
+    failed = [f"{outcome.name}: {outcome.text}" for outcome in report.outcomes if not outcome.passed]
     if failed:
-        count = f"{len(failed)} of {len(report.findings)} checks"
-        raise ConformanceError("\n".join([f"{report.findings[0].subject}, fails {count}.", *failed]))
+        count = f"{len(failed)} of {len(report.outcomes)} checks"
+        raise ConformanceError("\n".join([f"{report.outcomes[0].subject}, fails {count}.", *failed]))
     return report

@@ -1,11 +1,10 @@
-"""Random valid instances of a part, drawn from the ranges that its parameters declare."""
+"""Random instances of a part, with values from the declared ranges of its parameters."""
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,14 +16,12 @@ from vibrokit.parts.part import Part
 from vibrokit.parts.spring.custom import CustomSpring
 from vibrokit.testing.report import ConformanceError
 
-P = TypeVar("P", bound=Part)
-
 _SAMPLES = 3
 _ATTEMPTS = 100
 _SMALLEST, _LARGEST = 0.1, 100.0
-_EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 1.25, 0.5)  # what structural numbers usually are
+_EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 1.25, 0.5)  # usual values of structural numbers
 
-# A class whose parameters include a formula cannot be drawn at random; these stand for it.
+# Instances of classes with a formula, which cannot be drawn at random.
 REPRESENTATIVES: dict[type[Part], Callable[[], Part]] = {
     CustomLaw: lambda: CustomLaw("k*depth**1.5*(1 + c*rate) + k*tanh(depth)/3", k=50.0, c=0.1),
     CustomSpring: lambda: CustomSpring("x + e*x**5 + d*v**3 + sin(x)/2", e=0.2, d=0.1),
@@ -35,26 +32,27 @@ REPRESENTATIVES: dict[type[Part], Callable[[], Part]] = {
 def samples(part: Part | type[Part], rng: np.random.Generator) -> tuple[Part, ...]:
     """Return instances to check.
 
-    Of a class: several, with random parameters. Of an instance: itself, then copies of it whose parameters are
-    drawn anew where they declare a range; where they declare none, its own values are the only ones known to be
-    meant.
+    For a class: several, with random parameter values, the first with its default values. For an instance: itself, then
+    copies with random values of the parameters that declare a range; for others, only its own values are known to be
+    meaningful.
 
     Raises
     ------
     ConformanceError
-        The class refuses what its declared ranges allow.
+        The class refuses values in its declared ranges.
     """
     if isinstance(part, type):
-        represented = REPRESENTATIVES.get(part)
-        if represented is not None:
-            return samples(represented(), rng)
-        return tuple(_drawn(part, rng, usual=index == 0) for index in range(_SAMPLES))
-    again = (_redrawn(part, rng) for _ in range(_SAMPLES - 1))
-    return (part, *again) if any(map(_has_range, part.declared())) else (part,)
+        if part in REPRESENTATIVES:
+            return samples(REPRESENTATIVES[part](), rng)
+        required = _required(part)
+        return tuple(_drawn(part, part, required if index == 0 else part._declared, rng) for index in range(_SAMPLES))
+    ranged = [declared for declared in part.declared() if _has_range(declared)]
+    again = (_drawn(type(part), part.replace, ranged, rng) for _ in range(_SAMPLES - 1))
+    return (part, *again) if ranged else (part,)
 
 
 def value_for(declared: Parameter, rng: np.random.Generator) -> float:
-    """Draw a value that a parameter may have: of moderate size, never just on the edge of its range."""
+    """Draw a value in the range of a parameter, of moderate size and not at the lower end."""
     if declared.structural:
         fitting = [value for value in _EXPONENTS if _allowed(declared, value)]
         if fitting:
@@ -83,48 +81,35 @@ def _has_range(declared: Parameter) -> bool:
     return not declared.structural and any(bound is not None for bound in bounds)
 
 
-def _drawn(cls: type[Part], rng: np.random.Generator, *, usual: bool) -> Part:
-    """An instance with random parameters; if `usual`, defaults are left as they are."""
+def _required(cls: type[Part]) -> list[Parameter]:
+    """Parameters without default values."""
     accepted = inspect.signature(cls).parameters
-    values: dict[str, Any] = {}
     for declared in cls._declared:
         if declared.name not in accepted:
             raise ConformanceError(
-                f"The constructor of {cls.__name__} has no argument {declared.name!r}, though the class declares that "
-                "parameter; let the dataclass write the constructor, or take an argument of that name."
+                f"The constructor of {cls.__name__} has no argument {declared.name!r}, which the class declares; "
+                "use the constructor of the dataclass, or add the argument."
             )
-        if not (usual and accepted[declared.name].default is not inspect.Parameter.empty):
-            values[declared.name] = value_for(declared, rng)
-    return _made(lambda: cls(**values), cls, values, lambda: _drawn_again(cls, values, rng))
+    return [d for d in cls._declared if accepted[d.name].default is inspect.Parameter.empty]
 
 
-def _drawn_again(cls: type[Part], values: dict[str, Any], rng: np.random.Generator) -> None:
-    values.update({d.name: value_for(d, rng) for d in cls._declared if d.name in values})
-
-
-def _redrawn(part: Part, rng: np.random.Generator) -> Part:
-    changes: dict[str, Any] = {}
-
-    def draw() -> None:
-        changes.update({d.name: value_for(d, rng) for d in part.declared() if _has_range(d)})
-
-    draw()
-    return _made(lambda: part.replace(**changes), type(part), changes, draw)
-
-
-def _made(make: Callable[[], P], cls: type, values: dict[str, Any], draw: Callable[[], None]) -> P:
+def _drawn(
+    cls: type[Part], make: Callable[..., Part], parameters: Sequence[Parameter], rng: np.random.Generator
+) -> Part:
+    """Make an instance with random values of some parameters; repeat while the part refuses the combination."""
+    refusal = ""
     for _ in range(_ATTEMPTS):
+        values = {declared.name: value_for(declared, rng) for declared in parameters}
         try:
-            return make()
-        except VibrokitError as error:  # parameters may have to fit together
+            return make(**values)
+        except VibrokitError as error:
             refusal = str(error)
-            draw()
         except Exception as error:
             raise ConformanceError(
-                f"{cls.__name__} cannot be made from {values}: {type(error).__name__}: {error}. The ranges that its "
-                "parameters declare allow these values; if one is a text, give an instance to be checked."
+                f"{cls.__name__} cannot be made from {values}, which its declared ranges allow "
+                f"({type(error).__name__}: {error}); if a parameter is a text, check an instance."
             ) from error
     raise ConformanceError(
-        f"{cls.__name__} refused {_ATTEMPTS} random sets of values that its parameters' ranges allow, at last with: "
-        f"{refusal} Declare the range that is meant."
+        f"{cls.__name__} refused {_ATTEMPTS} random sets of values in its declared ranges, the last with: {refusal} "
+        "Declare narrower ranges."
     )

@@ -1,8 +1,9 @@
-"""Work and precision of basin grids on one scene: what a cell costs, and how many are wrong."""
+"""Work and precision of basin grids on one scene: the time per cell, and how many cells are wrong."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 import warnings
 
@@ -10,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import CoarseStepsWarning
-from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.structure import Structure
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.grid import classify_grid
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.text_table import text_table
 
+_HEADINGS = ("stepper", "margin", "wrong cells", "basin shift", "per cell (µs)", "")
 MARGINS: tuple[int | None, ...] = (1, 2, 3, None)
 _DEFAULT_MARGIN = 2
 
@@ -29,15 +33,15 @@ class BasinRow:
     Attributes
     ----------
     stepper : str
-        What carried the cells.
+        What integrated the cells.
     margin : int or None
-        Cells on every side that must agree before one answers for what enters it; None: every cell is followed.
+        Cells on every side that must agree before a cell decides for what enters it; None: every cell is followed.
     wrong : float
-        Share of the cells of which the label differs from the reference's.
+        Share of the cells whose label differs from the reference's.
     shift : float
         Largest change of a basin's share of the region.
     seconds : float
-        Time per cell, all threads at work.
+        Time per cell on all threads (s).
     default : bool
         Whether this is what `find_structure` does.
     """
@@ -71,14 +75,15 @@ class BasinTrade:
         lines = [
             f"Basins on {self.cells[0]} × {self.cells[1]} cells, against {self.reference} with every cell followed.",
             "",
-            "carrier                       margin  wrong cells  basin shares  per cell (µs)",
+            *text_table([_HEADINGS, *map(_line, self.rows)]),
         ]
-        for row in self.rows:
-            margin = "none" if row.margin is None else str(row.margin)
-            mark = "  ← default" if row.default else ""
-            line = f"{row.stepper:<28}  {margin:<6}  {100 * row.wrong:<9.3f} %  {row.shift:<12.1e}  "
-            lines.append(f"{line}{1e6 * row.seconds:<11.3g}{mark}".rstrip())
         return "\n".join(lines)
+
+
+def _line(row: BasinRow) -> tuple[str, ...]:
+    margin = "none" if row.margin is None else str(row.margin)
+    numbers = f"{100 * row.wrong:.3f} %", f"{row.shift:.1e}", f"{1e6 * row.seconds:.3g}"
+    return (row.stepper, margin, *numbers, "← default" if row.default else "")
 
 
 def measure_basins(
@@ -86,7 +91,7 @@ def measure_basins(
     *,
     cells: tuple[int, int] = (80, 80),
     margins: tuple[int | None, ...] = MARGINS,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> BasinTrade:
     """Measure time and error of the basin grid over steps and margins, for the attractors that the scene has.
 
@@ -96,8 +101,7 @@ def measure_basins(
     cells : (int, int)
     margins : tuple of int or None
         Given to `find_structure` as `margin`.
-    progress : callable, optional
-        Called with (settings done, settings in all).
+    progress : bool or callable, optional
 
     Returns
     -------
@@ -108,35 +112,35 @@ def measure_basins(
     StructureError
         The scene has no attractors.
     """
-    structure = find_structure(osc, cells=(2, 2), saddles=False)
-    carrier = named_stepper(structure.stepper)
-    ladder = [carrier.coarsened().coarsened(), carrier.coarsened(), carrier, carrier.refined()]
-    settings = [(stepper, margin) for stepper in ladder for margin in margins]
-    report = progress or (lambda done, total: None)
-    finest = carrier.refined().refined()
-    report(0, len(settings) + 1)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are what is measured here
-        reference = _labelled(osc, structure, finest, cells, None)[0]
+    with working(progress), warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose
+        structure = find_structure(osc, cells=(2, 2), saddles=False)
+        chosen = named_stepper(structure.stepper)
+        ladder = [chosen.coarsened().coarsened(), chosen.coarsened(), chosen, chosen.refined()]
+        finest = chosen.refined().refined()
         rows = []
-        for done, (stepper, margin) in enumerate(settings, start=1):
-            report(done, len(settings) + 1)
-            labels, seconds = _labelled(osc, structure, stepper, cells, margin)
-            default = stepper == carrier and margin == _DEFAULT_MARGIN
-            wrong = float(np.mean(labels != reference))
-            rows.append(BasinRow(repr(stepper), margin, wrong, _shift(labels, reference), seconds, default))
-    report(len(settings) + 1, len(settings) + 1)
+        with stage("basin grids", unit="settings", total=len(ladder) * len(margins) + 1):
+            reference = _labelled(osc, structure, finest, cells, None)[0]
+            advance()
+            for stepper, margin in itertools.product(ladder, margins):
+                labels, seconds = _labelled(osc, structure, stepper, cells, margin)
+                default = stepper == chosen and margin == _DEFAULT_MARGIN
+                wrong = float(np.mean(labels != reference))
+                rows.append(BasinRow(repr(stepper), margin, wrong, _shift(labels, reference), seconds, default))
+                advance()
     return BasinTrade(tuple(rows), cells, repr(finest))
 
 
 def _labelled(
     osc: Oscillator, structure: Structure, stepper: Stepper, cells: tuple[int, int], margin: int | None
 ) -> tuple[NDArray[np.int16], float]:
-    """Labels of a grid, and the seconds that each cell took; once before the clock starts, for what is compiled."""
-    settler = Settler(osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper)
-    settle_grid(settler, (2, 2), margin=margin)
+    """Labels of a grid and the time per cell (s); a small grid is run before, so that compilation is not timed."""
+    classifier = BasinClassifier(
+        osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper
+    )
+    classify_grid(classifier, (2, 2), margin=margin)
     began = time.perf_counter()
-    labels = settle_grid(settler, cells, margin=margin).labels
+    labels = classify_grid(classifier, cells, margin=margin).labels
     return labels, (time.perf_counter() - began) / labels.size
 
 

@@ -19,9 +19,9 @@ from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
 TIGHTEST = 2.3e-14  # relative tolerance, the least that SciPy's DOP853 takes
-_LOOKS = 16  # places at which each step is searched for a change of contact
-_FEWEST_STEPS = 32  # in an interval, so that the looks lie close
-_TURNS = 1_000_000  # changes of contact in one interval before it is given up
+_PROBES = 16  # places in each step that are searched for a change of contact
+_FEWEST_STEPS = 32  # in an interval, so that the probes lie close
+_MOST_CHANGES = 1_000_000  # of contact in one interval; chatter would never end
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def reference_map(
     Raises
     ------
     IntegrationError
-        DOP853 gave up.
+        DOP853 failed.
     """
     motion = _Motion(scene, flow, tolerance)
     ends = [np.array(state, dtype=float) for state in states]
@@ -75,7 +75,7 @@ class _Motion:
     def follow(self, state: Array, interval: float) -> Array:
         """Integrate from time 0 to `interval`."""
         time, pushing = 0.0, self.pushing_at(state)
-        for _ in range(_TURNS):
+        for _ in range(_MOST_CHANGES):
             solver = self._solver(time, state, interval, pushing, interval / _FEWEST_STEPS)
             change = None
             while solver.status == "running" and change is None:
@@ -92,7 +92,9 @@ class _Motion:
             if time >= interval:
                 return state
         raise IntegrationError(
-            f"the reference integrator met more than {_TURNS} changes of contact in one period.", time, tuple(state)
+            f"the reference integrator met more than {_MOST_CHANGES} changes of contact in one period.",
+            time,
+            tuple(state),
         )
 
     def _solver(self, time: float, state: Array, end: float, pushing: tuple[bool, ...], longest: float) -> DOP853:
@@ -122,16 +124,16 @@ class _Motion:
         if not self.stops:
             return None
         dense = solver.dense_output()
-        looks = np.linspace(solver.t_old, solver.t, _LOOKS + 1)
-        states = dense(looks).T
-        for k in range(1, _LOOKS + 1):
-            high = looks[k]
+        probes = np.linspace(solver.t_old, solver.t, _PROBES + 1)
+        states = dense(probes).T
+        for k in range(1, _PROBES + 1):
+            high = probes[k]
             changed = self.pushing_at(states[k]) != pushing
             if not changed and states[k - 1, 1] * states[k, 1] < 0.0:
-                high = _turn(dense, looks[k - 1], high)  # a graze shows at the turning point, if anywhere
+                high = _turn(dense, probes[k - 1], high)  # a graze shows at the turning point, if anywhere
                 changed = self.pushing_at(dense(high)) != pushing
             if changed:
-                return self._bisected(dense, looks[k - 1], high, pushing)
+                return self._bisected(dense, probes[k - 1], high, pushing)
         return None
 
     def _bisected(self, dense: Any, low: float, high: float, pushing: tuple[bool, ...]) -> Any:
@@ -150,7 +152,7 @@ def _step(solver: DOP853) -> None:
     if solver.status == "failed" or not np.isfinite(solver.y).all():
         last = tuple(float(value) for value in solver.y)
         raise IntegrationError(
-            f"the reference integrator, DOP853, gave up at t = {solver.t:g} in state {last}; measure a milder scene.",
+            f"the reference integrator, DOP853, failed at t = {solver.t:g} in state {last}; measure a milder scene.",
             float(solver.t),
             last,
         )

@@ -1,4 +1,4 @@
-"""Work and precision of every stepper on one scene: what a digit costs on this machine."""
+"""Work and precision of every stepper on one scene: error against computing time on this machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
-from vibrokit.kernels.ensemble import Progress
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
@@ -23,6 +22,7 @@ from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, report, stage, working
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.trade.reference import TIGHTEST, reference_map
 from vibrokit.trade.table import FirstCall, Trade, TradeRow, fitted_order
@@ -38,7 +38,7 @@ _FINEST = 1e-14
 _CHECKED = 16  # starts on which the references themselves are checked
 _MOST = 8192
 _FEW = 256
-_REMEMBERED = 1024  # trajectories whose arrays are counted
+_MEASURED = 1024  # trajectories whose arrays are measured
 _LEAST_REPEATS = 5
 _ALONE = 8  # trajectories that are timed one by one
 
@@ -53,14 +53,14 @@ def measure_steppers(
     periods: int = 2,
     seconds: float = 0.6,
     rng: int | np.random.Generator = 0,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> Trade:
     """Measure error, time and memory of every stepper that can integrate a scene, coarse to fine.
 
     The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to a finer reference
-    that flies by another method: FreeFlight at 1e-14 for RK4 and Order8, Order8 at 1e-14 for FreeFlight. What these
-    two have in common, the steps in contact, is checked by SciPy's DOP853, restarted at every change of contact;
-    where FreeFlight refuses the scene, DOP853 is the reference of Order8.
+    by another method: FreeFlight at 1e-14 for RK4 and Order8, Order8 at 1e-14 for FreeFlight. What these two share, the
+    steps in contact, is checked by SciPy's DOP853, restarted at every change of contact. Where FreeFlight cannot
+    integrate the scene, DOP853 is the reference of Order8.
 
     Parameters
     ----------
@@ -75,8 +75,7 @@ def measure_steppers(
         Time that each setting is timed for.
     rng : int or numpy.random.Generator
         Chooses the starts.
-    progress : callable, optional
-        Called with (settings done, settings in all); the references count as one.
+    progress : bool or callable, optional
 
     Returns
     -------
@@ -90,20 +89,18 @@ def measure_steppers(
         A reference ran out of range.
     """
     states = starts_between_stops(osc, starts, np.random.default_rng(rng))
-    calls, refused = _first_calls(osc, ladders, states[:1])
-    taken = [stepper for ladder in ladders for stepper in ladder if type(stepper).__name__ in calls]
-    report = progress or (lambda done, total: None)
-    report(0, 1 + len(taken))
-    references = References(osc, states, periods)
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
     rows: list[TradeRow] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are what is measured here
-        for stepper in taken:
-            report(1 + len(rows), 1 + len(taken))
+    with working(progress), stage("steppers", unit="settings"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose
+        calls, refused = _first_calls(osc, ladders, states[:1])
+        taken = [stepper for ladder in ladders for stepper in ladder if type(stepper).__name__ in calls]
+        references = References(osc, states, periods)
+        for done, stepper in enumerate(taken):
+            report(1 + done, 1 + len(taken))
             row = _row(osc, stepper, states, periods, references.ends_for(type(stepper).__name__), seconds)
             rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
-    report(1 + len(taken), 1 + len(taken))
+        report(1 + len(taken))
     return Trade(
         rows=tuple(rows),
         first_calls=tuple(calls.values()),
@@ -172,9 +169,9 @@ def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) 
 def _first_calls(
     osc: Oscillator, ladders: tuple[tuple[Stepper, ...], ...], states: Array
 ) -> tuple[dict[str, FirstCall], dict[str, str]]:
-    """Call each stepper once, before anything else does; with the reasons of those that refuse."""
+    """Call each stepper once, before anything else does; also return the reasons of those that cannot be used."""
     calls, refused = {}, {}
-    for stepper in (ladder[-1] for ladder in ladders):  # the finest, of which nobody is warned
+    for stepper in (ladder[-1] for ladder in ladders):  # the finest, which gives no warning
         name = type(stepper).__name__
         began = time.perf_counter()
         try:
@@ -190,8 +187,8 @@ def _first_calls(
 
 def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, reference: Array, seconds: float) -> TradeRow:
     errors = np.linalg.norm((osc.section_map(states, periods, stepper=stepper) - reference)[:, :2], axis=1)
-    crowd = _crowd(osc, stepper, states, seconds / (2 * _LEAST_REPEATS))
-    together = _median_time(lambda: osc.section_map(crowd, 1, stepper=stepper), 0.7 * seconds)
+    many = _as_many(osc, stepper, states, seconds / (2 * _LEAST_REPEATS))
+    together = _median_time(lambda: osc.section_map(many, 1, stepper=stepper), 0.7 * seconds)
     few, length = states[:_ALONE], 8
 
     def one_by_one() -> None:
@@ -200,28 +197,28 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
 
     one_by_one()
     alone = _median_time(one_by_one, 0.3 * seconds)
-    counted = np.resize(states, (_REMEMBERED, states.shape[1]))
+    counted = np.resize(states, (_MEASURED, states.shape[1]))
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
         cost=float(stepper.steps if isinstance(stepper, RK4) else 1 / getattr(stepper, "tolerance", np.nan)),
         error_median=float(np.median(errors)),
         error_90=float(np.quantile(errors, 0.9)),
-        seconds=together / len(crowd),
+        seconds=together / len(many),
         seconds_alone=alone / (len(few) * length),
-        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / _REMEMBERED,
+        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / _MEASURED,
     )
 
 
-def _crowd(osc: Oscillator, stepper: Stepper, states: Array, seconds: float) -> Array:
-    """As many trajectories as a period of them can be integrated in the time."""
+def _as_many(osc: Oscillator, stepper: Stepper, states: Array, seconds: float) -> Array:
+    """As many trajectories as can be integrated over one period in the time."""
     count = _FEW
     while True:
-        crowd = np.resize(states, (count, states.shape[1]))
+        many = np.resize(states, (count, states.shape[1]))
         began = time.perf_counter()
-        osc.section_map(crowd, 1, stepper=stepper)
+        osc.section_map(many, 1, stepper=stepper)
         if count >= _MOST or time.perf_counter() - began > 0.5 * seconds:
-            return crowd
+            return many
         count *= 2
 
 

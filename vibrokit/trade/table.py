@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from vibrokit.text_table import text_table
+
+_HEADINGS = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "arrays (B)", "")
 _ABOVE_FLOOR = 30.0  # an error this far above the smallest of all is not rounding or the reference's own
 _ASYMPTOTIC = 0.02  # distances below this are small enough to show an order
 
@@ -97,29 +100,28 @@ class Trade:
 
     def __str__(self) -> str:
         lines = [
-            f"Error: distance in (x, v) to a finer reference after {self.periods} periods, from {self.starts} starts.",
+            f"Error: distance in (x, v) from a finer reference after {self.periods} periods, of {self.starts} starts.",
             f"Time per trajectory and period: in an ensemble on {self.threads} threads, and one trajectory alone.",
             "Arrays: peak that Python holds per trajectory (tracemalloc); the kernels' own few kB are not in it.",
             "",
-            "stepper                       median      90 %        ensemble (µs)  alone (µs)  arrays (B)",
+            *text_table([_HEADINGS, *(self._line(row) for row in self.rows)]),
+            "",
         ]
-        lines += [self._line(row) for row in self.rows]
-        lines.append("")
         for call in self.first_calls:
             source = "compiled" if call.compiled else "from disk"
             lines.append(
                 f"{call.name}: {self._order(call.name)}, against {self.references[call.name]}; "
                 f"first call {call.seconds:.1f} s ({source})."
             )
-        lines += [f"{name}: refused. {reason}" for name, reason in self.refused.items()]
+        lines += [f"{name}: not used. {reason}" for name, reason in self.refused.items()]
         lines.append(f"The reference of RK4 and SciPy's DOP853 at its finest differ by {self.checked:.1e} (median).")
         return "\n".join(lines)
 
     @staticmethod
-    def _line(row: TradeRow) -> str:
-        default = "  ← default" if row.default else ""
-        line = f"{row.stepper:<28}  {row.error_median:<10.2e}  {row.error_90:<10.2e}  {1e6 * row.seconds:<13.4g}  "
-        return f"{line}{1e6 * row.seconds_alone:<10.4g}  {row.memory:<10.0f}{default}".rstrip()
+    def _line(row: TradeRow) -> tuple[str, ...]:
+        errors = f"{row.error_median:.2e}", f"{row.error_90:.2e}"
+        times = f"{1e6 * row.seconds:.4g}", f"{1e6 * row.seconds_alone:.4g}"
+        return (row.stepper, *errors, *times, f"{row.memory:.0f}", "← default" if row.default else "")
 
     def _order(self, name: str) -> str:
         order = self.orders[name]

@@ -115,5 +115,5 @@ def test_usable_by_name(tmp_path):
 )
 def test_wrong_values_are_refused(wrong):
     (name,) = wrong
-    with pytest.raises(ParameterError, match=f"HuntCrossley: {name} is .*; give a finite number"):
+    with pytest.raises(ParameterError, match=f"HuntCrossley: {name} must be a finite number.*, got "):
         HuntCrossley(**({"stiffness": 50.0, "dissipation": 0.2} | wrong))

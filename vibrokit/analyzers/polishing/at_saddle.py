@@ -1,78 +1,104 @@
-"""At a saddle: paths that end on an unstable orbit of the basin's boundary."""
+"""SaddleEnding: paths that end in the stable space of an unstable orbit on the basin boundary."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vibrokit.analyzers.polishing.carrier import Carrier
-from vibrokit.analyzers.polishing.course import Course
-from vibrokit.analyzers.polishing.destinations import Cut, Destination, Goal
-from vibrokit.analyzers.polishing.endings import ComesTo
-from vibrokit.analyzers.polishing.ends import End, linear_end
-from vibrokit.oscillator import Oscillator
-from vibrokit.results.attractor import Attractor
-from vibrokit.results.energy import ExitPath
-from vibrokit.results.saddle import Saddle
+from vibrokit.analyzers.paths.action_descent import Closing
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.ending import Cut, Ending
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, linearized_orbit, normals_of
+from vibrokit.analyzers.polishing.resampled import ResampledCandidate
 
-_SETTLING = 4.0  # e-foldings on the saddle that are added to a cut candidate
+_SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
 _MOST_ADDED = 40  # section intervals
+
+Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SaddleGoal(Goal):
-    """An unstable orbit, or equilibrium, on the boundary of the basin.
+class SaddleEnding(Ending):
+    """The last point lies in the stable space of an orbit.
 
     Attributes
     ----------
-    orbit : Saddle
+    orbit : LinearizedOrbit
+    phase : int
+        Of the last point, in pieces from node 0 of the orbit.
     """
 
-    orbit: Saddle
+    orbit: LinearizedOrbit
+    phase: int = 0
 
-    def scene(self, osc: Oscillator) -> Oscillator:
-        """The scene as it is."""
-        return osc
+    def distance(self, candidate: ResampledCandidate) -> float:
+        return self._closest(candidate)[0]
 
-    def reached(self, attractor: Attractor) -> bool:
-        """Never: an attractor is inside its basin."""
-        return False
+    def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
+        """Cut where the candidate, on the section, is closest to the orbit, and stay on the orbit from there."""
+        _, node, phase = self._closest(candidate)
+        pieces = self.propagator.pieces
+        periods = math.ceil(_SETTLING / (self.orbit.slowest_rate * pieces))
+        added = min(max(2, periods), _MOST_ADDED) * pieces
+        states = np.concatenate([candidate.all_states[: node + 1], self.orbit.along(phase + 1, added)])
+        return [Cut(states, dataclasses.replace(self, phase=phase + added), self.propagator.piece)]
 
-    def destination(self, carrier: Carrier) -> Destination:
-        """Linearise Hamilton's equations along the orbit."""
-        return _AtSaddle(carrier, linear_end(carrier, self.orbit.points[0], max(1, self.orbit.period)))
+    def misfit(self, point: Array, time: float, scale: Array) -> Array:
+        return self._normals(scale) @ ((point - self._point) / scale)
 
+    def derivatives(self, point: Array, time: float, scale: Array) -> tuple[Array, Array]:
+        normals = self._normals(scale)
+        return normals, np.zeros((len(normals), 0))
 
-class _AtSaddle(Destination):
-    def __init__(self, carrier: Carrier, end: End) -> None:
-        self.carrier, self.end = carrier, end
-        self.each = 1 if carrier.osc.autonomous else carrier.pieces
+    def tightened(self, propagator: SegmentPropagator) -> Self:
+        again = linearized_orbit(propagator, self.orbit.states[0], self.period_nodes // propagator.pieces)
+        return dataclasses.replace(self, propagator=propagator, orbit=again)
 
-    def distance(self, course: Course) -> float:
-        return self._closest(course)[0]
+    @property
+    def period_nodes(self) -> int:
+        return len(self.orbit.states)
 
-    def cuts(self, course: Course) -> list[Cut]:
-        """Cut where the course, on the section, comes closest to a point of the orbit, and stay on that from there."""
-        _, node, phase = self._closest(course)
-        periods = math.ceil(_SETTLING / (self.end.rate() * self.carrier.pieces))
-        added = min(max(2, periods), _MOST_ADDED) * self.carrier.pieces
-        orbit = self.end.states[(phase + np.arange(added + 1)) % len(self.end.states)]
-        states = np.concatenate([course.states, course.beyond[1:]])[: node + 1]
-        return [Cut(np.concatenate([states, orbit[1:]]), ComesTo(self.end, phase + added))]
+    @property
+    def closing(self) -> Closing:
+        n = self.propagator.size
+        basis = self.orbit.stable[self.orbit.node(self.phase)]
+        form = -np.linalg.solve(basis[:n].T, basis[n:].T).T
+        return self._point[:n], (form + form.T) / 2
 
-    def earlier(self, path: ExitPath) -> int | None:
-        return None
+    def tail(self, point: Array) -> float:
+        """−½ p δq, of the linearized equations."""
+        offset, n = point - self._point, len(point) // 2
+        return -0.5 * float(offset[n:] @ offset[:n])
 
-    def _closest(self, course: Course) -> tuple[float, int, int]:
-        """Distance, node of the course, and phase of the orbit."""
-        states = np.concatenate([course.states, course.beyond[1:]])
-        nodes = np.arange(self.each, len(states), self.each)
-        phases = np.arange(0, len(self.end.states), self.carrier.pieces)
-        size = np.ones(states.shape[1])
-        size[1] = self.carrier.osc.natural_frequency
-        apart = np.linalg.norm((states[nodes][:, None] - self.end.states[phases]) / size, axis=2)
-        apart = np.where(np.isfinite(apart), apart, np.inf)
-        node, phase = np.unravel_index(int(np.argmin(apart)), apart.shape)
-        return float(apart[node, phase]), int(nodes[node]), int(phases[phase])
+    def distance_left(self, point: Array) -> float:
+        return float(np.linalg.norm((point - self._point)[:2]))
+
+    def missing(self, points: Array, radius: float) -> int:
+        return self.orbit.missing(points[::-1], self.phase, 1, radius, self.propagator.grain)
+
+    def extended(self, points: Array, count: int) -> tuple[Array, Self]:
+        more = self.orbit.continued(points[-1], self.phase, max(count, 0))
+        points = np.concatenate([points[: len(points) + min(count, 0)], more])
+        return points, dataclasses.replace(self, phase=self.phase + count)
+
+    @property
+    def _point(self) -> Array:
+        return self.orbit.point(self.phase)
+
+    def _normals(self, scale: Array) -> Array:
+        return normals_of(self.orbit.stable[self.orbit.node(self.phase)], scale)
+
+    def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, int]:
+        """Distance, node of the candidate, and phase of the orbit."""
+        states, grain = candidate.all_states, self.propagator.grain
+        nodes = np.arange(grain, len(states), grain)
+        phases = np.arange(0, self.period_nodes, self.propagator.pieces)
+        offsets = (states[nodes][:, None] - self.orbit.states[phases]) / self.propagator.units
+        distances = np.linalg.norm(offsets, axis=2)
+        distances = np.where(np.isfinite(distances), distances, np.inf)
+        node, phase = np.unravel_index(int(np.argmin(distances)), distances.shape)
+        return float(distances[node, phase]), int(nodes[node]), int(phases[phase])

@@ -1,4 +1,4 @@
-"""Certify: what happens to a polished path when all that it stands on is tightened."""
+"""Certify: how a polished path changes when everything that it rests on is tightened."""
 
 from __future__ import annotations
 
@@ -6,95 +6,93 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.polishing.carrier import Carrier
-from vibrokit.analyzers.polishing.endings import ComesTo, Ending
-from vibrokit.analyzers.polishing.ends import End, linear_end
-from vibrokit.analyzers.polishing.heteroclinic import MORE, end_distances, solved_again, start_distances
-from vibrokit.analyzers.polishing.newton import Extremum, extremal_path
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
+from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
 from vibrokit.results.certificate import Certificate
 
-_FARTHER = 10.0
+_FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows
 
 Array = NDArray[np.float64]
 
 
-def certify(carrier: Carrier, found: Extremum) -> Certificate:
-    """Solve again from ten times as far, with two more periods at either end, and with a tightened integrator.
+def certify(propagator: SegmentPropagator, found: ExtremalPath) -> Certificate:
+    """Solve again from ten times as far, with two more periods at either end, and with a tightened integration.
 
     Raises
     ------
     StructureError
-        One of these has no solution near.
+        One of these has no solution nearby.
     """
-    starts = start_distances(found)
-    nearer = solved_again(carrier, found, -_later(found), 0)
-    ending = found.ending
-    after = MORE * len(ending.end.states) if isinstance(ending, ComesTo) else 0
-    longer = solved_again(carrier, found, MORE * len(found.source.states), after)
-    tighter = _tightened(carrier, found)
-    periods = (len(found.points) - 2) + ending.last(found.free, carrier.piece) / carrier.piece
+    nearer = solved_again(propagator, found, -_dropped(found), 0)
+    before, after = len(found.source.states), found.ending.period_nodes
+    longer = solved_again(propagator, found, MORE_PERIODS * before, MORE_PERIODS * after)
+    tighter = _tightened(propagator, found)
     return Certificate(
         residual=max(found.residual, found.slack),
-        start_distance=float(starts[0]),
-        end_distance=float(end_distances(found)[0]),
-        periods=periods / carrier.pieces,
+        start_distance=float(found.distances[0]),
+        end_distance=found.ending.distance_left(found.points[-1]),
+        periods=(len(found.points) - 2 + found.last / propagator.piece) / propagator.pieces,
         by_start=nearer.action - found.action,
         by_length=longer.action - found.action,
         by_stepper=tighter.action - found.action,
-        transversality=transversality(carrier, found),
+        transversality=transversality(propagator, found),
     )
 
 
-def _later(found: Extremum) -> int:
-    """Nodes to drop for a start ten times as far from the orbit; for one on it, two periods, or half of the path."""
-    if found.source.held:
-        return min(MORE * len(found.source.states), len(found.points) // 2)
-    starts = start_distances(found)
-    away = np.flatnonzero(starts[:-1] >= _FARTHER * starts[0])
+def _dropped(found: ExtremalPath) -> int:
+    """Nodes to drop for a start ten times as far; for one on the orbit, two periods, or half of the path."""
+    if found.source.start_on_orbit:
+        return min(MORE_PERIODS * len(found.source.states), len(found.points) // 2)
+    distances = found.distances
+    away = np.flatnonzero(distances[:-1] >= _FARTHER * distances[0])
     return int(away[0]) if away.size else 0
 
 
-def _tightened(carrier: Carrier, found: Extremum) -> Extremum:
-    finer = carrier.with_stepper(carrier.stepper.refined())
-    ending: Ending = found.ending
-    if isinstance(ending, ComesTo):
-        ending = ComesTo(_again(finer, ending.end), ending.phase)
-    last = ending.last(found.free, carrier.piece)
-    return extremal_path(finer, _again(finer, found.source), found.first, ending, found.points, last=last)
+def _tightened(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
+    finer, orbit = propagator.with_stepper(propagator.stepper.refined()), found.source
+    source = linearized_orbit(finer, orbit.states[0], len(orbit.states) // finer.pieces)
+    if orbit.start_on_orbit:
+        source = source.with_start_on_orbit()
+    return extremal_path(finer, source, found.first, found.ending.tightened(finer), found.points, found.last)
 
 
-def _again(carrier: Carrier, end: End) -> End:
-    again = linear_end(carrier, end.states[0], len(end.states) // carrier.pieces)
-    return again.on_orbit() if end.held else again
-
-
-def transversality(carrier: Carrier, found: Extremum) -> float:
+def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:
     """Return the sine of the least angle at which the two manifolds meet, anywhere along the path.
 
-    The tangent spaces of what leaves the source and of what comes to the end are carried along the path, each in the
-    direction in which that is attracting, in units of the path's extent. Without forcing they share the direction of
-    the path itself, which is left out.
+    The tangent spaces of the paths that leave the source and of those that reach the end are carried along the path,
+    each in the direction in which it is attracting, in units of the path's extent. Without forcing, the manifolds of
+    two equilibria share the direction of the path itself, which is left out.
     """
-    scale, n = found.scale, found.points.shape[1] // 2
+    scale, n = found.scale, propagator.size
     slopes = found.slopes * scale / scale[:, None]
-    number = len(slopes)
-    leaving = [_orthonormal(found.source.leaving[found.source.node(found.first)] / scale[:, None])]
+    leaving = [_orthonormal(found.source.unstable[found.source.node(found.first)] / scale[:, None])]
     for slope in slopes:
         leaving.append(_orthonormal(slope @ leaving[-1]))
-    autonomous = carrier.osc.autonomous
-    start = float((found.first + number - 1) % carrier.pieces) * carrier.piece
-    time = start + found.ending.last(found.free, carrier.piece)
-    rate = carrier.rate(found.points[-1], 0.0 if autonomous else time)
-    coming = _orthonormal(found.ending.incoming(rate, scale) / scale[:, None])
-    shared = int(autonomous and isinstance(found.ending, ComesTo))
+    reaching = _orthonormal(_tangents(propagator, found))
+    shared = int(propagator.osc.autonomous and found.ending.period_nodes > 0)
     least = 1.0
-    for node in range(number, -1, -1):
-        angles = np.sort(scipy.linalg.subspace_angles(leaving[node], coming))
+    for node in range(len(slopes), -1, -1):
+        angles = np.sort(scipy.linalg.subspace_angles(leaving[node], reaching))
         if len(angles) > shared:
             least = min(least, float(np.sin(angles[shared])))
         if node:
-            coming = _orthonormal(np.linalg.solve(slopes[node - 1], coming))
+            reaching = _orthonormal(np.linalg.solve(slopes[node - 1], reaching))
     return least if n > shared else 1.0
+
+
+def _tangents(propagator: SegmentPropagator, found: ExtremalPath) -> Array:
+    """A basis (2n, n), in units of the scale, of the changes of the last point after which a path still ends there."""
+    phase = (found.first + len(found.points) - 2) % propagator.pieces
+    time = phase * propagator.piece + found.last
+    in_point, in_time = found.ending.derivatives(found.points[-1], time, found.scale)
+    changes = scipy.linalg.null_space(np.hstack([in_point, in_time]))
+    double = len(found.scale)
+    if not found.ending.free_time:
+        return changes
+    rate = propagator.rate(found.points[-1], time) / found.scale
+    return changes[:double] - np.outer(rate, changes[double:])
 
 
 def _orthonormal(basis: Array) -> Array:

@@ -1,9 +1,10 @@
 """Boxes: a search that splits boxes of a unit cube where values are small, or border on small ones.
 
-After DIRECT (Jones, Perttunen & Stuckman, J. Optim. Theory Appl. 79, 157, 1993): a box is known by the value at its
-centre, is split in three along each side so that its own centre stays one, and boxes of every size are split in each
-round, so that no part of the cube is forgotten. Differences: many boxes of each size are split at once, a box counts as
-good as the best of its neighbours, and jumps between neighbours are followed, for the least actions lie there.
+The search follows DIRECT (Jones, Perttunen & Stuckman, J. Optim. Theory Appl. 79, 157, 1993): a box is known by the
+value at its centre; it is split in three along each side, so that its centre remains a centre; boxes of every size are
+split in each round, so that no part of the cube is neglected. It differs in three points: many boxes of each size are
+split at once, a box ranks as its best neighbour does, and jumps between neighbours are followed, because the least
+actions lie there.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-_FINEST = 26  # splits: 3^−26 of a first box is rounding
+_FINEST = 26  # splits: 3^−26 of a first box is at the level of rounding
 _ROUNDING = 1e-12
-_JUMP = 1.5  # ratio of values
+_JUMP = 1.5  # ratio of neighbouring values that counts as a jump; smooth branches vary less between boxes
 _ACROSS = 3  # boxes: one and its neighbours
 
 Array = NDArray[np.float64]
@@ -27,13 +28,13 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Boxes:
-    """Boxes that cover the unit cube without overlap, the first side of which is a circle.
+    """Boxes that cover the unit cube without overlap; the first coordinate is periodic.
 
     Attributes
     ----------
     centres : array (count, d)
     splits : int array (count,)
-        How many times each was split.
+        Number of times that each was split.
     first : array (d,)
         Sides of a box that was never split.
     """
@@ -44,20 +45,15 @@ class Boxes:
 
     @classmethod
     def grid(cls, counts: tuple[int, ...]) -> Boxes:
-        """Equal boxes, so many along each side."""
+        """Make equal boxes, `counts` of them along each side."""
         axes = [(np.arange(count) + 0.5) / count for count in counts]
         centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(counts))
         return cls(centres, np.zeros(len(centres), dtype=np.int64), 1 / np.array(counts))
 
     def around(self, index: int, counts: Sequence[int]) -> Boxes:
-        """Return boxes that cover the first box that one is in and those next to it, unsplit.
+        """Return unsplit boxes that cover the first-grid box that contains a given box, and its neighbours.
 
-        Parameters
-        ----------
-        index : int
-            Of the one.
-        counts : sequence of int
-            How many along each side, by the number of sides; the last one where there are more.
+        `counts` are their numbers along each side in 1, 2, … dimensions; the last one holds for all higher dimensions.
         """
         size = len(self.first)
         count = counts[min(size, len(counts)) - 1]
@@ -68,51 +64,43 @@ class Boxes:
         return Boxes(centres, np.zeros(len(centres), dtype=np.int64), _ACROSS * self.first / count)
 
     def split(self, which: Whole) -> Boxes:
-        """Split some boxes; the new ones come last, those that were split stay with a third of their sides."""
+        """Split some boxes; each keeps its place with a third of its sides, and the new ones come last."""
         size = self.centres.shape[1]
         steps = np.array([step for step in itertools.product((-1, 0, 1), repeat=size) if any(step)])
         splits = self.splits.copy()
         splits[which] += 1
         sides = self.first * 3.0 ** -splits[which][:, None]
         new = (self.centres[which, None, :] + steps * sides[:, None, :]).reshape(-1, size)
-        new[:, 1:] = np.clip(new[:, 1:], 0.0, 1.0 - _ROUNDING)  # only rounding, or a window, leads beyond
+        new[:, 1:] = np.clip(new[:, 1:], 0.0, 1.0 - _ROUNDING)  # only rounding, or `around`, leads outside
         return Boxes(
             np.concatenate([self.centres, new]), np.append(splits, splits[which].repeat(len(steps))), self.first
         )
 
     def neighbours(self) -> Whole:
-        """Return the boxes next to each box, itself among them: as many as a box of a regular grid has."""
+        """Return each box's neighbours, itself included: as many as in a regular grid."""
         return nearest(self.centres, self.first)
 
     def promising(self, values: Array, kinds: Whole, count: int) -> Whole:
-        """Return some boxes to split: of each size those of the least values in their neighbourhoods.
+        """Return about `count` boxes to split: of each size, those with the least values in their neighbourhoods.
 
-        Half of them are taken where neighbours differ in kind or more than a little in value, for a narrow way out
-        between two plateaus shows in nothing else.
-
-        Parameters
-        ----------
-        values : array (boxes,)
-            Infinite where nothing is known.
-        kinds : int array (boxes,)
-        count : int
-            About how many to choose.
+        Half of them are taken where neighbours differ in kind or by a jump in value, because nothing else reveals a
+        narrow exit path between two plateaus. Values (boxes,) are infinite where nothing is known.
         """
         near = self.neighbours()
         reachable, highest = values[near].min(axis=1), values[near].max(axis=1)
         jumps = (highest > _JUMP * reachable) | (kinds[near] != kinds[:, None]).any(axis=1)
-        worth = np.isfinite(reachable) & (self.splits < _FINEST)
-        sizes = np.unique(self.splits[worth])
+        eligible = np.isfinite(reachable) & (self.splits < _FINEST)
+        sizes = np.unique(self.splits[eligible])
         chosen = []
         for splits in sizes:
-            here = np.flatnonzero(worth & (self.splits == splits))
+            here = np.flatnonzero(eligible & (self.splits == splits))
             ranked = here[np.lexsort((values[here], reachable[here]))]
-            share = max(2, count // len(sizes))
-            chosen += [ranked[: share // 2], ranked[jumps[ranked]][: share // 2]]
+            quota = max(2, count // len(sizes))
+            chosen += [ranked[: quota // 2], ranked[jumps[ranked]][: quota // 2]]
         return np.unique(np.concatenate(chosen)) if chosen else np.empty(0, dtype=np.int64)
 
     def minima(self, values: Array) -> Whole:
-        """Return the best boxes of those first boxes that border on no better one, the best first."""
+        """Return the best box in each first-grid box that has no better neighbour, the best first."""
         ranked = np.lexsort((np.arange(len(values)), values))
         cell = np.floor(self.centres / self.first * (1 - _ROUNDING)).astype(np.int64)
         _, first = np.unique(cell[ranked], axis=0, return_index=True)
@@ -124,7 +112,7 @@ class Boxes:
 
 
 def nearest(centres: Array, first: Array) -> Whole:
-    """Return the 3^d places nearest to each, in units of `first`, the first coordinate being a circle of length 1."""
+    """Return the 3^d places nearest to each, in units of `first`; the first coordinate has period 1."""
     scaled = centres / first
     around = np.zeros(len(first))
     around[0] = 1 / first[0]

@@ -5,27 +5,30 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.quasi_potential import Phase
+from vibrokit.analyzers.paths.local_potential import Phase, potential_along
+from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.starts import Starts
+from vibrokit.kernels.stepper import Stepper
 
-_MOST_GROWTH = 10.0  # of a radius across a shell: the outer edge is to be in the linear range still
+_MOST_GROWTH = 10.0  # of a radius across a shell: the outer edge must still be in the linear range
 _ROUNDING = 1e-14
-_THINNEST = 1e-3  # domain that is given more than one row of starts, unless they are very many
+_THINNEST = 1e-3  # logarithmic width of a domain, below which it gets one row of starts unless there are very many
 
 Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Shell:
-    """Between an ellipse of the quadratic form at one time and the image of the ellipse of the shell before.
+    """Region between an ellipse of the quadratic form at one time and the image of the previous shell's ellipse.
 
     In coordinates y = L⁻¹ δq, Σ = L Lᵀ, ellipses are spheres and the linear growth of extremals
     δq ↦ (M + C M⁻ᵀ Σ⁻¹) δq = Σ' M⁻ᵀ Σ⁻¹ δq becomes B⁻ᵀ, with B = L'⁻¹ M L. Since B Bᵀ = 1 − L'⁻¹ C L'⁻ᵀ, every radius
-    grows, and Bᵀ y, which needs no inverse, is where y was.
+    grows. The preimage of y is Bᵀ y, which needs no inverse.
 
     Attributes
     ----------
@@ -44,14 +47,14 @@ class Shell:
     back: Array
 
     def states(self, directions: Array, radius: float, fractions: Array) -> Array:
-        """Return (q, p, S) at unit vectors (count, n), so far between the two edges on a logarithmic scale."""
+        """Return (q, p, S) along unit vectors (count, n), at fractions of the log distance between the edges."""
         inner = np.linalg.norm(directions @ self.back.T, axis=1)
         place = directions * (radius * inner**-fractions)[:, None]
         momentum = np.linalg.solve(self.root.T, place.T).T
         return np.column_stack([self.point + place @ self.root.T, momentum, 0.5 * np.sum(place**2, axis=1)])
 
     def fractions(self, states: Array, radius: float) -> Array:
-        """Return how far between the edges states (count, ≥ n) are; from 0 to below 1 inside the shell."""
+        """Return the fractions at which states (count, ≥ n) lie between the edges; in [0, 1) inside the shell."""
         place = np.linalg.solve(self.root, (states[:, : len(self.point)] - self.point).T).T
         length = np.linalg.norm(place, axis=1)
         before = np.linalg.norm(place @ self.back.T, axis=1)
@@ -60,46 +63,42 @@ class Shell:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FundamentalDomain(Starts):
-    """Shells through which each orbit of the growth of extremals passes once: the whole unstable manifold, no more.
+    """Shells that each extremal path passes through exactly once: together they hold the whole unstable manifold.
 
-    One shell, on the section, where radii grow little in a period of the orbit; several at times between, where they
-    grow much. Without forcing any time is as good as another, so that the inner edge alone has every path.
+    There is one shell, on the section, if radii grow little in a period of the orbit, and several at times in between
+    if they grow much. Without forcing all times are equivalent, so the inner edge alone holds every path.
 
-    A place is the direction in spherical coordinates of the whitened plane, then the fraction of the way from the inner
-    to the outer edge, shells one after another.
+    A place is the direction in spherical coordinates of the whitened plane, then the fraction of the distance from the
+    inner to the outer edge, shells one after another.
 
     Attributes
     ----------
     shells : tuple of Shell
     radius : float
-        Of the inner edge in whitened coordinates: there Ψ = ½ radius².
-    share : float
-        Of the way out that it is.
+        Radius of the inner edge in whitened coordinates, where Ψ = ½ radius².
+    relative_radius : float
+        The same, relative to the distance from the attractor to the exit.
     ratio : float
-        Of the fastest rate at which deviations decay to the slowest.
+        Ratio of the fastest rate at which deviations decay to the slowest.
     edge_only : bool
+        Whether only the inner edge is used.
     """
 
     shells: tuple[Shell, ...]
     radius: float
-    share: float
+    relative_radius: float
     ratio: float
     edge_only: bool = False
 
     @property
-    def dimension(self) -> int:
-        """Of the manifold; one less where time does not matter."""
-        return len(self.shells[0].point) - int(self.edge_only)
+    def growth(self) -> float:
+        """From the inner edge to the exit."""
+        return 1 / self.relative_radius
 
     @property
     def patience(self) -> int:
-        """Longer where a round is cheap, for an overdamped way out is a narrow funnel in a plateau."""
+        """Longer without forcing: rounds are cheap, and an overdamped exit path is a narrow funnel in a plateau."""
         return 8 if self.edge_only else 3
-
-    @property
-    def polars(self) -> int:
-        """One for each state of the noise."""
-        return len(self.shells[0].point) - 2
 
     def states(self, places: Array) -> tuple[Array, Array]:
         """In each place's shell."""
@@ -118,7 +117,7 @@ class FundamentalDomain(Starts):
         return np.zeros(len(places)) if self.edge_only else places[:, -1].copy()
 
     def grid(self, points: int) -> tuple[int, ...]:
-        """As long as wide where whitened coordinates are measured by their logarithms."""
+        """Cells are nearly square in the logarithms of whitened coordinates."""
         grown = -sum(float(np.log(np.linalg.svd(shell.back, compute_uv=False)).mean()) for shell in self.shells)
         lengths = [2 * math.pi] + [math.pi] * (len(self.shells[0].point) - 2)
         lengths += [] if self.edge_only else [max(grown, _THINNEST)]
@@ -127,13 +126,17 @@ class FundamentalDomain(Starts):
         return max(4, round(points / math.prod(across))), *across
 
     def depth(self, first: Array) -> int:
-        """Where rates differ, all but a narrow fan of directions follows the fastest: the fan is to be reached.
+        """Where rates differ, all but a narrow fan of directions follow the fastest; the boxes must resolve that fan.
 
-        A path that grows from a share ε of the way out along the slowest direction must start within ε^(r − 1) of it, r
-        the ratio of the fastest rate to the slowest.
+        A path that grows from the relative radius ε along the slowest direction must start within ε^(r − 1) of it, r
+        being the ratio of the fastest rate to the slowest.
         """
-        finest = self.share ** (self.ratio - 1)
+        finest = self.relative_radius ** (self.ratio - 1)
         return max(0, math.ceil(math.log(max(float(first[0]) / max(finest, _ROUNDING), 1.0), 3)))
+
+    def with_stepper(self, problem: ExitProblem, stepper: Stepper) -> Self:
+        """The same radii around another orbit."""
+        return dataclasses.replace(self, shells=shells_around(problem, stepper))
 
     def _shell(self, places: Array) -> tuple[NDArray[np.int64], Array]:
         if self.edge_only:
@@ -143,8 +146,13 @@ class FundamentalDomain(Starts):
         return which, across - which
 
 
+def shells_around(problem: ExitProblem, stepper: Stepper) -> tuple[Shell, ...]:
+    """Make the shells around the orbit that a stepper gives."""
+    return shells_of(potential_along(problem.scene, problem.orbit(stepper), stepper))
+
+
 def shells_of(phases: Sequence[Phase]) -> tuple[Shell, ...]:
-    """Make as few shells, at equal times, as keep the growth across each within a factor of 10; no more than phases."""
+    """Make the fewest shells, equally spaced in time, that keep the growth across each within a factor of 10."""
     count = len(phases)
     for shells in (number for number in range(1, count + 1) if count % number == 0):
         made = tuple(_shell(phases, last, count // shells) for last in range(0, count, count // shells))
@@ -164,7 +172,7 @@ def _shell(phases: Sequence[Phase], last: int, steps: int) -> Shell:
 
 
 def on_sphere(places: Array) -> Array:
-    """Return unit vectors (count, k + 1) of places (count, k): an angle in turns, then polar ones in half turns."""
+    """Return unit vectors (count, k + 1) of places (count, k): an angle in turns, then polar angles in half turns."""
     angle = 2 * np.pi * places[:, :1]
     vectors = np.hstack([np.cos(angle), np.sin(angle)])
     for number in range(1, places.shape[1]):

@@ -1,187 +1,101 @@
-"""The search: paths from all over a family of starts, more of them where the action is small or jumps."""
+"""Search: what shooting found about one attractor."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
+import xarray
 
-from vibrokit.analyzers.analyzer import part_of
-from vibrokit.analyzers.candidate import Candidate
-from vibrokit.analyzers.shooting.boxes import Boxes
-from vibrokit.analyzers.shooting.branches import Branch, branches_of
-from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
-from vibrokit.analyzers.shooting.starts import Starts
-from vibrokit.kernels.ensemble import Progress
-from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.branches import FINDER, Branch, branches_of
+from vibrokit.analyzers.shooting.energies import energy_of
+from vibrokit.analyzers.shooting.shots import Shots
+from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
 
-_PART = 4  # of the first grid, that each round adds
-_TRIED = 64  # local minima that are looked at, the cheapest
-_WORTH = 3.0  # times the least action: dearer ways are not kept
-_CERTAIN = 1.5  # times the least action, up to which all exits are confirmed
-_WINDOW = (200, 25, 7)  # boxes along each side of a box of the first grid and its neighbours, by dimension
-_WINDOW_ROUNDS = 12
-_WINDOW_TOLERANCE = 1e-5
-
-Array = NDArray[np.float64]
+_TRIED = 64  # local minima, the cheapest, that are compared as paths
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Search:
-    """What was found round one attractor.
+    """What was found about one attractor.
 
     Attributes
     ----------
-    starts : Starts
-    shooter : Shooter
-    boxes : Boxes
-        Around each start.
-    outcomes : Outcomes
+    problem : ExitProblem
+    findings : tuple of Finding
+    shots : Shots or None
+        None if the attractor already satisfies the exit condition.
     branches : tuple of Branch
-        The distinct ways out, the cheapest first.
-    change : float
-        By how much the least action of any target fell in the last rounds, relative; infinite where there were too few
-        to tell.
-    rounds : int
-        Of refinement.
+        Distinct exit paths, the cheapest first.
+    complete : bool
+        False if the work was stopped before its end.
     """
 
-    starts: Starts
-    shooter: Shooter
-    boxes: Boxes
-    outcomes: Outcomes
-    branches: tuple[Branch, ...]
-    change: float
-    rounds: int
+    problem: ExitProblem
+    findings: tuple[Finding, ...]
+    shots: Shots | None = None
+    branches: tuple[Branch, ...] = ()
+    complete: bool = True
+
+    @classmethod
+    def at_exit(cls, problem: ExitProblem) -> Search:
+        """Return the search from an attractor that already satisfies the exit condition."""
+        return cls(problem, (Finding.of(Code.AT_EXIT, problem.source),))
+
+    @classmethod
+    def of(cls, shots: Shots) -> Search:
+        """Find the distinct exit paths among some shots."""
+        problem = shots.shooter.problem
+        branches = branches_of(shots.shooter, shots.outcomes, shots.minima()[:_TRIED])
+        findings = [Finding.of(Code.SHOTS, problem.source, branches=len(branches), **shots.counts())]
+        if not branches:
+            findings.append(Finding.of(Code.NO_EXIT_FOUND, problem.source))
+        elif shots.rounds and math.isinf(shots.change):
+            findings.append(Finding.of(Code.REFINEMENT_TOO_SHORT, problem.source, rounds=shots.rounds))
+        elif shots.rounds:
+            values = {"last": shots.starts.patience, "rounds": shots.rounds, "change": shots.change}
+            findings.append(Finding(Code.REFINEMENT, problem.source, values=values))
+        return cls(problem, tuple(findings), shots, branches)
+
+    def stopped(self, interrupt: KeyboardInterrupt) -> Search:
+        """Return the same search, marked as stopped before its end."""
+        finding = Finding.stopped(FINDER, interrupt, self.problem.source)
+        return dataclasses.replace(self, findings=(*self.findings, finding), complete=False)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The ways out as guesses for a polisher, the cheapest first."""
+        """The exit paths as guesses for polishing, the cheapest first."""
         return tuple(branch.candidate for branch in self.branches)
 
+    def dataset(self) -> xarray.Dataset:
+        """Return the arrays of `ActionPlotResult.data`, without the dimension ``source``."""
+        return xarray.Dataset() if self.shots is None else self.shots.dataset()
+
+    @cached_property
+    def estimates(self) -> tuple[ActivationEnergy, ...]:
+        """The best energy of each target, with a numerical error if the search is complete.
+
+        The error takes another integration, so it is computed when it is first asked for.
+        """
+        if self.shots is None:
+            zero = ActivationEnergy(self.problem.source, -1, 0.0, 0.0, 0.0, FINDER, Bound.UPPER, numerical_error=0.0)
+            return (zero,)
+        best: dict[int, Branch] = {}
+        for branch in self.branches:
+            best.setdefault(branch.candidate.target, branch)
+        with stage("errors of the action plot", unit=TRAJECTORIES):
+            return tuple(energy_of(self.shots, branch, with_error=self.complete) for branch in best.values())
+
     @property
-    def cheapest(self) -> tuple[Branch, ...]:
-        """The cheapest way to each target."""
-        targets = dict.fromkeys(branch.candidate.target for branch in self.branches)
-        return tuple(next(b for b in self.branches if b.candidate.target == target) for target in targets)
-
-    def summary(self) -> str:
-        """What was found, as sentences."""
-        ways = len(self.branches)
-        words = f"{self.outcomes.summary()} {ways} distinct way{'s' if ways != 1 else ''} out."
-        if self.rounds and self.branches:
-            fell = "is new" if math.isinf(self.change) else f"fell by {self.change:.1e} of itself"
-            last = min(self.starts.patience, self.rounds)
-            words += f" Over the last {last} of {self.rounds} rounds of refinement the least action {fell}."
-        return words
-
-
-def search(
-    starts: Starts, shooter: Shooter, points: int, rounds: int, tolerance: float, progress: Progress | None = None
-) -> Search:
-    """Carry a first grid of paths to their exits, then refine.
-
-    Parameters
-    ----------
-    starts : Starts
-    shooter : Shooter
-    points : int
-        Of the first grid; each round adds about a quarter of it.
-    rounds : int
-        Of refinement at most; none leaves the grid as it is.
-    tolerance : float
-        Relative change of the least actions, below which the search ends when some rounds have not brought more.
-    progress : callable, optional
-
-    Returns
-    -------
-    Search
-    """
-    boxes, outcomes, history = _refined(
-        starts, shooter, Boxes.grid(starts.grid(points)), points, rounds, tolerance, progress
-    )
-    minima = boxes.minima(np.where(outcomes.confirmed, outcomes.states[:, -1], np.inf))[:_TRIED]
-    found = branches_of(shooter, outcomes, minima, _WORTH)
-    change = _change(history, starts.patience)
-    return Search(starts, shooter, boxes, outcomes, found, change, len(history) - 1)
-
-
-def least_near(found: Search, branch: Branch, starts: Starts, shooter: Shooter) -> float:
-    """Search again round a branch, with other starts or another shooter; return its target's least action.
-
-    NaN if no exit to that target is found. Near is within one box of the first grid to each side: where paths are
-    sensitive, another integration finds the same path elsewhere.
-    """
-    boxes = found.boxes.around(branch.index, _WINDOW)
-    points = len(boxes.centres)
-    _, outcomes, _ = _refined(starts, shooter, boxes, points, _WINDOW_ROUNDS, _WINDOW_TOLERANCE)
-    return _least(outcomes).get(branch.candidate.target, math.nan)
-
-
-def _refined(
-    starts: Starts,
-    shooter: Shooter,
-    boxes: Boxes,
-    points: int,
-    rounds: int,
-    tolerance: float,
-    progress: Progress | None = None,
-) -> tuple[Boxes, Outcomes, list[dict[int, float]]]:
-    outcomes = shooter.shoot(*starts.states(boxes.centres), part_of(progress, 0, rounds + 1))
-    shooter.confirm(outcomes)
-    history = [_least(outcomes)]
-    each = max(1, points // _PART // (3**starts.dimension - 1))
-    for number in range(1, rounds + 1):
-        which = boxes.promising(_relative(outcomes), _kinds(shooter, outcomes), each)
-        if not len(which):
-            break
-        known = len(boxes.centres)
-        boxes = boxes.split(which)
-        places = boxes.centres[known:]
-        outcomes = outcomes.joined(shooter.shoot(*starts.states(places), part_of(progress, number, rounds + 1)))
-        shooter.confirm(outcomes, _CERTAIN)
-        history.append(_least(outcomes))
-        if number >= starts.depth(boxes.first) and _change(history, starts.patience) <= tolerance:
-            break
-    if progress is not None:
-        progress(1, 1)
-    return boxes, outcomes, history
-
-
-def _relative(outcomes: Outcomes) -> Array:
-    """Actions as multiples of the least one of their target; infinite without an exit.
-
-    Of unknown target are those that left the region, and cost more than the best exit so far.
-    """
-    out = np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION))
-    actions = outcomes.states[:, -1]
-    values = np.full(len(actions), np.inf)
-    for target in np.unique(outcomes.targets[out]):
-        here = out & (outcomes.targets == target)
-        values[here] = actions[here] / actions[here if target >= 0 else out].min()
-    return values
-
-
-def _kinds(shooter: Shooter, outcomes: Outcomes) -> NDArray[np.int64]:
-    """How paths ended, as numbers: by target, by the edge over which they left the region, or not at all."""
-    edges = shooter.structure.basins.region.bounds
-    over = np.concatenate([outcomes.states[:, :2] < edges[:, 0], outcomes.states[:, :2] > edges[:, 1]], axis=1)
-    return outcomes.targets + len(shooter.structure.attractors) * 2 * (over @ 2 ** np.arange(4))
-
-
-def _least(outcomes: Outcomes) -> dict[int, float]:
-    """The least confirmed action of each target."""
-    least: dict[int, float] = {}
-    for target in np.unique(outcomes.targets[outcomes.confirmed]):
-        least[int(target)] = float(outcomes.states[outcomes.confirmed & (outcomes.targets == target), -1].min())
-    return least
-
-
-def _change(history: list[dict[int, float]], rounds: int) -> float:
-    """By how much the least actions fell in the last rounds, relative; infinite if one is new, or there are none."""
-    if len(history) <= rounds or not history[-1]:
-        return math.inf
-    before = history[-1 - rounds]
-    return max((before.get(target, math.inf) / action - 1 for target, action in history[-1].items()), default=math.inf)
+    def energies(self) -> tuple[ActivationEnergy, ...]:
+        """All exit paths, the cheapest first; those that are not the best of their target have no numerical error."""
+        if self.shots is None:
+            return self.estimates
+        known = {(energy.target, energy.value): energy for energy in self.estimates}
+        found = ((branch, known.get((branch.candidate.target, branch.candidate.action))) for branch in self.branches)
+        return tuple(energy or energy_of(self.shots, branch, with_error=False) for branch, energy in found)

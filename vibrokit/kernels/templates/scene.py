@@ -20,6 +20,8 @@ CLAMPED = (False, False)
 ROOTED = (True, True)
 JUMPS = (False, False)
 ORDER = 22
+DERIVATIVES = 0
+COVARIANCE = 0
 
 
 @njit(**OPTIONS)

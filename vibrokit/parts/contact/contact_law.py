@@ -1,4 +1,4 @@
-"""ContactLaw: how hard a stop pushes back."""
+"""ContactLaw: the force of a stop."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from vibrokit.parts.part import Part
 
 
 class ContactLaw(Part):
-    """Force of a stop on the mass, per unit mass, as a function of depth and rate.
+    """Force of a stop on the mass, per unit mass, as a function of depth and rate. Abstract.
 
-    Abstract. Side, position and sign belong to `Barrier`, and so does "no force when apart": the formula is
-    asked at positive depth only. Whether the law is conservative, how smooth it is at first touch, and whether
-    its force jumps there, is derived from the formula.
+    `Barrier` holds side, position and sign, and sets the force to zero without contact; the formula is evaluated at
+    positive depth only. Whether the law is conservative, how smooth it is at first touch, and whether its force jumps
+    there, is derived from the formula.
     """
 
     @abstractmethod
     def force(self, depth: Any, rate: Any) -> Any:
-        """Push on the mass (m s⁻²), positive when it pushes back.
+        """Force on the mass (m s⁻²), positive if it pushes the mass back.
 
         Parameters
         ----------
         depth : sympy.Symbol
-            How far the mass has gone past the stop (m), positive.
+            Depth of the mass beyond the stop (m), positive.
         rate : sympy.Symbol
-            Rate of depth (m s⁻¹), positive when going deeper.
+            Rate of change of depth (m s⁻¹), positive as depth increases.
 
         Returns
         -------

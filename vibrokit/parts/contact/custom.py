@@ -1,4 +1,4 @@
-"""A contact law by formula."""
+"""Contact law given as a formula."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class CustomLaw(FormulaPart, ContactLaw):
     Parameters
     ----------
     formula : str
-        Arithmetic, numbers, constants and the functions of `vibrokit.parts.formula`; read as data, never run.
+        Arithmetic, numbers, constants and the functions of `vibrokit.parts.formula`; it is never run as code.
     **constants : float
-        Values of the names that the formula uses.
+        Values of the other names in the formula.
 
     Examples
     --------
@@ -33,5 +33,5 @@ class CustomLaw(FormulaPart, ContactLaw):
         self._read(formula, constants)
 
     def force(self, depth: Any, rate: Any) -> Any:
-        """Push on the mass, as the formula says."""
+        """Force on the mass: the formula."""
         return self._evaluate(depth, rate)

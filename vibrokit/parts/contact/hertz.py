@@ -21,5 +21,5 @@ class Hertz(ContactLaw):
     stiffness: float = parameter("k", "m^(-1/2) s^-2", minimum=0)
 
     def force(self, depth: Any, rate: Any) -> Any:
-        """Push on the mass: k δ^(3/2)."""
+        """Force on the mass: k δ^(3/2)."""
         return self.stiffness * depth ** Rational(3, 2)

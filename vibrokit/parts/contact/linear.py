@@ -20,5 +20,5 @@ class Linear(ContactLaw):
     stiffness: float = parameter("k", "s^-2", minimum=0)
 
     def force(self, depth: Any, rate: Any) -> Any:
-        """Push on the mass: k δ."""
+        """Force on the mass: k δ."""
         return self.stiffness * depth

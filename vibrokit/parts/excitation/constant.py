@@ -29,5 +29,5 @@ class Constant(Excitation):
 
     @property
     def period(self) -> None:
-        """None: a constant has no period."""
+        """None: a constant force has no period."""
         return None

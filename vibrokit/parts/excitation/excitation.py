@@ -1,4 +1,4 @@
-"""Excitation: a force that depends on time alone."""
+"""Excitation: a force that depends on time only."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vibrokit.parts.part import Part
 
 
 class Excitation(Part):
-    """Force per unit mass that depends on time alone. Abstract."""
+    """Force per unit mass that depends on time only. Abstract."""
 
     @abstractmethod
     def force(self, t: Any) -> Any:
@@ -18,4 +18,4 @@ class Excitation(Part):
     @property
     @abstractmethod
     def period(self) -> float | None:
-        """Period (s); None if the force is constant, `math.inf` if it varies and never repeats."""
+        """Period (s); None if the force is constant, `math.inf` if it varies without period."""

@@ -10,15 +10,15 @@ from vibrokit.parts.part import Part
 
 
 class NoiseModel(Part):
-    """Random force of intensity D, in the sense of Itô. Abstract.
+    """Random force of intensity D, in the Itô sense. Abstract.
 
-    White noise drives the velocity: dv = … dt + amplitude(x, v) √D dW. A model with states of its own (coloured
-    noise) names them in `extra_states`; then the white noise drives the last of these instead, `drift` says how
-    they move without it, and `force` how they push the mass.
+    White noise drives the velocity: dv = … dt + amplitude(x, v) √D dW. A model with extra states (coloured noise)
+    names them in `extra_states`; then the white noise drives the last of these, `drift` gives their rates without
+    noise, and `force` gives their force on the mass.
 
     For developers
     --------------
-    `amplitude` alone makes a complete model. With `extra_states`, write `force` and `drift` as well.
+    `amplitude` alone is a complete model. With `extra_states`, write `force` and `drift` as well.
     """
 
     extra_states: ClassVar[tuple[str, ...]] = ()
@@ -27,12 +27,12 @@ class NoiseModel(Part):
 
     @abstractmethod
     def amplitude(self, x: Any, v: Any) -> Any:
-        """Factor before √D dW, as a SymPy expression in displacement and velocity."""
+        """Factor of √D dW, as a SymPy expression in displacement and velocity."""
 
     def force(self, *extra: Any) -> Any:
-        """Force on the mass (m s⁻²) of the extra states."""
+        """Force of the extra states on the mass (m s⁻²)."""
         return 0
 
     def drift(self, x: Any, v: Any, *extra: Any) -> tuple[Any, ...]:
-        """Rates of the extra states without noise, one for each."""
+        """Rates of the extra states without noise, one per state."""
         return ()

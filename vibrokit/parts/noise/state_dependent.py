@@ -1,4 +1,4 @@
-"""Noise whose strength depends on the state."""
+"""Noise whose amplitude depends on the state."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class StateDependentNoise(FormulaPart, NoiseModel):
     intensity : float
         D, in m² s⁻³, not negative.
     amplitude : str
-        Formula of g; read as data, never run.
+        Formula of g; it is never run as code.
     **constants : float
-        Values of the names that the formula uses.
+        Values of the other names in the formula.
 
     Examples
     --------
@@ -42,5 +42,5 @@ class StateDependentNoise(FormulaPart, NoiseModel):
         return self._declared[:1]
 
     def amplitude(self, x: Any, v: Any) -> Any:
-        """Factor before √D dW, as the formula says."""
+        """Factor of √D dW: the formula."""
         return self._evaluate(x, v)

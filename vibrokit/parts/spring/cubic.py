@@ -9,7 +9,7 @@ from vibrokit.parts.spring.spring import Spring
 
 
 class CubicSpring(Spring):
-    """Duffing's spring: α x + β x³; a double well when α < 0 < β.
+    """Duffing's spring: α x + β x³; a double well if α < 0 < β.
 
     Parameters
     ----------

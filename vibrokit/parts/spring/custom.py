@@ -1,4 +1,4 @@
-"""A spring by formula."""
+"""Spring given as a formula."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from vibrokit.parts.spring.spring import Spring
 
 
 class CustomSpring(FormulaPart, Spring):
-    """Spring given as a formula in ``x`` and ``v``; nonlinear damping may be part of it.
+    """Spring given as a formula in ``x`` and ``v``, nonlinear damping included.
 
     Parameters
     ----------
     formula : str
-        Arithmetic, numbers, constants and the functions of `vibrokit.parts.formula`; read as data, never run.
+        Arithmetic, numbers, constants and the functions of `vibrokit.parts.formula`; it is never run as code.
     **constants : float
-        Values of the names that the formula uses.
+        Values of the other names in the formula.
 
     Examples
     --------
@@ -33,5 +33,5 @@ class CustomSpring(FormulaPart, Spring):
         self._read(formula, constants)
 
     def force(self, x: Any, v: Any) -> Any:
-        """Restoring force, as the formula says."""
+        """Restoring force: the formula."""
         return self._evaluate(x, v)

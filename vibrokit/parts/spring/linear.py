@@ -11,7 +11,7 @@ from vibrokit.parts.spring.spring import Spring
 class LinearSpring(Spring):
     """Linear spring: κ x.
 
-    Without any spring a scene has ω_n² x; give this one to set stiffness and damping apart.
+    A scene without a spring has ω_n² x; use this one to set stiffness and damping independently.
 
     Parameters
     ----------

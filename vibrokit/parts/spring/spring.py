@@ -1,4 +1,4 @@
-"""Spring: the restoring force that acts everywhere."""
+"""Spring: the restoring force at every displacement."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.contacts import Path, contacts_along
 from vibrokit.structure.attractors.lyapunov import LyapunovEstimate
-from vibrokit.structure.cycles import Cycle, equilibrium_exponents, refine_cycle
+from vibrokit.structure.cycles import Cycle, refine_cycle
+from vibrokit.structure.equilibria import equilibrium_exponents
 from vibrokit.structure.orbits import Orbit, exponents_of, moved_by_tightening, refine_orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -39,7 +40,7 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
     )
     multipliers = np.linalg.eigvals(orbit.monodromy).astype(complex)
     duration = 0.0 if resting else period * osc.section_interval
-    exponents = equilibrium_exponents(osc, orbit.point, stepper) if resting else exponents_of(multipliers, duration)
+    exponents = equilibrium_exponents(osc, orbit.point) if resting else exponents_of(multipliers, duration)
 
     def refined(finer: Stepper) -> Array:
         return refine_orbit(osc, orbit.point, period, finer).point

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
 from vibrokit.oscillator import Oscillator
-from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.structure.linear_map import linear_map
 
 _BLOCKS = 20  # of time, for the standard error
 _SIGNIFICANT = 3.0  # standard errors
@@ -101,15 +99,14 @@ def lyapunov_exponent(
     # Directions that differ from start to start, so that even starts close together are not one measurement.
     tangents = np.random.default_rng(0).normal(size=(count, size))
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    identity = np.tile(np.eye(size).ravel(), (count, 1))
     growth = np.zeros((periods, count))
     finite = np.ones(count, dtype=bool)
     for period in range(skipped + periods):
-        ended = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, np.hstack([here, identity]), executor=executor)
-        here = ended.states[:, :size]
-        tangents = np.einsum("kij,kj->ki", ended.states[:, size:].reshape(-1, size, size), tangents)
+        moved = linear_map(osc, here[finite], stepper, executor=executor)
+        here[finite] = moved.images
+        tangents[finite] = np.einsum("kij,kj->ki", moved.derivatives, tangents[finite])
         lengths = np.linalg.norm(tangents, axis=1)
-        finite &= (ended.status == RAN_OUT) & (lengths > 0) & np.isfinite(lengths)
+        finite &= (lengths > 0) & np.isfinite(lengths)
         if not finite.any():
             raise StructureError(
                 f"all {count} trajectories ran out of range within {period + 1} periods, so there is no Lyapunov "

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from vibrokit.kernels.ensemble import Ensemble, Progress, run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import RAN_OUT, REACHED
 from vibrokit.oscillator import Oscillator
@@ -37,7 +37,6 @@ def follow(
     periods: int,
     stepper: Stepper,
     executor: concurrent.futures.Executor | None = None,
-    progress: Progress | None = None,
 ) -> tuple[Ensemble, NDArray[np.int64]]:
     """Follow starts until they come to a known orbit, or for some periods.
 
@@ -50,7 +49,7 @@ def follow(
         Index of the orbit that each start came to; UNSETTLED for those that go on, LEFT for numbers out of range.
     """
     stop = arrival_at(dict(enumerate(orbits)), tolerance)
-    ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor, progress=progress)
+    ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
     return ended, np.where(ended.status == REACHED, ended.label, np.where(ended.status == RAN_OUT, UNSETTLED, LEFT))
 
 
@@ -63,7 +62,6 @@ def watch(
     periods: int,
     stepper: Stepper,
     executor: concurrent.futures.Executor | None = None,
-    progress: Progress | None = None,
 ) -> tuple[Survival, Array, NDArray[np.int64]]:
     """Follow starts until they come to a known orbit, or for a long time, and say how long they live.
 
@@ -80,8 +78,6 @@ def watch(
         How long each start is followed, at most.
     stepper : Stepper
     executor : concurrent.futures.Executor, optional
-    progress : callable, optional
-        Called with (blocks done, blocks in all).
 
     Returns
     -------
@@ -94,7 +90,7 @@ def watch(
         Index of the orbit that each start came to; UNSETTLED for the survivors, LEFT for numbers out of range.
     """
     ended, labels = follow(
-        osc, states, orbits, tolerance=tolerance, periods=periods, stepper=stepper, executor=executor, progress=progress
+        osc, states, orbits, tolerance=tolerance, periods=periods, stepper=stepper, executor=executor
     )
     alive = labels == UNSETTLED
     settled_after = np.where(alive, -1, ended.intervals)

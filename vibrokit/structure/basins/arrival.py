@@ -1,4 +1,4 @@
-"""Arrival: the test for having come to one of some known orbits."""
+"""Arrival: the test for having reached a known orbit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cells of a finished grid may answer for trajectories that pass by them."""
+"""Cells of a finished grid that may classify trajectories which enter them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vibrokit.results.region import Region
 from vibrokit.structure.regions import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
-_AHEAD = 2  # sections over which a cell that answers must be carried to such cells
+_AHEAD = 2  # sections over which a classifying cell must be mapped to classifying cells
 
 Whole = NDArray[np.int64]
 Labels = NDArray[np.int16]
@@ -27,12 +27,12 @@ Mask = NDArray[np.bool_]
 def core_of(
     osc: Oscillator, stepper: Stepper, basins: Basins, margin: int, executor: concurrent.futures.Executor | None = None
 ) -> Basins:
-    """Return the cells whose neighbourhood leads to one attractor for certain, as far as the grid can tell.
+    """Return the cells whose neighbourhood leads to one attractor, as far as the grid resolves.
 
     All cells up to `margin` away must have the cell's label, and the same must hold for the cells that it and its
-    neighbours are carried to in the next two sections. The second test is for tongues of another basin too thin for
-    the grid: the flow widens them, so that they are seen where they go. Without it the small basin of ``hertz-0.570``
-    lost 13% of its area on a grid of 400 × 400 over [−1, 1]², with it not one cell.
+    neighbours are mapped to in the next two sections. The second test detects tongues of another basin too thin for
+    the grid: the flow widens them. Without it the small basin of ``hertz-0.570`` lost 13% of its area on a grid of
+    400 × 400 over [−1, 1]²; with it, not one cell.
 
     Parameters
     ----------
@@ -45,16 +45,16 @@ def core_of(
     Returns
     -------
     Basins
-        UNSETTLED where a cell does not answer.
+        UNSETTLED where a cell does not classify.
     """
-    answers = agreeing(basins.labels, margin)
-    cells = np.flatnonzero(answers)
+    certain = agreeing(basins.labels, margin)
+    cells = np.flatnonzero(certain)
     held, targets = _images(osc, stepper, basins, cells, executor)
     for _ in range(_AHEAD):
-        lost = np.zeros_like(answers)
-        lost.flat[cells[~(held & answers.flat[targets])]] = True
-        answers &= ~ndimage.binary_dilation(lost, np.ones((3, 3), dtype=bool))
-    return Basins(basins.region, np.where(answers, basins.labels, UNSETTLED).astype(np.int16))
+        lost = np.zeros_like(certain)
+        lost.flat[cells[~(held & certain.flat[targets])]] = True
+        certain &= ~ndimage.binary_dilation(lost, np.ones((3, 3), dtype=bool))
+    return Basins(basins.region, np.where(certain, basins.labels, UNSETTLED).astype(np.int16))
 
 
 def agreeing(labels: Labels, margin: int) -> Mask:
@@ -74,7 +74,7 @@ def centres(osc: Oscillator, region: Region, shape: tuple[int, ...], cells: Whol
 def _images(
     osc: Oscillator, stepper: Stepper, basins: Basins, cells: Whole, executor: concurrent.futures.Executor | None
 ) -> tuple[Mask, Whole]:
-    """Carry cells on by one section; return which come to a cell of the same label, and to which cell."""
+    """Map cells by one section; return which reach a cell of the same label, and which cell."""
     shape, labels = basins.labels.shape, basins.labels.flat
     ended = run_ensemble(osc, Flow.STATE, stepper, centres(osc, basins.region, shape, cells), executor=executor)
     low, high = basins.region.bounds.T

@@ -1,9 +1,9 @@
 """Edge tracking: motions that stay on the boundary between two basins.
 
-Two states close together that lead to different attractors have a piece of the boundary between them. Mapped forward
-and brought together again whenever they have drifted apart, they follow a motion on the boundary, which comes to
-what attracts within it: a saddle, as a rule (Battelino, Grebogi, Ott, Yorke and Yorke, Physica D 32, 1988; keeping the
-change of label nearest to one end finds what can be reached from that basin, Grebogi, Nusse, Ott and Yorke, 1988).
+Two close states that lead to different attractors lie on two sides of the boundary. Mapped forward, and brought
+together again whenever they have separated, they follow a motion on the boundary, which converges to an attracting set
+within the boundary, usually a saddle (Battelino, Grebogi, Ott, Yorke and Yorke, Physica D 32, 1988). Keeping the change
+of label nearest to one end finds sets that are accessible from that basin (Grebogi, Nusse, Ott and Yorke, 1988).
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
 """Points for each 2π/ω_n in an autonomous scene, where any time step is a section."""
-_WIDTH = 1e-10  # of the region: to what ends are brought together
-_DRIFTED, _TOGETHER = 60.0, 2.0  # times that: when they are brought together again, and to what at least
-_FEWEST_PIECES, _MOST_PIECES = 3, 63  # that a line between two ends is cut into, all corners carried at once
-_CARRIED = 512  # states at once, about: fewer take as long
+_WIDTH = 1e-10  # of the region's size: target distance of two ends
+_SEPARATED, _TOGETHER = 60.0, 2.0  # times that: distances at which ends are brought together, and count as together
+_FEWEST_PIECES, _MOST_PIECES = 3, 63  # of a line between two ends, all corners classified at once
+_AT_ONCE = 512  # states to classify, about: fewer take as long
 _MOST_CUTS = 60
-_FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label on; the third choice is any
+_FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label; the third choice is random
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 
 class Classifier(Protocol):
-    """What edge tracking asks of a settler: the scene, what carries it, and where states lead."""
+    """What edge tracking needs of a `BasinClassifier`."""
 
     @property
     def osc(self) -> Oscillator:
@@ -44,10 +44,10 @@ class Classifier(Protocol):
 
     @property
     def stepper(self) -> Stepper:
-        """What carries the states."""
+        """Integrates the states."""
 
     def labels(self, states: Array) -> Labels:
-        """Label of what each state leads to."""
+        """Label of the attractor that each state leads to."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ class EdgeTrack:
     Attributes
     ----------
     labels : (int, int)
-        What the two sides lead to at the end of it, the lower first.
+        Labels of the two sides at its end, the lower first.
     points : array (count, n)
         Midpoints between the two sides, at every section; at every sixteenth of 2π/ω_n in an autonomous scene.
     stretches : array (count − 1,)
-        Logarithm of how much the two sides drifted apart from each point to the next.
+        Logarithm of the ratio by which the distance of the two sides grows from each point to the next.
     """
 
     labels: tuple[int, int]
@@ -70,54 +70,53 @@ class EdgeTrack:
 
 
 def edge_states(
-    settler: Classifier, basins: Basins, *, trackers: int = 16, sections: int = 64, rng: np.random.Generator
+    classifier: Classifier, basins: Basins, *, trackers: int = 16, sections: int = 64, rng: np.random.Generator
 ) -> list[EdgeTrack]:
     """Follow motions on the boundaries between the basins of a grid.
 
     Parameters
     ----------
-    settler : Settler
-        Says where states lead, and carries them.
+    classifier : BasinClassifier
     basins : Basins
-        Where to begin: between neighbouring cells of different labels.
+        Motions start between neighbouring cells of different labels.
     trackers : int
-        Most motions for each pair of labels that meet, spread over the cells where they do.
+        Largest number of motions for each pair of labels that meet, distributed over the cells where they do.
     sections : int
-        Length of each motion: from how many points to the next it is followed.
+        Length of each motion.
     rng : numpy.random.Generator
-        Draws the cells, and the change of label that is kept where there are several.
+        Chooses the cells, and the change of label that is kept if there are several.
 
     Returns
     -------
     list of EdgeTrack
-        Without those that lost the boundary.
+        Without motions that lost the boundary.
     """
-    straddles = Straddles.across(settler, basins, trackers, rng)
+    straddles = Straddles.across(classifier, basins, trackers, rng)
     for _ in range(sections):
         straddles.advance()
     return straddles.tracks()
 
 
 class Straddles:
-    """Pairs of states on two sides of a boundary, all carried together.
+    """Pairs of states on two sides of a boundary, integrated together.
 
     Attributes
     ----------
     ends : array (count, 2, n)
     end_labels : int array (count, 2)
     numbers : int array (count,)
-        Which pair each is, of those begun with.
-    origins : int array (pairs begun with, 2)
-        Labels of the cells that each was begun between.
+        Index of each pair among the initial ones.
+    origins : int array (initial pairs, 2)
+        Labels of the cells that each initial pair lies between.
     lost : int
-        How many pairs lost the boundary and were dropped.
+        Number of pairs that lost the boundary and were dropped.
     """
 
     def __init__(
-        self, settler: Classifier, ends: Array, origins: Labels, width: float, rng: np.random.Generator
+        self, classifier: Classifier, ends: Array, origins: Labels, width: float, rng: np.random.Generator
     ) -> None:
-        """Bring the ends of each line together about a change of label on it; drop lines that have none."""
-        self.settler = settler
+        """Bring the ends of each line together around a change of label on it; drop lines without one."""
+        self.classifier = classifier
         self.width = width
         self.rng = rng
         self.ends = ends
@@ -127,25 +126,25 @@ class Straddles:
         self.lost = 0
         self._history: list[list[Array]] = [[] for _ in ends]
         self._stretches: list[list[float]] = [[] for _ in ends]
-        self._settle(np.arange(len(ends)))
+        self._bring_together(np.arange(len(ends)))
 
     @classmethod
     def across(
         cls,
-        settler: Classifier,
+        classifier: Classifier,
         basins: Basins,
         trackers: int,
         rng: np.random.Generator,
         only: Container[tuple[int, int]] | None = None,
     ) -> Straddles:
-        """Begin between neighbouring cells of different labels, at most `trackers` for each pair of labels.
+        """Start between neighbouring cells of different labels, at most `trackers` pairs for each pair of labels.
 
         Parameters
         ----------
-        settler, basins, trackers, rng
+        classifier, basins, trackers, rng
             As for `edge_states`.
         only : collection of (int, int), optional
-            Pairs of labels to begin between, the lower first; all that meet by default.
+            Pairs of labels to start between, the lower first; by default all that meet.
         """
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
@@ -153,9 +152,9 @@ class Straddles:
             if only is None or pair in only:
                 lines.append(spread(centres[cells], trackers, rng))
                 origins.append(np.tile(pair, (len(lines[-1]), 1)))
-        ends = states_at(settler.osc, np.concatenate(lines))
+        ends = states_at(classifier.osc, np.concatenate(lines))
         width = _WIDTH * basins.region.size
-        return cls(settler, ends, np.concatenate(origins), width, rng)
+        return cls(classifier, ends, np.concatenate(origins), width, rng)
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -163,16 +162,16 @@ class Straddles:
     @property
     def interval(self) -> float:
         """Time from one point to the next (s)."""
-        osc = self.settler.osc
+        osc = self.classifier.osc
         return osc.section_interval / (PARTS_OF_A_TURN if osc.autonomous else 1)
 
     def advance(self) -> None:
-        """Map all ends to the next section, and bring those together again that have drifted apart."""
+        """Map all ends to the next section, and bring those together again that have separated."""
         if not len(self):
             return
         count, _, size = self.ends.shape
         before = self._widths()
-        osc, stepper = self.settler.osc, self.settler.stepper
+        osc, stepper = self.classifier.osc, self.classifier.stepper
         states = self.ends.reshape(-1, size)
         self.ends = run_ensemble(osc, Flow.STATE, stepper, states, interval=self.interval).states.reshape(
             count, 2, size
@@ -182,12 +181,10 @@ class Straddles:
             grown = np.log(after / before)
         for stretches, stretch in zip(self._stretches, grown, strict=True):
             stretches.append(float(stretch))
-        drifted = ~(after <= _DRIFTED * self.width)
-        if (
-            drifted.any()
-        ):  # the others are brought together in the same call: it takes as long as its longest trajectory
-            drifted |= after > _TOGETHER * self.width
-        self._settle(np.flatnonzero(drifted))
+        separated = ~(after <= _SEPARATED * self.width)
+        if separated.any():  # the others come along: a call takes as long as its longest trajectory
+            separated |= after > _TOGETHER * self.width
+        self._bring_together(np.flatnonzero(separated))
 
     def history(self, index: int) -> Array:
         """Points of one motion so far, shape (count, n)."""
@@ -208,8 +205,8 @@ class Straddles:
         low, high = sorted(int(label) for label in self.end_labels[index])
         return EdgeTrack((low, high), self.history(index), np.array(self._stretches[index]))
 
-    def _settle(self, wide: NDArray[np.intp]) -> None:
-        """Bring the ends of some pairs together, drop those that straddle nothing, and note where all are."""
+    def _bring_together(self, wide: NDArray[np.intp]) -> None:
+        """Bring the ends of some pairs together, drop pairs on one side of the boundary, and record all places."""
         straddling = np.ones(len(self), dtype=bool)
         for _ in range(_MOST_CUTS):
             if not wide.size:
@@ -224,13 +221,13 @@ class Straddles:
             history.append(point)
 
     def _cut(self, wide: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Cut lines into pieces and keep for each a piece whose ends differ; return which lines have one."""
+        """Cut lines into pieces and keep of each a piece whose ends differ; return which lines have one."""
         low, high = self.ends[wide, 0], self.ends[wide, 1]
-        pieces = int(np.clip(_CARRIED // len(wide) - 1, _FEWEST_PIECES, _MOST_PIECES))
+        pieces = int(np.clip(_AT_ONCE // len(wide) - 1, _FEWEST_PIECES, _MOST_PIECES))
         shares = np.linspace(0.0, 1.0, pieces + 1)[:, None]
         corners = low[:, None] + shares * (high - low)[:, None]
         corners[:, -1] = high
-        labels = self.settler.labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
+        labels = self.classifier.labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
         shrunk = np.zeros(len(wide), dtype=bool)
         for row, index in enumerate(wide):
             known = np.flatnonzero(settled(labels[row]) & np.isfinite(corners[row]).all(axis=1))
@@ -248,15 +245,14 @@ class Straddles:
 
 
 def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Whether labels say where a state leads: to an attractor, or for good out of the region."""
+    """Whether labels are those of states that lead to an attractor, or leave the region for good."""
     return (labels >= 0) | (labels == LEFT)
 
 
 def meeting_cells(basins: Basins) -> dict[tuple[int, int], NDArray[np.intp]]:
     """Return, for each pair of labels that meet, the flat indices of the cells on both sides, shape (count, 2).
 
-    The lower label comes first. Cells that did not settle are passed over; only the nearest meetings of a pair are
-    returned.
+    The lower label is first. Cells that did not settle are skipped; only the nearest meetings of a pair are returned.
     """
     numbers = np.arange(basins.labels.size).reshape(basins.labels.shape)
     meetings: dict[tuple[int, int], list[tuple[int, int, int]]] = {}
@@ -278,7 +274,7 @@ def meeting_cells(basins: Basins) -> dict[tuple[int, int], NDArray[np.intp]]:
 
 
 def spread(lines: Array, most: int, rng: np.random.Generator) -> Array:
-    """Pick at most so many lines (count, 2, 2), each as far as can be from those picked before; the first is drawn."""
+    """Pick at most so many lines (count, 2, 2): a random first one, then each as far from those picked as possible."""
     middles = lines.mean(axis=1)
     middles = middles / np.maximum(np.ptp(middles, axis=0), np.finfo(float).tiny)
     picked = [int(rng.integers(len(lines)))]

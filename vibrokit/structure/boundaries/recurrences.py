@@ -1,4 +1,4 @@
-"""Recurrences: when a motion on a boundary has come to stay at an orbit or a cycle."""
+"""Recurrences: whether a motion on a boundary has converged to an orbit or a cycle."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-_RECURRENCE = 1e-6  # of the region's size: a motion has come to where it was
-_CLOSE = 1e-3  # of the region's size: a motion that keeps so close to where it was
-_STAY = 48  # sections, is coming to an orbit
+_RECURRENCE = 1e-6  # of the region's size: a motion has returned
+_CLOSE = 1e-3  # of the region's size: a motion that returns so closely
+_STAY = 48  # sections in a row converges to an orbit
 
 Array = NDArray[np.float64]
 
@@ -19,9 +19,9 @@ def same_place(points: Array, places: Array, distance: float) -> bool:
 
 
 def recurrence(points: Array, size: float, longest: int) -> int:
-    """After how many sections the last point was come to again, for good; 0 if it was not.
+    """Return the number of sections after which a motion recurs for good; 0 if it does not.
 
-    On a chaotic set a motion passes by periodic orbits at any distance, the smaller the rarer.
+    On a chaotic set a motion passes near periodic orbits at any distance, the smaller the rarer.
     """
     for period in range(1, min(longest, len(points) - 1) + 1):
         apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
@@ -40,7 +40,7 @@ def almost_repeats(points: Array, last: int, longest: int, near: float) -> bool:
 
 
 def closing(points: Array, size: float, interval: float) -> tuple[Array, float] | None:
-    """Guess a turning point of greatest x and the duration of a cycle from the end of a motion, if it closes there."""
+    """Estimate the turning point of greatest x and the duration of a cycle from a motion, if it closes at its end."""
     motion = CubicHermiteSpline(interval * np.arange(len(points)), points[:, 0], points[:, 1])
     turns = motion.derivative().roots(extrapolate=False)
     turns = turns[motion.derivative(2)(turns) < 0]

@@ -165,12 +165,8 @@ def _extrapolated(
 
 def _rates(family: Family, member: Member) -> NDArray[np.complex128]:
     """Exponents at an equilibrium; multipliers of an orbit, without that of a shift along a limit cycle."""
-    multipliers = np.linalg.eigvals(member.monodromy).astype(complex)
-    if family.kind == "equilibrium":
-        return np.log(multipliers) / member.duration
-    if family.kind == "limit cycle":
-        return np.delete(multipliers, np.argmin(np.abs(multipliers - 1)))
-    return multipliers
+    rates = np.linalg.eigvals(member.derivative).astype(complex)
+    return np.delete(rates, np.argmin(np.abs(rates - 1))) if family.kind == "limit cycle" else rates
 
 
 def _tests(family: Family, member: Member, rates: NDArray[np.complex128]) -> dict[str, float]:

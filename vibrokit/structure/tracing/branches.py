@@ -12,10 +12,12 @@ from scipy.spatial import cKDTree
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
 from vibrokit.structure.cycles import Cycle
-from vibrokit.structure.orbits import Orbit, refine_orbit, section_derivative, visited
+from vibrokit.structure.linear_map import linear_map
+from vibrokit.structure.orbits import Orbit, refine_orbit, visited
 from vibrokit.structure.tracing.bifurcations import DOUBLING, Located
 from vibrokit.structure.tracing.families import Family, Member
 from vibrokit.structure.tracing.following import family_of, follow
@@ -30,7 +32,7 @@ Place = tuple[int, int]
 
 
 class Tracing:
-    """Steady states value by value, the links between those of neighbours, and what happens between.
+    """Steady states at each value, the links between neighbouring values, and the bifurcations between.
 
     Parameters
     ----------
@@ -38,9 +40,9 @@ class Tracing:
     path : str
         Of the parameter.
     values : list of float
-        Those at which something was found, ascending.
+        Those with steady states, ascending.
     found : list of list of Attractor
-        What was found at each. Attractors that the search had missed are added, with basin fraction NaN.
+        Attractors at each. Those that the search missed are added, with basin fraction NaN.
     size : array (2,)
         Width of the region in x and in v.
     stepper : Stepper
@@ -63,22 +65,26 @@ class Tracing:
         self._led_to: dict[tuple[int, int, int], Array] = {}
 
     def run(self) -> None:
-        """Follow every orbit to the next value, those that nothing came to back again, and pair what is left."""
+        """Follow every orbit to the next value, those that were not reached back, and pair the others by distance."""
         pairs = range(len(self.links))
-        for pair in pairs:
-            for index in range(len(self.found[pair])):
-                self._follow(pair, index, pair + 1)
-        for pair in reversed(pairs):
-            for index in range(len(self.found[pair + 1])):
-                if index not in self.links[pair].values():
-                    self._follow(pair + 1, index, pair)
-        self.pair_off()
-        for pair in pairs:
-            for first, second in self.links[pair].items():
-                self._find_parents(pair, first, second)
+        with stage("branches", unit="intervals", total=3 * len(pairs)):
+            for pair in pairs:
+                for index in range(len(self.found[pair])):
+                    self._follow(pair, index, pair + 1)
+                advance()
+            for pair in reversed(pairs):
+                for index in range(len(self.found[pair + 1])):
+                    if index not in self.links[pair].values():
+                        self._follow(pair + 1, index, pair)
+                advance()
+            self.pair_off()
+            for pair in pairs:
+                for first, second in self.links[pair].items():
+                    self._find_parents(pair, first, second)
+                advance()
 
     def pair_off(self) -> None:
-        """Join what no family has joined by the distances between the sets of points; quick."""
+        """Join what no family has joined by the distances between the sets of points, which is fast."""
         for pair in range(len(self.links)):
             self._pair_off(pair)
 
@@ -102,7 +108,7 @@ class Tracing:
         try:
             family = family_of(self.osc, self.path, attractor, start, target, self.size, self.stepper)
             followed = follow(family, attractor, start, target)
-        except VibrokitError:  # lost at once: it stays unlinked, and is said to end
+        except VibrokitError:  # it stays unlinked, and a finding says that its branch ends
             return
         self.located += [((at, index), bifurcation) for bifurcation in followed.bifurcations]
         if followed.end is None:
@@ -129,26 +135,26 @@ class Tracing:
         osc = family.at(self.values[at])
         try:
             if family.kind == "limit cycle":
-                cycle = Cycle(member.point, member.duration, member.monodromy, member.residual)
+                cycle = Cycle(member.point, member.duration, member.derivative, member.residual)
                 attractor = describe_cycle(osc, cycle, self.stepper)
             else:
-                _, monodromy = section_derivative(osc, member.point, family.period, self.stepper)
-                orbit = Orbit(member.point, family.period, monodromy, member.residual)
+                found = linear_map(osc, member.point[None], self.stepper, intervals=family.period)
+                orbit = Orbit(member.point, family.period, found.derivatives[0], member.residual)
                 attractor = describe_orbit(osc, orbit, self.stepper)
         except VibrokitError:
             return None
-        self.found[at].append(unshared(attractor))
+        self.found[at].append(without_fraction(attractor))
         self.added += 1
         return len(self.found[at]) - 1
 
     def _points(self, family: Family, member: Member) -> Array:
         if family.kind != "periodic":
             return member.point[None]
-        orbit = Orbit(member.point, family.period, member.monodromy, member.residual)
+        orbit = Orbit(member.point, family.period, member.derivative, member.residual)
         return visited(family.at(member.value), orbit, self.stepper)
 
     def _pair_off(self, pair: int) -> None:
-        """Join by the least sum of distances between the sets of points, those left out that are too far apart."""
+        """Join by the smallest sum of distances between the sets of points, except for those that are too far apart."""
         first, second = self.found[pair], self.found[pair + 1]
         costs = np.full((len(first), len(second)), 2 * _NEAR)
         for row, before in enumerate(first):
@@ -164,7 +170,7 @@ class Tracing:
                 self.links[pair].setdefault(int(row), int(column))
 
     def _find_parents(self, pair: int, first: int, second: int) -> None:
-        """Between orbits whose periods differ by a power of two, follow back those of the periods between."""
+        """Between orbits whose periods differ by a power of two, follow those of the periods between back."""
         few, many = (pair, first), (pair + 1, second)
         if self.found[pair][first].period > self.found[pair + 1][second].period:
             few, many = many, few
@@ -186,15 +192,15 @@ class Tracing:
             period //= 2
 
 
-def unshared(attractor: Attractor) -> Attractor:
-    """Return the same with a basin fraction that is not known."""
+def without_fraction(attractor: Attractor) -> Attractor:
+    """Return an attractor whose basin fraction is unknown."""
     return dataclasses.replace(attractor, basin_fraction=np.nan, basin_fraction_error=np.nan)
 
 
 def _apart(first: Array, second: Array, size: Array) -> float:
-    """How far the points of one set are from the other set at most; the smaller of the two ways round.
+    """Largest distance of a point of one set from the other set; the smaller of the two directions.
 
-    So an orbit stays near the set that it came from, or went into, when its period doubles or it becomes chaotic.
+    So an orbit stays near the set from which it bifurcates when its period doubles or it becomes chaotic.
     """
     a, b = first[:, :2] / size, second[:, :2] / size
     return float(min(cKDTree(b).query(a)[0].max(), cKDTree(a).query(b)[0].max()))

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.structure.cycles import cycle_equations, turning_point
+from vibrokit.structure.equilibria import equilibrium_equations
+from vibrokit.structure.newton import Evaluation, newton
+from vibrokit.structure.orbits import section_equations
 
 _ITERATIONS = 12
 _CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
-_NUDGE = 1e-4  # share of the span that a derivative in the parameter is taken over
-_MOMENT = 1e-4  # share of a cycle's duration that its rate of change is taken over
-_ONE_ORBIT = 1e-5  # the same for an orbit and its image after a part of its period
-_RESTING = 1e-2  # of the sizes: motion in a cycle's duration below which it is none
-_SHORT = 0.25  # how far from the identity the flow that tells an equilibrium may be
+_NUDGE = 1e-4  # share of the span over which the difference for a derivative in the parameter is taken
+_ONE_ORBIT = 1e-5  # relative distance of an orbit from its image after a part of its period, if it repeats then
+_RESTING = 1e-2  # motion within the duration, relative to the sizes, below which there is no cycle
 
 Array = NDArray[np.float64]
 
@@ -37,11 +41,11 @@ class Member:
     point : array (n,)
         On the section.
     duration : float
-        Time after which it is compared with itself (s).
-    monodromy : array (n, n)
-        Derivative of the flow over the duration.
+        Time after which it repeats (s); 0 for an equilibrium.
+    derivative : array (n, n)
+        Derivative of the flow over the duration; at an equilibrium, of the defect.
     defect : array (n,)
-        Image of the point less the point.
+        Image of the point less the point; at an equilibrium, the rate of change times a sixteenth of 2π/ω_n.
     jacobian : array (n, n)
         Derivative of the defect in the unknowns, each in units of its size.
     """
@@ -50,52 +54,45 @@ class Member:
     place: Array
     point: Array
     duration: float
-    monodromy: Array
+    derivative: Array
     defect: Array
     jacobian: Array
 
     @property
     def residual(self) -> float:
-        """Distance of the point from its image."""
+        """Size of the defect."""
         return float(np.linalg.norm(self.defect))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Family:
-    """Steady motions of one kind, as the solutions of defect(unknowns, value) = 0.
-
-    The unknowns are the point; for a limit cycle the point is a turning point, whose velocity is 0, and its duration
-    takes the place of the velocity.
+class Family(ABC):
+    """Steady motions of one kind, as the solutions of defect(unknowns, value) = 0. Abstract.
 
     Attributes
     ----------
     osc : Oscillator
     path : str
         Of the parameter.
-    kind : str
-        ``"periodic"``, ``"equilibrium"`` or ``"limit cycle"``.
     period : int
         In forcing periods, for periodic ones.
     sizes : array (n,)
-        By which the unknowns are measured.
+        Units of the unknowns.
     span : float
-        By which the parameter is measured.
+        Unit of the parameter.
     middle : float
-        A value between those that will be asked for.
+        A value amid those at which the family is evaluated.
     stepper : Stepper
-    interval : float
-        For equilibria: time over which the flow is looked at (s).
     """
+
+    kind: ClassVar[str]
 
     osc: Oscillator
     path: str
-    kind: str
     period: int
     sizes: Array
     span: float
     middle: float
     stepper: Stepper
-    interval: float = 0.0
 
     def at(self, value: float) -> Oscillator:
         """Return the scene at a value of the parameter."""
@@ -105,23 +102,20 @@ class Family:
         """Return unknowns and value, each in its unit."""
         return np.append(unknowns / self.sizes, value / self.span)
 
+    @abstractmethod
+    def equations(self, osc: Oscillator) -> Callable[[Array], Evaluation]:
+        """Return the equations of the defect at one value of the parameter, and the derivative that belongs to it."""
+
+    @abstractmethod
+    def parted(self, osc: Oscillator, unknowns: Array) -> tuple[Array, float]:
+        """Return the point and the duration that unknowns stand for."""
+
     def member(self, place: Array) -> Member:
         """Evaluate the defect and its derivatives at a place, which need not be on the family."""
         value, unknowns = float(place[-1] * self.span), place[:-1] * self.sizes
-        osc, (point, duration) = self.at(value), self._start(unknowns)
-        if self.kind == "periodic":
-            duration = self.period * osc.section_interval
-        size = len(point)
-        start = np.concatenate([point, np.eye(size).ravel()])
-        image = self._flow(osc, Flow.STATE_VARIATIONAL, start, duration)
-        monodromy = image[size:].reshape(size, size)
-        jacobian = monodromy - np.eye(size)
-        if self.kind == "limit cycle":
-            jacobian[:, 1] = self._rate(osc, image[:size], duration)
-            if duration * np.abs(jacobian[:, 1] / self.sizes).max() < _RESTING:
-                raise StructureError("Newton's method for a limit cycle came to an equilibrium.")
-        defect = image[:size] - point
-        return Member(value, place, point, duration, monodromy, defect, jacobian * self.sizes)
+        osc = self.at(value)
+        (defect,), (jacobian,), (derivative,) = self.equations(osc)(unknowns[None])
+        return Member(value, place, *self.parted(osc, unknowns), derivative, defect, jacobian * self.sizes)
 
     def corrected(self, guess: Array, slope: Array, normal: Array) -> Member:
         """Return the member on the plane through a guess, by Newton's method until the residual no longer falls.
@@ -137,42 +131,39 @@ class Family:
         Raises
         ------
         StructureError
-            The iteration did not come near any member.
+            The iteration did not converge to a member.
         """
-        best, place = None, guess
-        for _ in range(_ITERATIONS):
-            member = self.member(place)
-            if not np.isfinite(member.residual) or (best is not None and member.residual >= best.residual):
-                break
-            best = member
-            matrix = np.vstack([np.column_stack([member.jacobian, slope]), normal])
-            try:
-                place = place + np.linalg.solve(matrix, np.append(-member.defect, normal @ (guess - place)))
-            except np.linalg.LinAlgError:
-                break
-        if best is None or best.residual > _CLOSED * float(np.linalg.norm(self.sizes)):
+
+        def evaluate(places: Array) -> Evaluation:
+            member = self.member(places[0])
+            residual = np.append(member.defect, normal @ (places[0] - guess))
+            jacobian = np.vstack([np.column_stack([member.jacobian, slope]), normal])
+            return Evaluation(residual[None], jacobian[None], np.array([member]))
+
+        _, (residual,), members = newton(evaluate, guess[None], iterations=_ITERATIONS)
+        if not residual <= _CLOSED * float(np.linalg.norm(self.sizes)):
             value = float(guess[-1] * self.span)
             raise StructureError(f"Newton's method found no {self.kind} motion near {self.path} = {value:g}.")
-        return best
+        found: Member = members[0]
+        return found
 
     def slope(self, member: Member) -> Array:
-        """Return the derivative of the defect in the parameter, in units of the span: a difference, inwards."""
+        """Return the derivative of the defect in the parameter, in units of the span: a difference, inwards.
+
+        Raises
+        ------
+        StructureError
+            The motion goes out of range at the neighbouring value.
+        """
         step = np.copysign(_NUDGE, self.middle - member.value)
-        osc = self.at(member.value + step * self.span)
-        duration = self.period * osc.section_interval if self.kind == "periodic" else member.duration
-        image = self._flow(osc, Flow.STATE, member.point, duration)
-        return (image - member.point - member.defect) / step
+        nudged = self.equations(self.at(member.value + step * self.span))(member.place[None, :-1] * self.sizes)
+        slope = np.asarray((nudged.residuals[0] - member.defect) / step)
+        if not np.isfinite(slope).all():
+            raise StructureError(f"a trajectory went out of range from {tuple(member.point.tolist())}.")
+        return slope
 
     def closes_early(self, member: Member) -> bool:
-        """Whether an orbit repeats after a part of its period: then it is of another family, which this one met."""
-        if self.kind != "periodic":
-            return False
-        osc = self.at(member.value)
-        for parts in (parts for parts in range(2, self.period + 1) if self.period % parts == 0):
-            shorter = dataclasses.replace(self, period=self.period // parts)
-            image = shorter._flow(osc, Flow.STATE, member.point, 0.0)
-            if np.linalg.norm((image - member.point) / self.sizes) < _ONE_ORBIT:
-                return True
+        """Whether an orbit repeats after a part of its period; then it belongs to another family, met by this one."""
         return False
 
     def tangent(self, member: Member, slope: Array, ahead: Array) -> Array:
@@ -180,41 +171,66 @@ class Family:
         tangent: Array = np.linalg.svd(np.column_stack([member.jacobian, slope]))[2][-1]
         return tangent if tangent @ ahead >= 0 else -tangent
 
-    def _start(self, unknowns: Array) -> tuple[Array, float]:
-        if self.kind != "limit cycle":
-            return unknowns, self.interval
-        if not unknowns[1] > 0:
-            raise StructureError(f"Newton's method for a limit cycle came to the duration {unknowns[1]:g}.")
-        point = unknowns.copy()
-        point[1] = 0.0
-        return point, float(unknowns[1])
 
-    def _flow(self, osc: Oscillator, flow: Flow, start: Array, duration: float) -> Array:
-        periodic = self.kind == "periodic"
-        count, interval = (self.period, None) if periodic else (1, duration)
-        ended = run_ensemble(osc, flow, self.stepper, start[None], count, interval=interval)
-        if ended.intervals[0] < count:
-            raise StructureError(f"a trajectory ran out of range from {tuple(start[:2].tolist())}.")
-        return ended.states[0]
+class PeriodicFamily(Family):
+    """Periodic orbits of a scene with periodic excitation; the unknowns are the point."""
 
-    def _rate(self, osc: Oscillator, state: Array, duration: float) -> Array:
-        """Rate of change of an autonomous scene's state, from two short flights."""
-        moment = _MOMENT * duration
-        once = self._flow(osc, Flow.STATE, state, moment)
-        twice = self._flow(osc, Flow.STATE, state, 2 * moment)
-        return (4 * once - twice - 3 * state) / (2 * moment)
+    kind: ClassVar[str] = "periodic"
+
+    def equations(self, osc: Oscillator) -> Callable[[Array], Evaluation]:
+        """Return those of a fixed point of the section map's power."""
+        return section_equations(osc, self.period, self.stepper)
+
+    def parted(self, osc: Oscillator, unknowns: Array) -> tuple[Array, float]:
+        """Return the point and the period."""
+        return unknowns, self.period * osc.section_interval
+
+    def closes_early(self, member: Member) -> bool:
+        """Whether an orbit repeats after a part of its period; then it belongs to another family, met by this one."""
+        osc = self.at(member.value)
+        for period in (period for period in range(1, self.period) if self.period % period == 0):
+            moved = section_equations(osc, period, self.stepper)(member.point[None]).residuals[0]
+            if np.linalg.norm(moved / self.sizes) < _ONE_ORBIT:
+                return True
+        return False
 
 
-def short_interval(osc: Oscillator, point: Array, stepper: Stepper) -> float:
-    """Return a time over which the flow at an equilibrium is so near the identity that its logarithm is the rates."""
-    size = len(point)
-    units = np.ones(size)
-    units[1] = osc.natural_frequency
-    start, interval = np.concatenate([point, np.eye(size).ravel()]), osc.section_interval / 16
-    for _ in range(60):
-        image = run_ensemble(osc, Flow.STATE_VARIATIONAL, stepper, start[None], 1, interval=interval).states[0]
-        change = image[size:].reshape(size, size) - np.eye(size)
-        if np.linalg.norm(change * units / units[:, None]) < _SHORT:
-            break
-        interval /= 2
-    return float(interval)
+class EquilibriumFamily(Family):
+    """Equilibria of a scene without periodic excitation; the unknowns are the point."""
+
+    kind: ClassVar[str] = "equilibrium"
+
+    def equations(self, osc: Oscillator) -> Callable[[Array], Evaluation]:
+        """Return those of a zero of the vector field."""
+        return equilibrium_equations(osc)
+
+    def parted(self, osc: Oscillator, unknowns: Array) -> tuple[Array, float]:
+        """Return the point and 0."""
+        return unknowns, 0.0
+
+
+class CycleFamily(Family):
+    """Limit cycles: the point is a turning point, with v = 0, and the duration takes the place of v as an unknown."""
+
+    kind: ClassVar[str] = "limit cycle"
+
+    def equations(self, osc: Oscillator) -> Callable[[Array], Evaluation]:
+        """Return those of a cycle."""
+        return cycle_equations(osc, self.stepper)
+
+    def parted(self, osc: Oscillator, unknowns: Array) -> tuple[Array, float]:
+        """Return the turning point and the duration."""
+        return turning_point(unknowns), float(unknowns[1])
+
+    def member(self, place: Array) -> Member:
+        """Evaluate the defect and its derivatives; a StructureError is raised at an equilibrium."""
+        member = super().member(place)
+        if np.abs(member.jacobian[:, 1] / self.sizes).max() < _RESTING:  # the rate of change times the duration
+            raise StructureError("Newton's method for a limit cycle converged to an equilibrium.")
+        return member
+
+
+FAMILIES: Mapping[str, type[Family]] = MappingProxyType(
+    {family.kind: family for family in (PeriodicFamily, EquilibriumFamily, CycleFamily)}
+)
+"""The family of each kind of attractor that repeats."""

@@ -13,7 +13,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
-from vibrokit.structure.tracing.families import Family, Member, short_interval
+from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
 _MOST_STEPS = 800
 _LONGEST = 0.01  # share of the region's size that a motion may move in one step
@@ -63,13 +63,10 @@ def family_of(
     """
     point = attractor.points[0]
     sizes = np.append(size, np.full(len(point) - 2, size[1]))
-    interval = 0.0
-    if attractor.kind == "equilibrium":
-        interval = short_interval(osc.replace({path: start}), point, stepper)
-    elif attractor.kind == "limit cycle":
+    if attractor.kind == "limit cycle":
         sizes[1] = attractor.duration
     span, middle = abs(target - start), 0.5 * (start + target)
-    return Family(osc, path, attractor.kind, attractor.period, sizes, span, middle, stepper, interval)
+    return FAMILIES[attractor.kind](osc, path, attractor.period, sizes, span, middle, stepper)
 
 
 def follow(family: Family, attractor: Attractor, start: float, target: float) -> Followed:

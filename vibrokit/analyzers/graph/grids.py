@@ -1,0 +1,104 @@
+"""Grids: the nodes at each phase of a period, and where states lie among them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MARGIN = 0.1  # of the width of the nodes that a closer grid has to cover, added on each side
+_MARGIN_IN_NODES = 3
+_WIDER = 0.3  # of the width: how much a grid grows at a side
+_EDGE = 3  # nodes at a side that make it grow
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Grids:
+    """A grid of nodes (x, v) for each phase, all with the same number of nodes.
+
+    Attributes
+    ----------
+    boxes : array (phases, 2, 2)
+        Bounds of x and of v; the outermost nodes lie on them.
+    shape : (int, int)
+        Nodes in x and in v.
+    step : float
+        Time from phase to phase (s).
+    """
+
+    boxes: Array
+    shape: tuple[int, int]
+    step: float
+
+    @property
+    def phases(self) -> int:
+        """Number of phases: 1 for an autonomous scene."""
+        return len(self.boxes)
+
+    @property
+    def area(self) -> float:
+        """Area of all boxes together."""
+        return float(np.prod(np.diff(self.boxes, axis=2)[..., 0], axis=1).sum())
+
+    def time(self, phase: int) -> float:
+        """Time of a phase since the section (s)."""
+        return phase * self.step
+
+    def spacing(self, phase: int) -> Array:
+        """Distance between nodes in x and in v, shape (2,)."""
+        widths: Array = np.diff(self.boxes[phase], axis=1)[:, 0] / (np.array(self.shape) - 1)
+        return widths
+
+    def nodes(self, phase: int) -> Array:
+        """States of the nodes, shape (nx, nv, 2)."""
+        axes = [np.linspace(low, high, count) for (low, high), count in zip(self.boxes[phase], self.shape, strict=True)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    def index(self, phase: int, states: Array) -> Array:
+        """Return the fractional indices of states (…, ≥ 2), shape (…, 2)."""
+        index: Array = (states[..., :2] - self.boxes[phase, :, 0]) / self.spacing(phase)
+        return index
+
+    def states(self, phase: int, index: Array) -> Array:
+        """Return the states at fractional indices (…, 2)."""
+        states: Array = self.boxes[phase, :, 0] + index * self.spacing(phase)
+        return states
+
+    def inside(self, phase: int, states: Array) -> Mask:
+        """Return which states are at least one node away from the edge."""
+        index = self.index(phase, states)
+        return np.all((index >= 1) & (index <= np.array(self.shape) - 2), axis=-1)
+
+    def with_shape(self, shape: tuple[int, int]) -> Grids:
+        """Return grids on the same boxes with another number of nodes."""
+        return dataclasses.replace(self, shape=shape)
+
+    def with_double_step(self) -> Grids:
+        """Return every second grid, or the only one."""
+        return dataclasses.replace(self, boxes=self.boxes[::2], step=2 * self.step)
+
+    def widened(self, needed: list[Mask]) -> Grids:
+        """Return grids that reach farther on each side where needed nodes lie; the same grids if there are none."""
+        boxes = self.boxes.copy()
+        for phase, mask in enumerate(needed):
+            more = _WIDER * np.diff(self.boxes[phase], axis=1)[:, 0]
+            for axis, edge in enumerate((mask, mask.T)):
+                boxes[phase, axis, 0] -= more[axis] * bool(edge[:_EDGE].any())
+                boxes[phase, axis, 1] += more[axis] * bool(edge[-_EDGE:].any())
+        return self if np.array_equal(boxes, self.boxes) else dataclasses.replace(self, boxes=boxes)
+
+    def zoomed(self, needed: list[Mask]) -> Grids:
+        """Return grids that cover the needed nodes of each phase, with a margin."""
+        boxes = self.boxes.copy()
+        for phase, mask in enumerate(needed):
+            if mask.any():
+                states = self.nodes(phase)[mask]
+                low, high = states.min(axis=0), states.max(axis=0)
+                margin = _MARGIN * (high - low) + _MARGIN_IN_NODES * self.spacing(phase)
+                boxes[phase, :, 0] = np.maximum(low - margin, boxes[phase, :, 0])
+                boxes[phase, :, 1] = np.minimum(high + margin, boxes[phase, :, 1])
+        return dataclasses.replace(self, boxes=boxes)

@@ -1,0 +1,239 @@
+"""GridHierarchy: one potential on finer and coarser grids and with longer steps, whose differences give the error."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.graph.grids import Grids
+from vibrokit.analyzers.graph.potential import Potential, quasi_potential
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.graph.targets import ExitTarget
+from vibrokit.analyzers.graph.tracing import SolvedGrid, distinct
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.progress import stage
+
+_SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
+_MARGIN = 0.04  # of the width, on each side of them
+_ROOM = 1.2  # ceiling of V in units of the costliest exit
+_NEAR_CEILING = 0.95  # of the ceiling: a value above it may be that of the ceiling
+_RAISE, _RAISES = 3.0, 6  # factor and number of trials for a higher ceiling
+_WIDENINGS = 6  # of the first grid, each by 30 % at a side: 5 times the region
+_ZOOMS, _WORTHWHILE = 4, 0.8  # closer grids, and the ratio of areas above which another one does not pay
+_STEP_TOLERANCE = (
+    0.01  # relative change of a cost by linearization that is accepted: below the error of the default grid
+)
+_PATH_FACTOR = 2.0  # on the difference from a path's action, because the path's fixed ends make it an upper bound
+_STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at least with the square of the step
+_FEWEST_NODES = 16  # along a side of the coarse grids
+
+Mask = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TargetEstimate:
+    """What reaching an exit target costs.
+
+    Attributes
+    ----------
+    value, error : float
+        Infinite if the target was not reached.
+    candidates : tuple of Candidate
+        Distinct paths, the cheapest first; their last states lie beyond the exit.
+    """
+
+    value: float
+    error: float
+    candidates: tuple[Candidate, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CoarseGrids:
+    """The potential on half as many nodes along each side.
+
+    Attributes
+    ----------
+    whole : SolvedGrid
+        On all that the region covers.
+    coarse : SolvedGrid
+        On what can be reached for little more than the costliest exit.
+    long : SolvedGrid
+        The same with steps twice as long.
+    """
+
+    whole: SolvedGrid
+    coarse: SolvedGrid
+    long: SolvedGrid
+
+    def linearization_error(self, targets: Sequence[ExitTarget]) -> float:
+        """Largest relative change of an exit's cost by linearization over a step."""
+        return max((path.linearization_error for t in targets for path in self.coarse.paths(t)), default=0.0)
+
+    def excess(self, targets: Sequence[ExitTarget]) -> float:
+        """Largest relative difference between V at a target and the action of the path that V leads along."""
+        found = [(self.coarse.arrival(t).value, self.coarse.paths(t)) for t in targets]
+        return max((abs(value / paths[0].candidate.action - 1) for value, paths in found if paths), default=0.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GridHierarchy:
+    """The potential on the nodes that were asked for, and on fewer.
+
+    Attributes
+    ----------
+    fine : SolvedGrid
+    coarser : CoarseGrids
+    """
+
+    fine: SolvedGrid
+    coarser: CoarseGrids
+
+    def estimate(self, target: ExitTarget) -> TargetEstimate:
+        """Return what an exit target costs.
+
+        The error is the change by halving the nodes, the difference from a path's action by Hamilton's equations (if
+        no path was traced, half the change by doubling the step), and that of the target's own place.
+        """
+        arrival = self.fine.arrival(target)
+        fine, coarse, long = (
+            grid.arrival(target).value for grid in (self.fine, self.coarser.coarse, self.coarser.long)
+        )
+        reached = (self.fine, self.coarser.coarse) if np.isfinite(fine) else (self.coarser.whole,)
+        paths = distinct(path for grid in reached for path in grid.paths(target))
+        if np.isfinite([fine, coarse, long]).all():
+            by_step = (
+                _PATH_FACTOR * abs(paths[0].candidate.action - fine) if paths else _STEP_FACTOR * abs(coarse - long)
+            )
+            value, error = fine, abs(fine - coarse) + by_step + arrival.error
+        else:
+            value = error = self.coarser.whole.arrival(target).value
+        return TargetEstimate(value, error, tuple(path.candidate for path in paths))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HierarchySearch:
+    """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs.
+
+    Attributes
+    ----------
+    problem : ExitProblem
+    model : StepModel
+    shape : (int, int)
+        Nodes in x and in v.
+    steps_per_period : tuple of int
+        To be tried in turn.
+    """
+
+    problem: ExitProblem
+    model: StepModel
+    shape: tuple[int, int]
+    steps_per_period: tuple[int, ...]
+
+    def estimates(self, targets: Sequence[ExitTarget]) -> tuple[dict[ExitTarget, TargetEstimate], Potential]:
+        """Return what some targets cost, and the potential on the finest grid that covers them.
+
+        Raises
+        ------
+        StructureError
+            No target was reached, or the attractor is not hyperbolic.
+        """
+        with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
+            hierarchy = self._hierarchy(targets)
+            return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
+
+    def _hierarchy(self, targets: Sequence[ExitTarget]) -> GridHierarchy:
+        """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
+
+        Steps are not shortened beyond where that takes V farther from the actions of its paths: each step adds an error
+        of interpolation.
+        """
+        first, *shorter = self.steps_per_period
+        coarser = self._coarser(first, targets)
+        for count in shorter:
+            if coarser.linearization_error(targets) <= _STEP_TOLERANCE:
+                break
+            tried = self._coarser(count, targets)
+            if tried.excess(targets) > max(coarser.excess(targets), _STEP_TOLERANCE):
+                break
+            coarser = tried
+        grids = coarser.coarse.potential.grids.with_shape(self.shape)
+        fine = self._solved(grids, _ROOM * coarser.coarse.highest(targets), targets)
+        return GridHierarchy(fine, coarser)
+
+    def _coarser(self, steps: int, targets: Sequence[ExitTarget]) -> CoarseGrids:
+        """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit."""
+        grids = self._covering(steps)
+        whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
+        for _ in range(_WIDENINGS):
+            wider = grids.widened(self._before_exit(whole, whole.highest(targets)))
+            if wider is grids:
+                break
+            grids = wider
+            whole = self._solved(grids, 2 * whole.highest(targets), targets)
+        coarse = whole
+        for _ in range(_ZOOMS):
+            ceiling = _ROOM * coarse.highest(targets)
+            zoomed = grids.zoomed(self._before_exit(coarse, ceiling))
+            if coarse is not whole and zoomed.area > _WORTHWHILE * grids.area:
+                break
+            grids = zoomed
+            coarse = self._solved(grids, ceiling, targets)
+        long = self._solved(grids.with_double_step(), _ROOM * coarse.highest(targets), targets)
+        return CoarseGrids(whole, coarse, long)
+
+    def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
+        """Solve up to a ceiling of V, which is raised until the targets lie well below it."""
+        for _ in range(_RAISES):
+            potential = quasi_potential(self.model, self.problem.attractor, grids, ceiling)
+            solved = SolvedGrid(self.problem, self.model, potential)
+            if solved.highest(targets) < _NEAR_CEILING * ceiling:
+                return solved
+            ceiling *= _RAISE
+        raise StructureError(
+            f"the graph reaches no exit of {self.problem.attractor.name}: the region or the number of nodes leaves no "
+            "room for a path; widen the region or raise the number of nodes."
+        )
+
+    def _covering(self, steps: int) -> Grids:
+        """Grids that cover the region of the section, and in the other phases also its image."""
+        scene, region = self.problem.scene, self.problem.structure.basins.region
+        step = scene.section_interval / steps
+        states = region.cell_centres((_SAMPLES, _SAMPLES))
+        boxes = []
+        for phase in range(1 if scene.autonomous else steps):
+            low = np.minimum(states.min(axis=0), region.bounds[:, 0])
+            high = np.maximum(states.max(axis=0), region.bounds[:, 1])
+            margin = _MARGIN * (high - low)
+            boxes.append(np.stack([low - margin, high + margin], axis=1))
+            images = self.model.images(states, phase * step, step)
+            states = images[np.isfinite(images).all(axis=1)]
+        nx, nv = self.shape
+        return Grids(np.array(boxes), (max(_FEWEST_NODES, nx // 2), max(_FEWEST_NODES, nv // 2)), step)
+
+    def _before_exit(self, solved: SolvedGrid, ceiling: float) -> list[Mask]:
+        """By phase: which nodes lie before the exit, with V below a ceiling."""
+        grids, values = solved.potential.grids, solved.potential.values
+        inside = self._not_out if self.problem.exit.by_position else self._in_basin
+        return [(values[phase] < ceiling) & inside(grids, phase) for phase in range(grids.phases)]
+
+    def _not_out(self, grids: Grids, phase: int) -> Mask:
+        return ~self.problem.is_out(grids.nodes(phase))
+
+    def _in_basin(self, grids: Grids, phase: int) -> Mask:
+        """Which nodes lead to the attractor, according to the cells of the section that they come to."""
+        states = grids.nodes(phase).reshape(-1, 2)
+        if phase:
+            rest = self.problem.scene.section_interval - grids.time(phase)
+            states = self.model.images(states, grids.time(phase), rest)
+        basins = self.problem.structure.basins
+        low, high = basins.region.bounds.T
+        place = (states - low) / (high - low)
+        known = np.all((place >= 0) & (place < 1), axis=1)
+        cells = np.where(known[:, None], place * basins.labels.shape, 0).astype(np.int64)
+        mask: Mask = known & (basins.labels[tuple(cells.T)] == self.problem.source)
+        return mask.reshape(grids.shape)

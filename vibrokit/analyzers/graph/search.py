@@ -1,0 +1,127 @@
+"""GraphSearch: settings of the graph, and the search itself."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from numbers import Real
+
+import numpy as np
+
+from vibrokit.analyzers.graph.hierarchy import HierarchySearch
+from vibrokit.analyzers.graph.path_ends import exit_targets
+from vibrokit.analyzers.graph.solution import GraphSolution, solutions
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.oscillator import Oscillator
+from vibrokit.structure.request import pair, whole
+from vibrokit.symbolic.flow_kind import Flow
+
+_BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predecessor, uphill start, flags
+_BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
+_ALL_GRIDS = 1.9  # memory of all grids together, in units of the finest
+_FEWEST_NODES = 32
+_MOST_STEPS = 64
+_STEPS_PER_PERIOD = (8, 16, 32, 64)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GraphSearch:
+    """Search for the least action from an attractor to its exits, as a shortest path over time and space.
+
+    The period is divided into steps, and the section at each of these phases into nodes. A step from a state x to a
+    node y costs ½ eᵀ C⁻¹ e, where e is the distance from y to the image of x without noise, and C is the covariance
+    that noise adds along the step. The least sum of such costs from the attractor is the quasi-potential V. Value
+    iteration finds it as a shortest path over the phases. In it x may be any state, with V interpolated between nodes:
+    if x were a node too, and damping is weak, grid rounding would add more action than the path itself. Near the
+    attractor V is the exact quadratic form.
+
+    The error estimate of an exit is the change when the number of nodes along each side is halved, and the difference
+    from the action of the graph's path after that is relaxed by Hamilton's equations. The latter measures what
+    linearization over a step changes: it can be much over a whole period, and is some 0.2 % over an eighth of it.
+
+    Parameters
+    ----------
+    nodes : (int, int)
+        Nodes in x and in v.
+    steps_per_period : int, optional
+        Steps of time in a section interval; even. By default 8, doubled (up to 64) until linearization over a step
+        changes no cost by more than 1 %.
+    max_memory_gib : float
+        Memory that the search may take (GiB).
+
+    Raises
+    ------
+    StructureError
+        A setting has a value that is not allowed.
+    """
+
+    nodes: tuple[int, int] = (360, 360)
+    steps_per_period: int | None = None
+    max_memory_gib: float = 4.0
+
+    def __post_init__(self) -> None:
+        name, steps, memory = type(self).__name__, self.steps_per_period, self.max_memory_gib
+        object.__setattr__(self, "nodes", pair(f"{name}: nodes", self.nodes))
+        if min(self.nodes) < _FEWEST_NODES:
+            raise StructureError(f"{name}: nodes must be {_FEWEST_NODES} or more in x and in v, got {self.nodes}.")
+        if steps is not None:
+            whole(f"{name}: steps_per_period", steps, 2, _MOST_STEPS)
+            if steps % 2:
+                raise StructureError(
+                    f"{name}: steps_per_period must be an even number, got {steps}; the error is estimated with steps "
+                    "twice as long."
+                )
+        if isinstance(memory, bool) or not isinstance(memory, Real) or not memory > 0:
+            raise StructureError(f"{name}: max_memory_gib must be a positive number of GiB, got {shown(memory)}.")
+
+    def search(self, problem: ExitProblem) -> GraphSolution:
+        """Search the exits of one attractor.
+
+        Raises
+        ------
+        SceneError
+            The noise has its own states.
+        StructureError
+            No exit was reached, the attractor is not hyperbolic or lies outside the structure's region, the exit has a
+            path end that the graph does not know, or the grids would take too much memory.
+        """
+        *_, best = self.solutions(problem)
+        return best
+
+    def solutions(self, problem: ExitProblem) -> Iterator[GraphSolution]:
+        """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`."""
+        noise, attractor = problem.osc.noise, problem.attractor
+        if noise is not None and noise.extra_states:
+            raise SceneError(
+                f"the noise has {len(noise.extra_states)} states of its own, and the graph covers x and v only; use "
+                "ActionPlot."
+            )
+        low, high = problem.structure.basins.region.bounds.T
+        if np.any((attractor.points[:, :2] < low) | (attractor.points[:, :2] > high)):
+            raise StructureError(
+                f"{attractor.name} lies outside the region of the structure, which is all that the graph covers; find "
+                "the structure on a wider region."
+            )
+        steps = self._affordable_steps(problem.scene)
+        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+        search = HierarchySearch(problem, model, self.nodes, steps)
+        yield from solutions(problem, search, exit_targets(problem, model))
+
+    def _affordable_steps(self, scene: Oscillator) -> tuple[int, ...]:
+        """Numbers of steps to try that there is memory for."""
+        wanted = _STEPS_PER_PERIOD if self.steps_per_period is None else (self.steps_per_period,)
+        allowed = tuple(steps for steps in wanted if self._memory(scene, steps) <= self.max_memory_gib)
+        if not allowed:
+            nx, nv = self.nodes
+            raise StructureError(
+                f"a graph of {nx} × {nv} nodes at {wanted[0]} phases needs {self._memory(scene, wanted[0]):.3g} GiB of "
+                f"memory, and max_memory_gib is {self.max_memory_gib:.3g}; lower nodes or raise max_memory_gib."
+            )
+        return allowed
+
+    def _memory(self, scene: Oscillator, steps: int) -> float:
+        """Memory that a graph takes (GiB)."""
+        phases = 1 if scene.autonomous else steps
+        return _ALL_GRIDS * self.nodes[0] * self.nodes[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30

@@ -1,0 +1,183 @@
+"""Action descent: Newton's method on the action as a function of the states at the nodes of a path."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.progress import count
+from vibrokit.structure.linear_map import HamiltonianMap
+
+_ITERATIONS = 100  # damped paths need 5 to 30
+_INNER = 8  # Newton's method on the momenta of the segments; it converges in 2 to 4
+_MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
+_CONVERGED = 1e-9  # of the action: the gain that the next step promises
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-8, 1e6
+
+Array = NDArray[np.float64]
+Closing = tuple[Array, Array]
+"""A state x₀ (n,) and a form A (n, n): after the last node a path still costs ½ (x − x₀)ᵀA(x − x₀)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Evaluation:
+    """A path through given states, its segments extremal."""
+
+    states: Array
+    momenta: Array
+    carried: HamiltonianMap
+    action: float
+
+
+def descend_action(
+    propagator: SegmentPropagator,
+    first: int,
+    points: Array,
+    *,
+    last: float | None = None,
+    free: NDArray[np.bool_] | None = None,
+    closing: Closing | None = None,
+) -> tuple[Array, float]:
+    """Bring a path to a local minimum of the action, with extremal segments and its first state held.
+
+    The action of a segment as a function of the states at its two nodes has the momenta as its derivatives, and blocks
+    of the variational equations as its second derivatives: Newton's method on the sum has a banded matrix, and is
+    damped where a step would not descend. It converges from farther away than multiple shooting, and to minima only.
+
+    Parameters
+    ----------
+    propagator : SegmentPropagator
+    first : int
+        Phase of the first node, in pieces since the section.
+    points : array (nodes, 2n)
+        Guess of (q, p).
+    last : float, optional
+        Duration of the last piece (s), if it differs from the others.
+    free : bool array (n,), optional
+        Which coordinates of the last state may change; by default none, or all of them with `closing`.
+    closing : (array (n,), array (n, n)), optional
+        State and quadratic form of the action after the last node; by default the path ends there.
+
+    Returns
+    -------
+    points : array (nodes, 2n)
+        The guess itself where no extremal segments through its states were found.
+    action : float
+        NaN there.
+    """
+    n = propagator.size
+    path = _Descent(propagator, first, last, free, closing)
+    current = path.evaluate(points[:, :n], points[:-1, n:])
+    if current is None:
+        return points, float("nan")
+    current = path.minimize(current)
+    return np.hstack([current.states, np.vstack([current.momenta, current.carried.images[-1:, n:]])]), current.action
+
+
+class _Descent:
+    def __init__(
+        self,
+        propagator: SegmentPropagator,
+        first: int,
+        last: float | None,
+        free: NDArray[np.bool_] | None,
+        closing: Closing | None,
+    ) -> None:
+        n = propagator.size
+        self.propagator, self.first, self.last, self.n = propagator, first, last, n
+        self.held = np.full(n, closing is None) if free is None else ~free
+        self.target, self.form = (np.zeros(n), np.zeros((n, n))) if closing is None else closing
+
+    def evaluate(self, states: Array, momenta: Array) -> _Evaluation | None:
+        """Find the momenta that lead from node to node; None where there are none near those given."""
+        extent = np.ptp(states, axis=0)
+        for _ in range(_INNER):
+            carried = self.propagator.extremal(np.hstack([states[:-1], momenta]), self.first, self.last)
+            misses = states[1:] - carried.images[:, : self.n]
+            if not np.isfinite(carried.derivatives).all():
+                return None
+            if np.all(np.abs(misses) <= _MATCHED * extent):
+                tail = states[-1] - self.target
+                missed = float(np.sum(carried.images[:, self.n :] * misses))
+                action = float(np.sum(carried.actions)) + missed + 0.5 * float(tail @ self.form @ tail)
+                return _Evaluation(states, momenta, carried, action)
+            momenta = momenta + np.linalg.solve(carried.derivatives[:, : self.n, self.n :], misses[..., None])[..., 0]
+        return None
+
+    def minimize(self, current: _Evaluation) -> _Evaluation:
+        """Descend until the next step promises no more."""
+        damping = _FIRST_DAMPING
+        for _ in range(_ITERATIONS):
+            slope, (diagonal, below) = self._gradient(current), self._curvature(current)
+            before = current.action
+            count(newton_iterations=1)
+            while damping < _MOST_DAMPING:
+                step = _step(diagonal, below, slope, damping)
+                tried, promised = None, 0.0
+                if step is not None:
+                    tried, promised = self._moved(current, step), -float(np.sum(slope * step)) / 2
+                    if promised < _CONVERGED * before:
+                        return current
+                gain = -1.0 if tried is None else (before - tried.action) / promised
+                if gain < 0.25:
+                    damping *= 4
+                elif gain > 0.75:
+                    damping = max(damping / 6, _LEAST_DAMPING)
+                if tried is not None and gain > 0:
+                    current = tried
+                    break
+            else:
+                break
+        return current
+
+    def _moved(self, current: _Evaluation, step: Array) -> _Evaluation | None:
+        """Evaluate the path whose states are moved, its momenta moved to first order."""
+        n, slopes = self.n, current.carried.derivatives
+        ahead = step[1:] - np.einsum("kij,kj->ki", slopes[:, :n, :n], step[:-1])
+        momenta = current.momenta + np.linalg.solve(slopes[:, :n, n:], ahead[..., None])[..., 0]
+        return self.evaluate(current.states + step, momenta)
+
+    def _gradient(self, current: _Evaluation) -> Array:
+        """∂S/∂q at each node: the momentum before it less the one after it; 0 where the state is held."""
+        outgoing = np.vstack([current.momenta, -(self.form @ (current.states[-1] - self.target))])
+        slope = -outgoing
+        slope[1:] += current.carried.images[:, self.n :]
+        slope[0] = 0.0
+        slope[-1, self.held] = 0.0
+        return slope
+
+    def _curvature(self, current: _Evaluation) -> tuple[Array, Array]:
+        """Second derivatives: the blocks on the diagonal, and those below it."""
+        n, slopes = self.n, current.carried.derivatives
+        turn = np.linalg.inv(slopes[:, :n, n:])  # ∂p/∂q of a start, in the state at the end of its segment
+        here = turn @ slopes[:, :n, :n]
+        below = slopes[:, n:, :n] - slopes[:, n:, n:] @ here
+        diagonal = np.concatenate([here, self.form[None]])
+        diagonal[1:] += slopes[:, n:, n:] @ turn
+        below = (below - turn.transpose(0, 2, 1)) / 2
+        below[0] = 0.0
+        below[-1, self.held] = 0.0
+        diagonal[-1, self.held[:, None] != self.held] = 0.0
+        return (diagonal + diagonal.transpose(0, 2, 1)) / 2, below
+
+
+def _step(diagonal: Array, below: Array, slope: Array, damping: float) -> Array | None:
+    """Newton step with damping relative to the size of the diagonal; None where it would not descend."""
+    nodes, n = slope.shape
+    values, vectors = np.linalg.eigh(diagonal)
+    raised = diagonal + damping * np.einsum("kij,kj,klj->kil", vectors, np.abs(values), vectors)
+    bands = np.zeros((2 * n, nodes * n))
+    for i in range(n):
+        for j in range(i + 1):
+            bands[i - j, j::n] = raised[:, i, j]
+        for j in range(n):
+            bands[n + i - j, j : -n or None : n] = below[:, i, j]
+    try:
+        solved = scipy.linalg.solveh_banded(bands, -slope.ravel(), lower=True)
+    except np.linalg.LinAlgError:
+        return None
+    return solved.reshape(nodes, n) if np.isfinite(solved).all() else None

@@ -1,0 +1,109 @@
+"""The quasi-potential near an attractor: a quadratic form, from the linearized map."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from vibrokit.errors import StructureError
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.structure.linear_map import gaussian_map, gaussian_pieces
+from vibrokit.structure.orbits import Orbit
+
+_PIECES = 16  # of a section interval, at which the quadratic form along an orbit is given
+_NEUTRAL = 1e-6  # distance of a multiplier from 1 below which nothing decays
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LocalPotential:
+    """Ψ = ½ δqᵀ Σ⁻¹ δq on the section, near a point of a stable orbit.
+
+    Attributes
+    ----------
+    monodromy : array (n, n)
+        M, derivative of the map over one period of the orbit.
+    gathered : array (n, n)
+        C, covariance per unit D that noise adds in that time.
+    covariance : array (n, n)
+        Σ, the stationary covariance per unit D: Σ = M Σ Mᵀ + C.
+    """
+
+    monodromy: Array
+    gathered: Array
+    covariance: Array
+
+    @property
+    def stiffness(self) -> Array:
+        """Σ⁻¹: the momentum at δq is p = Σ⁻¹ δq."""
+        inverse = np.linalg.inv(self.covariance)
+        return (inverse + inverse.T) / 2
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Phase:
+    """The quadratic form at one time of an orbit, and what leads to it from the time before.
+
+    Attributes
+    ----------
+    time : float
+        Since the section that the orbit starts on (s).
+    point : array (n,)
+        Of the orbit.
+    covariance : array (n, n)
+        Σ at that time.
+    monodromy : array (n, n)
+        M, derivative of the flow from the phase before to this one.
+    """
+
+    time: float
+    point: Array
+    covariance: Array
+    monodromy: Array
+
+
+def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPotential:
+    """Linearize the motion under noise along a stable orbit, and solve for the stationary covariance.
+
+    Raises
+    ------
+    StructureError
+        The orbit is not stable, so that it has no stationary covariance.
+    """
+    found = gaussian_map(osc, orbit.point[None], stepper, intervals=orbit.period)
+    return _stationary(orbit, found.derivatives[0], found.covariances[0])
+
+
+def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> tuple[Phase, ...]:
+    """Return the quadratic form at 16 times of each section interval of a stable orbit, the first the orbit's start.
+
+    From phase to phase Σ' = M Σ Mᵀ + C; the monodromy of the first phase leads to it from the last.
+
+    Raises
+    ------
+    StructureError
+        The orbit is not stable.
+    """
+    nodes, pieces = gaussian_pieces(osc, orbit.point, stepper, _PIECES, _PIECES * orbit.period)
+    covariance = _stationary(orbit, *pieces.composed()).covariance
+    interval, phases = osc.section_interval / _PIECES, list[Phase]()
+    before = np.roll(pieces.derivatives, 1, axis=0)
+    for number, (step, added) in enumerate(zip(pieces.derivatives, pieces.covariances, strict=True)):
+        phases.append(Phase(number * interval, nodes[number], covariance, before[number]))
+        covariance = step @ covariance @ step.T + added
+    return tuple(phases)
+
+
+def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotential:
+    largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
+    if not largest < 1 - _NEUTRAL:
+        raise StructureError(
+            f"the orbit at {tuple(orbit.point.tolist())} has a multiplier of size {largest:.6g}; only a stable one "
+            "(all below 1) has a quasi-potential around it."
+        )
+    return LocalPotential(monodromy, gathered, scipy.linalg.solve_discrete_lyapunov(monodromy, gathered))

@@ -1,0 +1,101 @@
+"""SegmentPropagator: the flow over short pieces of time, from many nodes of a path at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.single import record
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.vector_field import VectorField
+from vibrokit.oscillator import Oscillator
+from vibrokit.structure.linear_map import GaussianMap, HamiltonianMap, Map, gaussian_map, hamiltonian_map, joined
+from vibrokit.symbolic.flow_kind import Flow
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SegmentPropagator:
+    """Maps nodes of a path, which lie at whole multiples of a piece of the section interval.
+
+    Attributes
+    ----------
+    osc : Oscillator
+    stepper : Stepper
+    pieces : int
+        Number of pieces in a section interval.
+    """
+
+    osc: Oscillator
+    stepper: Stepper
+    pieces: int = 8
+
+    @property
+    def piece(self) -> float:
+        """Duration of a piece (s)."""
+        return self.osc.section_interval / self.pieces
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates of a state."""
+        return 2 + (len(self.osc.noise.extra_states) if self.osc.noise else 0)
+
+    @property
+    def units(self) -> Array:
+        """Sizes of the coordinates of a state that belong together: 1 m, ω_n m/s, and 1 for extra noise states."""
+        units = np.ones(self.size)
+        units[1] = self.osc.natural_frequency
+        return units
+
+    @property
+    def grain(self) -> int:
+        """Nodes from section to section; without forcing, every node is on the section."""
+        return 1 if self.osc.autonomous else self.pieces
+
+    def linear(self, states: Array, first: int, last: float | None = None) -> GaussianMap:
+        """Map consecutive nodes over one piece each without noise, with the covariance that noise adds.
+
+        Parameters
+        ----------
+        states : array (count, n)
+        first : int
+            Phase of the first node, in pieces since the section.
+        last : float, optional
+            Duration of the last piece (s), if it differs from the others.
+        """
+        return self._by_phase(gaussian_map, states, first, last)
+
+    def extremal(self, points: Array, first: int, last: float | None = None) -> HamiltonianMap:
+        """Map consecutive (q, p) over one piece each by Hamilton's equations; arguments as for `linear`."""
+        return self._by_phase(hamiltonian_map, points, first, last)
+
+    def _by_phase(self, mapped: Callable[..., Map], points: Array, first: int, last: float | None) -> Map:
+        """Map consecutive nodes, those of one phase together."""
+        phases = (first + np.arange(len(points))) % self.pieces
+        kinds = np.zeros_like(phases) if self.osc.autonomous else phases.copy()
+        if last is not None and last != self.piece:
+            kinds[-1] = -1
+        groups = [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
+        parts = []
+        for some in groups:
+            length = self.piece if kinds[some[0]] >= 0 or last is None else last
+            start = float(phases[some[0]]) * self.piece
+            parts.append(mapped(self.osc, points[some], self.stepper, start_time=start, interval=length))
+        found, order = joined(parts), np.argsort(np.concatenate(groups))
+        return dataclasses.replace(found, **{name: values[order] for name, values in vars(found).items()})
+
+    def rate(self, point: Array, start: float) -> Array:
+        """Return (q′, p′) at a point (q, p)."""
+        return VectorField(self.osc).hamiltonian_rate(point[: self.size], point[self.size :], start)
+
+    def onward(self, state: Array, phase: int, count: int) -> Array:
+        """Return the noise-free motion from one state at `count` + 1 nodes, the first included."""
+        return record(self.osc, Flow.STATE, self.stepper, state, phase % self.pieces * self.piece, self.piece, count)
+
+    def with_stepper(self, stepper: Stepper) -> SegmentPropagator:
+        """Return the same with another stepper."""
+        return dataclasses.replace(self, stepper=stepper)

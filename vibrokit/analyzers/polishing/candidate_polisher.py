@@ -1,0 +1,164 @@
+"""CandidatePolisher: candidates of one attractor, the cheapest first, polished to the ends that they come near."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.dense import dense_path
+from vibrokit.analyzers.polishing.ending import Ending
+from vibrokit.analyzers.polishing.ends import ending_at
+from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
+from vibrokit.analyzers.polishing.newton import ExtremalPath
+from vibrokit.analyzers.polishing.path_solver import PathSolver
+from vibrokit.analyzers.polishing.resampled import ResampledCandidate, resampled
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.results.energy import ExitPath
+from vibrokit.results.finding import Code, Finding
+from vibrokit.symbolic.flow_kind import Flow
+
+WORTH = 1.25
+"""Times the least action known: costlier candidates are skipped. Searches price a path to a few percent."""
+_PIECES = (8, 16)  # in a section interval: the finer ones where the coarser ones do not converge
+_NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
+_ROUNDS = 4  # how often a path is cut where it has already left
+_CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
+_TRIES = 2  # candidates for an end that the cheaper ones do not lead to
+_EQUAL = 1e-6  # relative difference of the actions of one path found twice
+_SAME = 0.05  # of a path's extent: distance between two paths that are one, one of them at its samples
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Solved:
+    """A path to an end, at its nodes (`found`) and between them (`path`)."""
+
+    end: PathEnd
+    propagator: SegmentPropagator
+    found: ExtremalPath
+    path: ExitPath
+
+    def is_same(self, other: Solved) -> bool:
+        """Return whether two paths are one, shifted in time: of one action, and at one place where half is spent."""
+        one, action = self.path, self.found.action
+        if self.end is not other.end or abs(action - other.found.action) > _EQUAL * action:
+            return False
+        middle = min(int(np.searchsorted(one.action, 0.5 * action)), len(one.t) - 1)
+        place = np.concatenate([one.q[middle], one.p[middle]])
+        offsets = (np.hstack([other.path.q, other.path.p]) - place) / self.found.scale
+        return bool(np.abs(offsets).max(axis=1).min() < _SAME)
+
+
+class CandidatePolisher:
+    """Polishes candidates that leave one orbit, and keeps each path once.
+
+    Attributes
+    ----------
+    solved : list of Solved
+    skipped : int
+        Candidates that cost too much.
+    findings : list of Finding
+
+    Raises
+    ------
+    StructureError
+        The orbit is not hyperbolic.
+    """
+
+    def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], point: np.ndarray, period: int) -> None:
+        stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
+        propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in _PIECES}
+        source = functools.cache(lambda pieces: linearized_orbit(propagators[pieces], point, period))
+        source(_PIECES[0])
+        self.problem, self.ends = problem, ends
+        self.solved: list[Solved] = []
+        self.skipped = 0
+        self.findings: list[Finding] = []
+        self._solver = functools.cache(lambda end, pieces: PathSolver(propagators[pieces], source(pieces)))
+        self._ending = functools.cache(lambda end, pieces: ending_at(end, problem, propagators[pieces]))
+        self._resampled = functools.cache(lambda candidate, pieces: resampled(propagators[pieces], candidate))
+
+    def polish(self, candidate: Candidate) -> None:
+        """Polish a candidate to each end that it comes near, unless a far cheaper path to its target is known."""
+        known = [one.found.action for one in self.solved if candidate.target in one.end.targets]
+        if known and candidate.action > WORTH * min(known):
+            self.skipped += 1
+            return
+        failures, solved = [], False
+        try:
+            for end in self._near(candidate):
+                try:
+                    self._add(self._solve(end, candidate, self.solved))
+                    solved = True
+                except StructureError as error:
+                    failures.append(str(error))
+        except StructureError as error:
+            failures.append(str(error))
+        if not solved:
+            self.findings.append(
+                Finding.of(
+                    Code.CANDIDATE_FAILED, self.problem.source, candidate.target,
+                    action=candidate.action, finder=candidate.finder, reason=(*failures, "it comes near no end.")[0],
+                )
+            )  # fmt: skip
+
+    def reach(self, end: PathEnd, ranked: Sequence[Candidate]) -> None:
+        """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
+        if any(one.end is end for one in self.solved):
+            return
+        near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
+        for candidate in itertools.chain(near, ranked[:1]):
+            try:
+                return self._add(self._solve(end, candidate, ()))
+            except StructureError:
+                continue
+
+    def _add(self, one: Solved) -> None:
+        if not any(one.is_same(other) for other in self.solved):
+            self.solved.append(one)
+
+    def _near(self, candidate: Candidate) -> list[PathEnd]:
+        """The ends that a candidate comes near, the nearest first."""
+        nodes: ResampledCandidate = self._resampled(candidate, _PIECES[0])
+        distances = [self._ending(end, _PIECES[0]).distance(nodes) for end in self.ends]
+        order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
+        return [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
+
+    def _comes_near(self, end: PathEnd, candidate: Candidate) -> bool:
+        try:
+            return end in self._near(candidate)
+        except StructureError:
+            return False
+
+    def _solve(self, end: PathEnd, candidate: Candidate, known: Sequence[Solved]) -> Solved:
+        """Polish a candidate to an end, with finer pieces if necessary."""
+        least = min((one.found.action for one in known if one.end is end), default=np.inf)
+        for pieces in _PIECES:
+            try:
+                return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least)
+            except StructureError as error:
+                failure = error
+        raise failure
+
+    def _solve_with(self, pieces: int, end: PathEnd, candidate: Candidate, worth: float) -> Solved:
+        solver: PathSolver = self._solver(end, pieces)
+        ending: Ending = self._ending(end, pieces)
+        for _ in range(_ROUNDS):
+            found = solver.solve(ending.cuts(self._resampled(candidate, pieces)), worth)
+            if not found.action > 0:
+                raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
+            path = dense_path(solver.propagator, found)
+            if any(self._ending(other, pieces).crossing(path) is not None for other in self.ends if other is not end):
+                raise StructureError("the path leaves by another face before its end.")
+            left = ending.crossing(path)
+            if left is None:
+                return Solved(end, solver.propagator, found, path)
+            candidate = dataclasses.replace(candidate, times=path.t[: left + 1], states=path.q[: left + 1])
+        raise StructureError(f"after {_ROUNDS} cuts where it has already left, the path still leaves before its end.")

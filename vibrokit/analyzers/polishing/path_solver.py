@@ -1,0 +1,190 @@
+"""PathSolver: from a cut candidate to the extremal path between two orbits, or from an orbit to a face."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.paths.action_descent import descend_action
+from vibrokit.analyzers.paths.gauss_newton import gauss_newton
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.ending import Cut
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
+from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.errors import StructureError
+
+_NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
+_RADIUS = 1e-4  # of a path's extent: within this distance of its ends the linearized equations replace the path
+_CLOSER, _UNCHANGED = 4, 1e-8  # the radius is divided by 10 until the action changes by no more (relative), 4 times
+_LONG_ENOUGH = 1e-6  # the same for a path that starts on its orbit, made twice as long
+_FEW_EVALUATIONS = 24  # of the misfits, for a path that is known except near its ends
+_ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
+_FAILURES = 3  # of these in turn, after which no longer one is tried
+MORE_PERIODS = 2
+"""Periods of its orbits by which a certified path must allow to be extended."""
+_FEWEST = 2  # nodes of a path
+_MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
+
+Array = NDArray[np.float64]
+
+
+class PathSolver:
+    """Solves for paths that leave one orbit; each path that several candidates lead to is completed once."""
+
+    def __init__(self, propagator: SegmentPropagator, source: LinearizedOrbit) -> None:
+        self.propagator, self.source = propagator, source
+        self._known: dict[tuple[int, int, str], ExtremalPath | StructureError] = {}
+
+    def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
+        """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
+
+        Parameters
+        ----------
+        cuts : sequence of Cut
+            The candidate cut in several ways, of which the cheapest after the Gauss–Newton method is taken.
+        worth : float
+            Action below which a path that cannot be joined to its source by the linearized equations is solved for as
+            one that starts on the orbit itself.
+
+        Raises
+        ------
+        StructureError
+            No extremal path was found near it.
+        """
+        propagator, fitted = self.propagator, []
+        for cut in cuts:
+            first, states = _begun(propagator, self.source, cut.states)
+            fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
+        points, action, first, cut = min(fitted, key=lambda each: each[1])
+
+        def from_orbit(failure: StructureError, known: float) -> ExtremalPath:
+            if not known < worth:
+                raise failure
+            return self._from_orbit(first, cut, points, failure)
+
+        try:
+            found = self._descended(self.source, first, cut, points)
+        except StructureError as error:
+            return from_orbit(error, action)
+        key = self.source.node(found.first), len(found.points), f"{found.action:.9e}"
+        if key not in self._known:
+            try:
+                self._known[key] = self._completed(found, from_orbit)
+            except StructureError as error:
+                self._known[key] = error
+        known = self._known[key]
+        if isinstance(known, StructureError):
+            raise known
+        return known
+
+    def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
+        ending = cut.ending
+        free = ending.free if ending.closing is None else None
+        points, _ = descend_action(
+            self.propagator, first, points, last=cut.last, free=free, closing=ending.closing
+        )  # fmt: skip
+        return extremal_path(self.propagator, source, first, ending, points, cut.last)
+
+    def _completed(self, found: ExtremalPath, from_orbit: Callable[..., ExtremalPath]) -> ExtremalPath:
+        """The same path, started and ended so near to its orbits that the action no longer changes."""
+        radius = _RADIUS * found.extent
+        try:
+            found = _within(self.propagator, found, radius)
+            for _ in range(_CLOSER):
+                radius /= 10
+                closer = _within(self.propagator, found, radius)
+                if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
+                    break
+                found = closer
+        except StructureError as error:
+            return from_orbit(error, found.action)
+        return found
+
+    def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
+        """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""
+        best, failures, propagator = None, 0, self.propagator
+        source = self.source.with_start_on_orbit()
+        for intervals in _ON_ORBIT:
+            added = intervals * propagator.pieces
+            states = np.concatenate([source.along(first - added, added), points[:, : propagator.size]])
+            try:
+                longer, _ = gauss_newton(propagator, first - added, states, cut.last, cut.ending.free)
+                found = self._descended(source, first - added, cut, longer)
+                found = _within(propagator, found, _RADIUS * found.extent)
+                solved_again(propagator, found, MORE_PERIODS * len(source.states), 0)
+            except StructureError:
+                failures += 1
+                if best is not None or failures == _FAILURES:
+                    break
+                continue
+            if best is not None and abs(found.action - best.action) <= _LONG_ENOUGH * best.action:
+                break
+            best = found
+        if best is None:
+            raise failure
+        return best
+
+
+def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int) -> ExtremalPath:
+    """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
+
+    Raises
+    ------
+    StructureError
+        It did not converge, or hardly anything of the path would be left.
+    """
+    points, first = found.points, found.first
+    if len(points) + min(before, 0) + min(after, 0) < _FEWEST:
+        raise StructureError(
+            f"a path of {len(points)} nodes cannot be made {-min(before, 0) - min(after, 0)} nodes shorter."
+        )
+    more = found.source.continued(points[0], first, -max(before, 0))
+    points = np.concatenate([more, points[max(-before, 0) :]])
+    points, ending = found.ending.extended(points, after)
+    return extremal_path(
+        propagator, found.source, first - before, ending, points, found.last, evaluations=_FEW_EVALUATIONS
+    )
+
+
+def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -> ExtremalPath:
+    """The same path, started and ended within a radius of its orbits; in steps where all at once does not converge."""
+    grain, source, least = propagator.grain, found.source, 1
+    while True:
+        before = 0 if source.start_on_orbit else source.missing(found.points, found.first, -1, radius, grain) // grain
+        after, share = found.ending.missing(found.points, radius) // grain, 1
+        while True:
+            try:
+                longer = solved_again(propagator, found, int(before / share) * grain, int(after / share) * grain)
+                break
+            except StructureError:
+                if max(before, after) < max(share, least):
+                    raise
+                share *= 2
+        if share == 1:
+            return longer
+        found, least = longer, 2
+
+
+def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, states: Array) -> tuple[int, Array]:
+    """Start a candidate on its source, at the section where it last is near, or long enough before its first state.
+
+    The start stays on the orbit until multiple shooting: the linearized equations do not hold for a start far from the
+    orbit, and would give it much too small an action.
+    """
+    nodes = np.arange(0, len(states) - 1, propagator.grain)
+    phases = np.arange(0, len(source.states), propagator.pieces)
+    distances = np.linalg.norm((states[nodes][:, None] - source.states[phases]) / propagator.units, axis=2)
+    nearest, closest = phases[np.argmin(distances, axis=1)], distances.min(axis=1)
+    wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
+    near = np.flatnonzero(closest <= wanted)
+    entered = int(near[-1]) if near.size else 0
+    first, states = int(nearest[entered]), states[nodes[entered] :]
+    if not near.size:
+        periods = math.ceil(math.log(closest[0] / wanted) / (source.slowest_rate * propagator.pieces))
+        added = min(periods, _MOST_ADDED) * propagator.pieces
+        first -= added
+        states = np.concatenate([source.along(first, added), states])
+    return first, np.concatenate([source.along(first, 1), states[1:]])

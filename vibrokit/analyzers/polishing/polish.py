@@ -1,0 +1,157 @@
+"""Polish: all candidates of one attractor, each exit path once, ranked and certified."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher, Solved
+from vibrokit.analyzers.polishing.certify import certify
+from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.progress import advance, stage
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
+from vibrokit.structure.orbits import Orbit
+
+METHOD = "least action"
+_COMPETING = 0.01  # of the least action: at ΔU/D = 100 such a path still carries a third as many exits
+_FLAT = 1e-3  # sine of the angle between the manifolds
+_ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Polished:
+    """What the candidates of one attractor led to.
+
+    Attributes
+    ----------
+    branches : tuple of ActivationEnergy
+        Each exit path once for each attractor that it leads to, the cheapest first, with path and certificate. The
+        lower bound is 0, because polishing does not exclude cheaper paths.
+    findings : tuple of Finding
+        `Code.STOPPED` is among them if the work was stopped before its end.
+    """
+
+    branches: tuple[ActivationEnergy, ...]
+    findings: tuple[Finding, ...]
+
+
+def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit | None = None) -> Polished:
+    """Polish candidates to certified exit paths.
+
+    If it is stopped, by Ctrl-C or by the time limit, the paths found so far are certified and returned.
+
+    Parameters
+    ----------
+    problem : ExitProblem
+    candidates : sequence of Candidate
+    orbit : Orbit, optional
+        The orbit to leave: for an attractor that is not an orbit, an unstable one inside it. An exit from there costs
+        at least as much as leaving the attractor.
+
+    Returns
+    -------
+    Polished
+
+    Raises
+    ------
+    StructureError
+        The attractor is not an orbit and none is given, or the orbit is not hyperbolic.
+    StepperError
+        The stepper cannot integrate Hamilton's equations of this scene.
+    """
+    source = problem.source
+    ends, findings = usable_ends(problem)
+    polisher = CandidatePolisher(problem, ends, *_start(problem, orbit))
+    ranked = sorted(candidates, key=lambda each: each.action)
+    branches: list[ActivationEnergy] = []
+    try:
+        with stage("polishing", unit="candidates", total=len(ranked)):
+            for candidate in ranked:
+                polisher.polish(candidate)
+                advance()
+            for end in ends:
+                polisher.reach(end, ranked)
+    except KeyboardInterrupt as error:
+        findings.append(Finding.stopped("polishing", error, source))
+    findings += polisher.findings
+    if polisher.skipped:
+        values = {"skipped": polisher.skipped, "total": len(ranked), "factor": WORTH}
+        findings.append(Finding(Code.CANDIDATES_SKIPPED, source, values=values))
+    try:
+        with stage("certifying", unit="paths", total=len(polisher.solved)):
+            for solved in polisher.solved:
+                branches += _certified(source, solved, findings)
+                advance()
+    except KeyboardInterrupt as error:
+        findings.append(Finding.stopped("certifying", error, source))
+    branches.sort(key=lambda branch: branch.value)
+    return Polished(tuple(branches), (*findings, *_valleys(branches)))
+
+
+def _start(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int]:
+    attractor = problem.attractor
+    if orbit is not None:
+        return orbit.point, orbit.period
+    if not attractor.is_fixed:
+        raise StructureError(
+            f"{attractor.name} is {attractor.kind}, and paths are polished from an orbit or an equilibrium; give an "
+            "unstable orbit inside it."
+        )
+    return attractor.points[0], attractor.period
+
+
+def _certified(source: int, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:
+    """The path with its certificate, once for each attractor that it leads to."""
+    found = solved.found
+    try:
+        certificate = certify(solved.propagator, found)
+    except StructureError as failure:
+        findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=found.action, reason=str(failure)))
+        return []
+    if found.source.start_on_orbit:
+        values = {"action": found.action, "periods": certificate.periods}
+        findings.append(Finding(Code.STARTS_ON_ORBIT, source, values=values))
+    error = certificate.error + _ROUNDING * found.action
+    return [
+        ActivationEnergy(
+            source=source,
+            target=target,
+            value=found.action,
+            lower=0.0,
+            upper=found.action + error,
+            method=METHOD,
+            bound=Bound.UPPER,
+            numerical_error=error,
+            residual=certificate.residual,
+            path=solved.path,
+            saddle=solved.end.saddle,
+            certificate=certificate,
+        )
+        for target in solved.end.targets
+    ]
+
+
+def _valleys(branches: Sequence[ActivationEnergy]) -> list[Finding]:
+    """Findings where exits are not confined to one path."""
+    if not branches:
+        return []
+    best, findings = branches[0], []
+    limit = (1 + _COMPETING) * best.value
+    alike = [branch.value for branch in branches if branch.path is not best.path and branch.value <= limit]
+    if alike:
+        percent = 100 * _COMPETING
+        findings.append(
+            Finding.of(
+                Code.COMPETING_PATHS, best.source, best.target, percent=percent, least=best.value, actions=alike
+            )
+        )  # fmt: skip
+    sine = 1.0 if best.certificate is None else best.certificate.transversality
+    if sine < _FLAT:
+        findings.append(Finding.of(Code.FLAT_VALLEY, best.source, best.target, sine=sine))
+    return findings

@@ -1,0 +1,116 @@
+"""ExitProblem: one attractor to leave, what counts as leaving it, and what everything is integrated with."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.exits import Exit
+from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.errors import StructureError
+from vibrokit.kernels import choice
+from vibrokit.kernels.ensemble import Stop
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
+from vibrokit.results.structure import Structure
+from vibrokit.structure.orbits import Orbit, refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
+
+_REFINEMENTS = 5  # of an ensemble stepper, until it reproduces the attractor's orbit
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExitProblem:
+    """The question that an analyzer answers: how is this attractor left?
+
+    Attributes
+    ----------
+    osc : Oscillator
+    structure : Structure
+    attractor : Attractor
+        The one that is left.
+    exit : Exit
+    stepper : Stepper or None
+        The one that the user asked for; None for the defaults.
+    """
+
+    osc: Oscillator
+    structure: Structure
+    attractor: Attractor
+    exit: Exit
+    stepper: Stepper | None = None
+
+    @property
+    def source(self) -> int:
+        """Label of the attractor."""
+        return self.attractor.label
+
+    @cached_property
+    def scene(self) -> Oscillator:
+        """The scene that paths move in until they leave."""
+        return self.exit.scene(self.osc)
+
+    @cached_property
+    def stop(self) -> Stop:
+        """The kernel's test."""
+        return self.exit.stop(self.osc, self.structure, self.source)
+
+    @property
+    def exit_status(self) -> int:
+        """Status, of `vibrokit.kernels.stopping`, of trajectories that have left."""
+        return LEFT_REGION if self.exit.by_position else LEFT_BASIN
+
+    @cached_property
+    def path_ends(self) -> tuple[PathEnd, ...]:
+        """Where a path of least action may end."""
+        return self.exit.path_ends(self.osc, self.structure, self.source)
+
+    @cached_property
+    def checks(self) -> int:
+        """Exit tests in a section interval."""
+        return self.exit.checks_per_period(self.osc)
+
+    @cached_property
+    def at_exit(self) -> bool:
+        """Whether the attractor already satisfies the exit condition, without noise."""
+        return self.exit.holds_at(self.osc, self.attractor)
+
+    def is_out(self, states: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which states have left, by position alone."""
+        return self.exit.is_out(self.osc, states)
+
+    def orbit(self, stepper: Stepper) -> Orbit:
+        """Return the attractor's orbit as a stepper gives it; raises StructureError if there is none."""
+        return refine_orbit(self.scene, self.attractor.points[0], self.attractor.period, stepper)
+
+    def ensemble_stepper(self, flow: Flow) -> Stepper:
+        """Return the stepper for many trajectories: the user's, or the default one, refined until it has the orbit.
+
+        Steps across a contact that is short or nearly grazes can be too coarse for the orbit or for its stability.
+        """
+        if self.stepper is not None:
+            return self.stepper
+        chosen = tried = choice.ensemble_stepper(self.scene, flow)
+        if not self.attractor.is_fixed:
+            return chosen
+        for _ in range(_REFINEMENTS):
+            if self._has_orbit(tried):
+                return tried
+            tried = tried.refined()
+        return chosen
+
+    def single_stepper(self, flow: Flow) -> Stepper:
+        """Return the stepper for single paths: the user's, or the default one."""
+        return self.stepper or choice.single_stepper(self.scene, flow)
+
+    def _has_orbit(self, stepper: Stepper) -> bool:
+        try:
+            orbit = self.orbit(stepper)
+        except StructureError:
+            return False
+        return bool(np.abs(np.linalg.eigvals(orbit.monodromy)).max() < 1)

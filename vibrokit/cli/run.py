@@ -1,0 +1,243 @@
+"""vibrokit run: find the structure, run the analyzers, save and print what was found, whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vibrokit.cli.interrupts import Interrupts
+from vibrokit.errors import VibrokitError
+
+if TYPE_CHECKING:
+    from vibrokit.analyzers.analyzer import Analyzer
+    from vibrokit.kernels.stepper import Stepper
+    from vibrokit.oscillator import Oscillator
+    from vibrokit.results.finding import Finding
+    from vibrokit.results.record import Record
+    from vibrokit.results.result import Result
+    from vibrokit.results.structure import Structure
+
+STRUCTURE = "structure"  # its name among those of the analyzers
+_ENDINGS = (".png", ".pdf", ".svg", ".nc")
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """What is asked for, checked before any work is done."""
+
+    osc: Oscillator
+    stepper: Stepper | None
+    analyzers: Mapping[str, Analyzer]
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What was found so far, kept from the moment that it is found."""
+
+    asked: tuple[str, ...]
+    structure: Structure | None = None
+    results: dict[str, Result] = dataclasses.field(default_factory=dict)
+    findings: list[Finding] = dataclasses.field(default_factory=list)
+    files: dict[str, Path] = dataclasses.field(default_factory=dict)
+    seconds: float = 0.0
+    failed: bool = False
+
+    @property
+    def records(self) -> dict[str, Record]:
+        """All that was found, by name."""
+        found: dict[str, Record] = {} if self.structure is None else {STRUCTURE: self.structure}
+        return found | self.results
+
+    @property
+    def complete(self) -> bool:
+        """Whether all that was asked for is there."""
+        return {STRUCTURE, *self.asked} == {name for name, record in self.records.items() if record.complete}
+
+    def stopped(self, reason: KeyboardInterrupt) -> None:
+        """Note that the work ended before its records could say so."""
+        from vibrokit.results.finding import Finding
+
+        stage = "the analysis" if self.structure else "the search for steady states"
+        self.findings.append(Finding.stopped(stage, reason))
+
+    @property
+    def status(self) -> int:
+        """Exit status of a run that was not interrupted."""
+        return int(self.failed or not self.complete or any(record.failed for record in self.records.values()))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    outcome = Outcome(tuple(dict.fromkeys(options.analyzer)))
+    with Interrupts() as interrupts:
+        plan = planned(options)
+        try:
+            _work(plan, options, interrupts, outcome)
+            interrupts.finishing()
+        except KeyboardInterrupt as stopped:  # no steady state was known yet, or Ctrl-C was pressed twice
+            interrupts.finishing()
+            outcome.stopped(stopped)
+        _save(outcome, options)
+        _print(outcome, options)
+        if not (options.json or interrupts.requested):
+            _draw(outcome, options)
+        if interrupts.requested:
+            print(f"vibrokit: interrupted; {_written(outcome)}.", file=sys.stderr)
+            return 130
+        return outcome.status
+
+
+def planned(options: argparse.Namespace) -> Plan:
+    """Check what is asked for, and load what saves and prints: an import that Ctrl-C ends cannot be repeated.
+
+    Raises
+    ------
+    VibrokitError
+        Something that is asked for does not exist or is not allowed.
+    """
+    import vibrokit.report.data
+    import vibrokit.report.text
+    import vibrokit.results.files  # noqa: F401 - loaded for later
+    from vibrokit.analyzers.analyzer import Analyzer
+    from vibrokit.analyzers.settings import configured, named_exit, setting
+    from vibrokit.kernels.named import named_stepper
+    from vibrokit.progress import checked_time_limit
+    from vibrokit.registry import Group, load
+    from vibrokit.results.pictures import checked_picture
+    from vibrokit.scene_file import load_scene
+
+    for target in (options.output, options.figure):
+        if target is not None and not target.parent.is_dir():
+            raise VibrokitError(f"the folder {target.parent} of {target} does not exist; make it first.")
+    if options.figure is not None:
+        checked_picture(options.figure)
+    if not 2 <= options.cells <= 20_000:
+        raise VibrokitError(f"--cells must be a whole number from 2 to 20000, got {options.cells}.")
+    checked_time_limit(options.time_limit)
+    osc = load_scene(options.scene)
+    stepper = None if options.stepper is None else named_stepper(options.stepper)
+    given = {
+        "stepper": stepper,
+        "exit": None if options.exit is None else named_exit(options.exit),
+        "source": None if options.source is None else source_of(options.source),
+    }
+    settings = dict(setting(text) for text in options.set)
+    settings |= {name: value for name, value in given.items() if value is not None}
+    kinds = {name: load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer}
+    return Plan(osc, stepper, {name: configured(kind, settings) for name, kind in kinds.items()})
+
+
+def source_of(text: str) -> int | str:
+    """Return the label or the name of an attractor."""
+    return int(text) if text.isdecimal() else text
+
+
+def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outcome: Outcome) -> None:
+    """Find the structure and run the analyzers; keep each of them in the outcome as soon as it is there."""
+    from vibrokit.progress import working
+    from vibrokit.results.finding import Code, Finding
+    from vibrokit.structure.find import find_structure
+
+    def not_run(name: str, reason: str) -> None:
+        outcome.findings.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=name, reason=reason))
+
+    with working(True, options.time_limit) as work:
+        interrupts.stops(work)
+        try:
+            cells = (options.cells, options.cells)
+            outcome.structure = find_structure(plan.osc, cells=cells, stepper=plan.stepper, rng=options.seed)
+            for name, analyzer in plan.analyzers.items():
+                if interrupts.requested or not all(record.complete for record in outcome.records.values()):
+                    not_run(name, "the work was stopped before.")
+                    continue
+                try:
+                    outcome.results[name] = analyzer.run(plan.osc, outcome.structure)
+                except VibrokitError as error:
+                    not_run(name, str(error))
+                except Exception as error:  # of a plug-in, or a mistake of ours: what was found is kept
+                    traceback.print_exc()
+                    not_run(name, f"{type(error).__name__}: {error}")
+        finally:
+            outcome.seconds = work.seconds
+
+
+def _save(outcome: Outcome, options: argparse.Namespace) -> None:
+    """Write what was found, if a file was asked for.
+
+    The results are written; the structure too if no analyzer has a result, or if something is missing.
+    """
+    if options.output is None:
+        return
+    results = {
+        name: result for name, result in outcome.results.items() if result.complete or result.energies or result.data
+    }
+    targets = {name: _numbered(options.output, name, len(outcome.asked)) for name in results}
+    if outcome.structure is not None and not (results and outcome.complete):
+        targets[STRUCTURE] = _numbered(options.output, STRUCTURE, 1 + len(results))
+    for name, path in targets.items():
+        try:
+            outcome.records[name].save(path)
+        except (VibrokitError, OSError) as error:
+            outcome.failed = True
+            print(f"vibrokit: {path} was not written: {error}", file=sys.stderr)
+        else:
+            outcome.files[name] = path
+
+
+def _print(outcome: Outcome, options: argparse.Namespace) -> None:
+    """Print what was found, as one JSON object or as text; what was not run goes to standard error too."""
+    from vibrokit.report.data import findings_data, run_data
+    from vibrokit.report.text import record_text
+    from vibrokit.results.versions import versions
+
+    for finding in outcome.findings:
+        print(f"vibrokit: {finding}", file=sys.stderr)
+    if options.json:
+        found = {"scene": options.scene, "complete": outcome.complete, **run_data(outcome.structure, outcome.results)}
+        found["findings"] += findings_data("run", outcome.findings)
+        found |= {"files": {name: str(path) for name, path in outcome.files.items()}, "versions": versions()}
+        print(json.dumps({**found, "seed": options.seed, "seconds": outcome.seconds}, allow_nan=False))
+    else:
+        for name, record in outcome.records.items():
+            print(record_text(f"{options.scene}: {name}", record), end="\n\n")
+        print(f"{outcome.seconds:.1f} s; {_written(outcome)}.")
+    sys.stdout.flush()
+
+
+def _draw(outcome: Outcome, options: argparse.Namespace) -> None:
+    """Save a figure of each result; of the structure if no analyzer was asked for."""
+    from vibrokit.results.pictures import save_figure
+
+    records = outcome.results if outcome.asked else outcome.records
+    for name, record in records.items():
+        path = options.figure or Path(f"{scene_stem(options.scene)}.png")
+        path = _numbered(path, name, len(outcome.asked or records) if options.figure else 2)
+        try:
+            save_figure(record.plot(), path)
+        except (VibrokitError, OSError) as error:
+            outcome.failed = True
+            print(f"vibrokit: {path} was not drawn: {error}", file=sys.stderr)
+        else:
+            print(f"figure: {path}")
+
+
+def _written(outcome: Outcome) -> str:
+    files = ", ".join(f"{path} ({name})" for name, path in outcome.files.items())
+    return f"written: {files}" if files else "no file was written"
+
+
+def scene_stem(scene: str) -> str:
+    """Return the name of a scene without its folder and ending."""
+    return Path(scene).name.removesuffix(".toml")
+
+
+def _numbered(path: Path, name: str, count: int) -> Path:
+    """Return the path of one of several files."""
+    ending = path.suffix if path.suffix in _ENDINGS else ""
+    return path if count == 1 else path.with_name(f"{path.name.removesuffix(ending)}-{name}{ending}")

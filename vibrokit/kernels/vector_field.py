@@ -1,0 +1,112 @@
+"""The vector field of a scene, its Jacobian and Hamilton's vector field, compiled from the formulas of the parts."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
+from vibrokit.kernels.stepper import Emitter
+from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.scene_text import SceneText
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Rates(Emitter):
+    """Emits the right-hand side of a flow alone."""
+
+    name: ClassVar[str] = "rates"
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """The right-hand side, the loop over states, and the force of each excitation."""
+        return [text.constants, text.forcing, text.excitations, text.derivative, _rates_function(text)]
+
+
+def _rates_function(text: SceneText) -> str:
+    """Function `rates(t, z, theta, out)`: the right-hand sides of states z (count, EQUATIONS) at one time."""
+    places = range(len(text.variables))
+    values = [*(f"z[lane, {place}]" for place in places), *(["f"] if text.forced else []), *text.parameters]
+    lines = ["@njit(**OPTIONS)", "def rates(t, z, theta, out):"]
+    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    f = forcing(t, theta)"] if text.forced else []
+    lines += ["    for lane in range(z.shape[0]):"]
+    lines += [f"        {', '.join(f'out[lane, {place}]' for place in places)} = derivative({', '.join(values)})"]
+    return "\n".join([*lines, ""])
+
+
+class VectorField:
+    """The exact right-hand sides of a scene's equations, b(q, t) = q′ without noise.
+
+    The force of a stop is that at positive depth. At depth 0 and below a stop does not push, so the Jacobian there is
+    that of the free motion.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._theta = theta_of(scene)
+        self._modules: dict[Flow, types.ModuleType] = {}
+
+    def rate(self, states: Array, time: float = 0.0) -> Array:
+        """Return b(q, t).
+
+        Parameters
+        ----------
+        states : array (…, n)
+        time : float
+            In s.
+
+        Returns
+        -------
+        array (…, n)
+        """
+        return self._variational(states, time)[..., : np.shape(states)[-1]]
+
+    def jacobian(self, states: Array, time: float = 0.0) -> Array:
+        """Return ∂b/∂q, shape (…, n, n), at states of shape (…, n)."""
+        size = np.shape(states)[-1]
+        return self._variational(states, time)[..., size:].reshape(*np.shape(states), size)
+
+    def hamiltonian_rate(self, states: Array, momenta: Array, time: float = 0.0) -> Array:
+        """Return (q′, p′) of Hamilton's equations, shape (…, 2n), at states and momenta of shape (…, n).
+
+        Raises
+        ------
+        SceneError
+            The scene has no noise, so there are no momenta.
+        """
+        points = np.concatenate([states, momenta, np.zeros((*np.shape(states)[:-1], 1))], axis=-1)
+        return self._rates(Flow.HAMILTONIAN, points, time)[..., :-1]
+
+    def excitation(self, index: int, time: float) -> float:
+        """Return the force of one excitation (m s⁻²)."""
+        return float(self._module(Flow.STATE_VARIATIONAL).excitation(index, time, self._theta))
+
+    def _variational(self, states: Array, time: float) -> Array:
+        """b, and ∂b/∂q row by row: the rates of the variational equations where the matrix is the identity."""
+        shape = np.shape(states)
+        identity = np.broadcast_to(np.eye(shape[-1]).ravel(), (*shape[:-1], shape[-1] ** 2))
+        return self._rates(Flow.STATE_VARIATIONAL, np.concatenate([states, identity], axis=-1), time)
+
+    def _rates(self, flow: Flow, variables: Array, time: float) -> Array:
+        flat = np.ascontiguousarray(variables.reshape(-1, variables.shape[-1]))
+        out = np.empty_like(flat)
+        rates = self._module(flow).rates
+        with first_call(rates):
+            rates(float(time), flat, self._theta, out)
+        return out.reshape(variables.shape)
+
+    def _module(self, flow: Flow) -> types.ModuleType:
+        if flow not in self._modules:
+            self._modules[flow] = kernel_for(self.scene, flow, _Rates()).module
+        return self._modules[flow]

@@ -1,0 +1,295 @@
+"""Progress and statistics of long work: stages, counts, and a time limit.
+
+A public call opens a `Work`; everything that runs inside it, at any depth, counts into it and reports to it through the
+functions of this module. So no function takes a progress argument that it only hands on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
+from typing import Any
+
+from vibrokit.errors import StructureError, shown
+from vibrokit.registry import load_attribute
+
+TRAJECTORIES = "trajectories"
+"""Unit of stages that integrate many starts: `run_ensemble` advances them."""
+
+_SETTLED = 1.0  # seconds of a stage after which its pace is known well enough to estimate the time left
+
+
+class OutOfTime(KeyboardInterrupt):
+    """The time limit is reached; work stops as on Ctrl-C, and what was found is kept."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Update:
+    """What a listener is told.
+
+    Attributes
+    ----------
+    stage : str
+        What is being done, such as ``"basins"`` or ``"graph"``.
+    subject : str
+        The attractor or other thing it is done for; empty if there is none.
+    done : int
+        How many units are done.
+    total : int or None
+        How many there are; None where that is not known beforehand.
+    unit : str
+        What is counted, in the plural.
+    elapsed : float
+        Time since the stage began (s).
+    remaining : float or None
+        Estimated time until the stage ends (s), which never grows; None where the total is unknown.
+    compiling : bool
+        Whether a kernel is being compiled.
+    finished : bool
+        Whether the stage has ended.
+    """
+
+    stage: str
+    subject: str
+    done: int
+    total: int | None
+    unit: str
+    elapsed: float
+    remaining: float | None
+    compiling: bool = False
+    finished: bool = False
+
+
+Listener = Callable[[Update], None]
+Progress = bool | Listener | None
+"""What public calls take: True for a display on standard error, a function of an `Update`, or None."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Stats:
+    """How much work a result took.
+
+    Attributes
+    ----------
+    trajectories : int
+        Trajectories integrated.
+    intervals : int
+        Section intervals integrated, over all trajectories.
+    steps : int
+        Steps of fixed size taken; steppers that choose their own steps do not count them.
+    newton_iterations : int
+    seconds : dict of str to float
+        Time spent in each stage (s), without the stages inside it; ``"compiling"`` is one of them.
+    """
+
+    trajectories: int = 0
+    intervals: int = 0
+    steps: int = 0
+    newton_iterations: int = 0
+    seconds: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+class _Stage:
+    """One stage under way."""
+
+    def __init__(self, name: str, subject: str, unit: str, total: int | None) -> None:
+        self.name, self.subject, self.unit, self.total = name, subject, unit, total
+        self.done = 0
+        self.began = time.perf_counter()
+        self.inner = 0.0
+        self.remaining = math.inf
+
+    def update(self, *, compiling: bool = False, finished: bool = False) -> Update:
+        elapsed = time.perf_counter() - self.began
+        if self.total and self.done and elapsed >= _SETTLED:
+            self.remaining = min(self.remaining, elapsed * max(0, self.total - self.done) / self.done)
+        known = None if math.isinf(self.remaining) else self.remaining
+        return Update(
+            self.name, self.subject, self.done, self.total, self.unit, elapsed, known, compiling, finished
+        )  # fmt: skip
+
+
+class Work:
+    """One piece of work that a user asked for: its stages, its counts, its time limit.
+
+    Parameters
+    ----------
+    listener : callable, optional
+        Called with an `Update` whenever something is done; by default that of the work around it.
+    time_limit : float, optional
+        Time after which `OutOfTime` is raised at the next report (s).
+    outer : Work, optional
+        The work that this one is a part of: its time limit stays in force, and what is counted here counts there too.
+    """
+
+    def __init__(
+        self, listener: Listener | None = None, time_limit: float | None = None, outer: Work | None = None
+    ) -> None:
+        self.listener: Listener | None = listener or (outer.listener if outer else None)
+        self.outer = outer
+        self.began = time.perf_counter()
+        self.deadline = math.inf if time_limit is None else self.began + time_limit
+        self.interrupted = False
+        self.counts: Counter[str] = Counter()
+        self.spent: defaultdict[str, float] = defaultdict(float)  # s, by stage
+        self.stages: list[_Stage] = []
+
+    @property
+    def seconds(self) -> float:
+        """Time since the work began (s)."""
+        return time.perf_counter() - self.began
+
+    @property
+    def stats(self) -> Stats:
+        """What was counted so far."""
+        names = [field.name for field in dataclasses.fields(Stats) if field.name != "seconds"]
+        return Stats(**{name: self.counts[name] for name in names}, seconds=dict(self.spent))
+
+    @property
+    def inside(self) -> _Stage | None:
+        """The innermost stage, of this work or of that around it."""
+        return self.stages[-1] if self.stages else self.outer.inside if self.outer else None
+
+    def interrupt(self) -> None:
+        """Ask the work to stop: KeyboardInterrupt is raised at its next report, where nothing is lost."""
+        self.interrupted = True
+
+    def tell(self, *, compiling: bool = False, finished: bool = False) -> None:
+        """Tell the listener about the innermost stage; raises OutOfTime after a deadline, and asked interrupts."""
+        if self.stages and self.listener is not None:
+            self.listener(self.stages[-1].update(compiling=compiling, finished=finished))
+        if not finished:
+            self.check()
+
+    def check(self) -> None:
+        """Raise OutOfTime after a deadline, and interrupts that were asked for; each once, so that all else is kept."""
+        if self.interrupted:
+            self.interrupted = False
+            raise KeyboardInterrupt
+        if time.perf_counter() > self.deadline:
+            self.deadline = math.inf
+            raise OutOfTime
+        if self.outer is not None:
+            self.outer.check()
+
+    def close(self) -> None:
+        """Add what was counted to the work around this one."""
+        if self.outer is not None:
+            self.outer.counts.update(self.counts)
+            for name, seconds in self.spent.items():
+                self.outer.spent[name] += seconds
+
+
+_CURRENT: ContextVar[Work | None] = ContextVar("work", default=None)
+
+
+def current() -> Work:
+    """Return the work under way; one that nobody listens to if none was opened."""
+    return _CURRENT.get() or Work()
+
+
+@contextlib.contextmanager
+def working(progress: Progress = None, time_limit: float | None = None) -> Iterator[Work]:
+    """Open a piece of work; inside another one, the listener and the time limit of that stay in force."""
+    work = Work(_listener(progress), checked_time_limit(time_limit), _CURRENT.get())
+    token = _CURRENT.set(work)
+    try:
+        yield work
+    finally:
+        _CURRENT.reset(token)
+        work.close()
+
+
+@contextlib.contextmanager
+def stage(name: str, *, subject: str = "", unit: str = "", total: int | None = None) -> Iterator[None]:
+    """Open a stage of the work under way.
+
+    Parameters
+    ----------
+    name : str
+    subject : str
+        Name of the attractor that it is for; by default that of the stage around it.
+    unit : str
+        What is counted, in the plural.
+    total : int, optional
+        How many there are; None where that is not known beforehand.
+    """
+    work = current()
+    around = work.inside
+    own = _Stage(name, subject or (around.subject if around else ""), unit, total)
+    work.stages.append(own)
+    try:
+        work.tell()
+        yield
+    finally:
+        elapsed = time.perf_counter() - own.began
+        try:
+            work.tell(finished=True)
+        finally:
+            work.stages.pop()
+            work.spent[name] += elapsed - own.inner
+            if around is not None:
+                around.inner += elapsed
+
+
+def advance(count: int = 1, unit: str | None = None) -> None:
+    """Add to what is done in the innermost stage; with a unit, only if the stage counts that."""
+    work = current()
+    if work.stages and unit in (None, work.stages[-1].unit):
+        work.stages[-1].done += count
+    work.tell()
+
+
+def report(done: int, total: int | None = None) -> None:
+    """Set what is done in the innermost stage, and how much there is."""
+    work = current()
+    if work.stages:
+        work.stages[-1].done = done
+        work.stages[-1].total = total if total is not None else work.stages[-1].total
+    work.tell()
+
+
+def count(**counts: int) -> None:
+    """Add to the counts of `Stats`."""
+    current().counts.update(counts)
+
+
+@contextlib.contextmanager
+def compiling() -> Iterator[None]:
+    """Mark a compilation, which may take long."""
+    work, began = current(), time.perf_counter()
+    work.tell(compiling=True)
+    try:
+        yield
+    finally:
+        elapsed = time.perf_counter() - began
+        work.spent["compiling"] += elapsed
+        if work.stages:
+            work.stages[-1].inner += elapsed
+
+
+def checked_time_limit(seconds: Any) -> float | None:
+    """Return a time limit (s) or None; raises StructureError for anything else."""
+    if seconds is None:
+        return None
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
+        raise StructureError(f"time_limit must be a positive number of seconds or None, got {shown(seconds)}.")
+    return float(seconds)
+
+
+def _listener(progress: Progress) -> Listener | None:
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        display: Listener = load_attribute("vibrokit.display:Display")()  # it stands above this module
+        return display
+    if callable(progress):
+        return progress
+    raise StructureError(
+        f"progress must be True, None or a function of one Update, got {shown(progress)}."
+    )  # fmt: skip

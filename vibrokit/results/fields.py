@@ -1,0 +1,303 @@
+"""Fields: how one attribute of many records lies in a dataset.
+
+A number of each record makes an array with one entry per record. Arrays whose length differs from record to record are
+padded with NaN at their ends, beside an array of their lengths; long curves of very different lengths lie end to end
+instead, which the CF conventions (cfconventions.org, section 9.3.3) call a contiguous ragged array.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import ResultFileError
+from vibrokit.results.arrays import LARGEST_WHOLE, Arrays
+
+Variable = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
+Array = NDArray[np.float64]
+
+SIDES = ("left", "right")
+LARGEST = float(np.finfo(float).max)
+
+
+def _about(long_name: str, units: str = "1") -> dict[str, Any]:
+    """Attributes of an array."""
+    return {"long_name": long_name, "units": units} if units else {"long_name": long_name}
+
+
+class Field(ABC):
+    """One attribute of many records. In every method `record` is their dimension and `name` that of the array."""
+
+    @abstractmethod
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        """Return the arrays that hold the attribute of all records, with their names."""
+
+    @abstractmethod
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        """Return the attribute of each record; raises ResultFileError."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scalar(Field):
+    """A value of each record. Abstract."""
+
+    dtype: ClassVar[type] = float
+
+    long_name: str
+    units: str = "1"
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        yield name, ((record,), np.array(values, dtype=self.dtype), _about(self.long_name, self.units))
+
+
+@dataclasses.dataclass(frozen=True)
+class Number(Scalar):
+    """A real number; it may be NaN or infinite unless it has bounds."""
+
+    low: float = -np.inf
+    high: float = np.inf
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        bounded = self.low > -np.inf or self.high < np.inf
+        return arrays.numbers(name, (arrays.size(record),), self.low, self.high, finite=bounded).tolist()
+
+
+@dataclasses.dataclass(frozen=True)
+class Whole(Scalar):
+    """A whole number."""
+
+    dtype: ClassVar[type] = np.int64
+
+    low: int = 0
+    high: int = LARGEST_WHOLE
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        return arrays.wholes(name, (arrays.size(record),), self.low, self.high).tolist()
+
+
+@dataclasses.dataclass(frozen=True)
+class Flag(Scalar):
+    """True or False."""
+
+    dtype: ClassVar[type] = bool
+
+    units: str = ""
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        return [bool(value) for value in arrays.wholes(name, (arrays.size(record),), 0, 1)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Word(Scalar):
+    """A text; one of `known`, if that is given."""
+
+    dtype: ClassVar[type] = str
+
+    units: str = ""
+    known: tuple[str, ...] = ()
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        return arrays.words(name, (arrays.size(record),), self.known)
+
+
+@dataclasses.dataclass(frozen=True)
+class BySide(Scalar):
+    """A number, 0 or more, for each side of the mass where there is a stop; NaN where there is none."""
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        rows = np.array([[value.get(side, np.nan) for side in SIDES] for value in values], dtype=float)
+        yield "side", (("side",), np.array(SIDES), {"long_name": "side of the mass on which the stop is"})
+        yield name, ((record, "side"), rows.reshape(len(values), len(SIDES)), _about(self.long_name, self.units))
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        rows = arrays.numbers(name, (arrays.size(record), len(SIDES)), 0.0, LARGEST, finite=False)
+        return [{s: float(n) for s, n in zip(SIDES, row, strict=True) if not np.isnan(n)} for row in rows]
+
+
+@dataclasses.dataclass(frozen=True)
+class Length:
+    """A length that differs from record to record.
+
+    Attributes
+    ----------
+    dimension : str
+        Along which the arrays lie; the name of the record goes before it.
+    what : str
+        What is counted, in the plural.
+    ragged : bool
+        Whether arrays lie end to end, and are not padded.
+    """
+
+    dimension: str
+    what: str
+    ragged: bool = False
+
+    def counts(self, record: str, lengths: Sequence[int]) -> tuple[str, Variable]:
+        """Return the array of lengths, with its name."""
+        dimension = f"{record}_{self.dimension}"
+        attributes = _about(f"number of {self.what}") | ({"sample_dimension": dimension} if self.ragged else {})
+        return f"{dimension}_count", ((record,), np.array(lengths, dtype=np.int64), attributes)
+
+    def lay(self, record: str, pieces: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], Array]:
+        """Return the dimensions and the values of one array that holds all the pieces."""
+        dimension = f"{record}_{self.dimension}"
+        if self.ragged:
+            return (dimension,), np.concatenate([np.empty(0), *pieces])
+        padded = np.full((len(pieces), max(map(len, pieces), default=0)), np.nan)
+        for row, piece in zip(padded, pieces, strict=True):
+            row[: len(piece)] = piece
+        return (record, dimension), padded
+
+    def take(self, arrays: Arrays, record: str, name: str, *, finite: bool) -> list[Array]:
+        """Return the pieces of an array."""
+        count, room = arrays.size(record), arrays.size(f"{record}_{self.dimension}")
+        lengths = arrays.wholes(f"{record}_{self.dimension}_count", (count,), 0, room)
+        if self.ragged:
+            values = arrays.numbers(name, (int(lengths.sum()),), finite=False)
+            pieces = np.split(values, np.cumsum(lengths)[:-1])[:count]
+        else:
+            rows = arrays.numbers(name, (count, room), finite=False)
+            pieces = [row[:length] for row, length in zip(rows, lengths, strict=True)]
+        if finite and not all(np.isfinite(piece).all() for piece in pieces):
+            raise ResultFileError(f"its array {name!r} holds NaN or infinity where finite numbers are needed")
+        return [piece.copy() for piece in pieces]
+
+
+@dataclasses.dataclass(frozen=True)
+class Series(Field):
+    """An array of finite numbers; whole ones from `low` on if `whole`."""
+
+    length: Length
+    long_name: str
+    units: str = "1"
+    whole: bool = False
+    low: int = 0
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        pieces = [np.asarray(value, dtype=float) for value in values]
+        yield self.length.counts(record, [len(piece) for piece in pieces])
+        yield name, (*self.length.lay(record, pieces), _about(self.long_name, self.units))
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        pieces = self.length.take(arrays, record, name, finite=True)
+        if not self.whole:
+            return pieces
+        for piece in pieces:
+            if not np.all((piece == np.floor(piece)) & (piece >= self.low) & (piece <= LARGEST_WHOLE)):
+                raise ResultFileError(f"its array {name!r} holds numbers that are not whole, or below {self.low}")
+        return [piece.astype(np.int64) for piece in pieces]
+
+
+@dataclasses.dataclass(frozen=True)
+class Spectrum(Field):
+    """An array of complex numbers, real and imaginary parts apart; `finite`: neither NaN nor infinity."""
+
+    length: Length
+    long_name: str
+    units: str = "1"
+    finite: bool = True
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        yield self.length.counts(record, [len(value) for value in values])
+        for part, pieces in (("real", [value.real for value in values]), ("imag", [value.imag for value in values])):
+            about = _about(f"{self.long_name}, {part} part", self.units)
+            yield f"{name}_{part}", (*self.length.lay(record, pieces), about)
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        parts = (self.length.take(arrays, record, f"{name}_{part}", finite=self.finite) for part in ("real", "imag"))
+        return [_complex(real, imag) for real, imag in zip(*parts, strict=True)]
+
+
+def _complex(real: Array, imag: Array) -> NDArray[np.complex128]:
+    values = np.empty(len(real), dtype=complex)  # real + 1j·imag would turn an infinite part into NaN
+    values.real, values.imag = real, imag
+    return values
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """One column of an array of vectors: the end of its name, its long name, its units."""
+
+    name: str
+    long_name: str
+    units: str
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Attributes of the array."""
+        return _about(self.long_name, self.units)
+
+
+@dataclasses.dataclass(frozen=True)
+class Columns:
+    """The columns of an array of vectors.
+
+    Attributes
+    ----------
+    first : tuple of Column
+        Those that all vectors have.
+    further : Column or None
+        Those of extra noise states, which are numbered; None if there are none.
+    """
+
+    first: tuple[Column, ...]
+    further: Column | None = None
+
+    def __getitem__(self, index: int) -> Column:
+        if index < len(self.first) or self.further is None:
+            return self.first[index]
+        number = index + 1
+        return Column(f"{self.further.name}{number}", f"{self.further.long_name} {number}", self.further.units)
+
+    def allows(self, count: int) -> bool:
+        """Whether vectors may have so many entries."""
+        return count == len(self.first) or (count > len(self.first) and self.further is not None)
+
+
+PLANE = Columns((Column("x", "displacement", "m"), Column("v", "velocity", "m s-1")))
+STATE = Columns(PLANE.first, Column("state", "state of the noise", "1"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Vectors(Field):
+    """An array (length, n) of finite vectors, each column an array of its own.
+
+    Attributes
+    ----------
+    length : Length
+    columns : Columns
+    prefixed : bool
+        Whether the names of the arrays contain that of the attribute.
+    """
+
+    length: Length
+    columns: Columns
+    prefixed: bool = True
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        yield self.length.counts(record, [len(value) for value in values])
+        widths = {value.shape[1] for value in values if len(value)} or {len(self.columns.first)}
+        width = widths.pop()
+        if widths or not self.columns.allows(width):
+            raise ResultFileError(f"{name} have {sorted({width, *widths})} columns, which a file cannot hold")
+        for index in range(width):
+            pieces = [value[:, index] if len(value) else np.empty(0) for value in values]
+            about = self.columns[index].about
+            yield self._name(record, name, index), (*self.length.lay(record, pieces), about)
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        width = len(self.columns.first)
+        while self.columns.allows(width + 1) and self._name(record, name, width) in arrays:
+            width += 1
+        columns = [
+            self.length.take(arrays, record, self._name(record, name, index), finite=True) for index in range(width)
+        ]
+        return [np.stack(piece, axis=1) for piece in zip(*columns, strict=True)]
+
+    def _name(self, record: str, name: str, index: int) -> str:
+        return f"{name if self.prefixed else record}_{self.columns[index].name}"

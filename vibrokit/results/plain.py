@@ -1,0 +1,71 @@
+"""PlainRecord: a saved record whose kind no installed package registers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import xarray
+
+from vibrokit.errors import ResultFileError, UnknownNameError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.record import Record
+from vibrokit.results.summary import Summary, counted
+
+
+class PlainRecord(Record):
+    """The arrays and the provenance of a file whose kind is unknown here.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+    unknown_kind : str
+        The kind that the file names. Saved again, it names it still.
+    """
+
+    kind: ClassVar[str] = "plain"
+
+    dataset: xarray.Dataset
+    unknown_kind: str
+
+    @property
+    def file_kind(self) -> str:
+        """The kind that a file of this record names."""
+        return self.unknown_kind
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, if the file has them in the usual place."""
+        try:
+            return tuple(Arrays(self.dataset).words("attractor_name", (None,)))
+        except ResultFileError:
+            return ()
+
+    def plot(self, ax: Any = None) -> Any:
+        """Raise UnknownNameError: only the package that registers the kind can draw it."""
+        raise UnknownNameError(
+            f"there is no picture of kind {self.unknown_kind!r}: no installed package registers it; install the "
+            "package that wrote the file, or draw the arrays in its dataset."
+        )
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays."""
+        return self.dataset
+
+    @classmethod
+    def from_dataset(cls, dataset: xarray.Dataset, *, unknown_kind: str = "", **provenance: Any) -> Self:
+        """Make a record of arrays and of the name of their kind."""
+        record = cls(dataset=dataset, unknown_kind=unknown_kind, **provenance)
+        if record.found(Code.UNKNOWN_KIND):
+            return record
+        finding = Finding.of(Code.UNKNOWN_KIND, kind=unknown_kind)
+        return cls(
+            dataset=dataset, unknown_kind=unknown_kind, **provenance | {"findings": (*record.findings, finding)}
+        )  # fmt: skip
+
+    @property
+    def summary(self) -> Summary:
+        """The unknown kind and the arrays."""
+        arrays = [(str(name), " × ".join(map(str, array.shape))) for name, array in self.dataset.data_vars.items()]
+        title = f"PlainRecord of unknown kind {self.unknown_kind!r}: {counted(len(arrays), 'array')}"
+        return Summary(title, tuple(arrays))

@@ -1,0 +1,134 @@
+"""Record: what every saved outcome has: where it came from, what was found, and how it is saved and drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
+
+from vibrokit.progress import Stats
+from vibrokit.registry import load_attribute
+from vibrokit.results.finding import Code, Finding, Severity
+from vibrokit.results.summary import Summary
+from vibrokit.results.versions import versions
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibrokit.oscillator import Oscillator
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, kw_only_default=True, field_specifiers=(dataclasses.field,))
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Record(ABC):
+    """The outcome of one piece of work. Abstract.
+
+    A subclass becomes a frozen dataclass by itself; no decorator is needed.
+
+    Attributes
+    ----------
+    scene : dict
+        The scene as plain data, with every parameter.
+    settings : dict
+        The arguments or the analyzer's configuration, as plain data from which the same can be built again.
+    findings : tuple of Finding
+    stats : Stats
+        How much work it took.
+    complete : bool
+        False if the work was stopped before its end.
+    seed : int or None
+        Seed of what was random.
+    seconds : float
+        Time that it took.
+    versions : dict
+        Versions of the toolkit and of the libraries it uses.
+
+    For developers
+    --------------
+    A concrete subclass names its `kind`, which files carry, writes `names`, `plot`, `to_dataset` and `from_dataset`,
+    and is registered under the entry-point group ``vibrokit.records`` by its kind. From these everything else just
+    works: saving, opening, drawing a saved one.
+    """
+
+    kind: ClassVar[str] = ""
+
+    scene: Mapping[str, Any]
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    stats: Stats = dataclasses.field(default_factory=Stats)
+    complete: bool = True
+    seed: int | None = None
+    seconds: float = 0.0
+    versions: Mapping[str, str] = dataclasses.field(default_factory=versions)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)(cls)
+        if not inspect.isabstract(cls) and ABC not in cls.__bases__ and not cls.__dict__.get("kind"):
+            raise TypeError(
+                f'{cls.__name__} names no kind; write kind: ClassVar[str] = "...", the name that its files carry.'
+            )
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, in the order of their labels."""
+
+    @abstractmethod
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the record into `ax`, or into a new figure; return a `vibrokit.plots.artists.Artists`."""
+
+    @abstractmethod
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays of the record with dimensions, coordinates, units and long names."""
+
+    @classmethod
+    @abstractmethod
+    def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
+        """Make a record of its arrays, which may come from a stranger's file; raises ResultFileError."""
+
+    @property
+    def file_kind(self) -> str:
+        """The kind that a file of this record names."""
+        return self.kind
+
+    @property
+    def status(self) -> str:
+        """The findings as sentences, a line each."""
+        return "\n".join(finding.sentence(self.names) for finding in self.findings)
+
+    def found(self, code: Code) -> tuple[Finding, ...]:
+        """Return the findings of a code."""
+        return tuple(finding for finding in self.findings if finding.code is code)
+
+    @property
+    def summary(self) -> Summary:
+        """What the record shows of itself in a console or a notebook, besides its findings."""
+        return Summary(type(self).__name__)
+
+    def __repr__(self) -> str:
+        return self.summary.text(self.findings, self.names)
+
+    def _repr_html_(self) -> str:
+        return self.summary.html(self.findings, self.names)
+
+    @property
+    def failed(self) -> bool:
+        """Whether something that was asked for is missing."""
+        return any(finding.severity is Severity.ERROR for finding in self.findings)
+
+    @property
+    def oscillator(self) -> Oscillator:
+        """The scene as an oscillator."""
+        # The reader of scenes is in a layer above; it is found by name, as plug-ins are.
+        oscillator: Oscillator = load_attribute("vibrokit.scene_file:scene_from_data")(self.scene)
+        return oscillator
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
+        from vibrokit.results.files import save_record
+
+        save_record(self, path)

@@ -1,0 +1,80 @@
+"""Names of attractors, from what they do."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vibrokit.results.attractor import Attractor
+
+_RATIO = 1.1  # least ratio of two amplitudes that are named small and large
+_SHIFT = 0.1  # least distance, in widths of the motion, of two places that are named left and right
+_SIZES: Mapping[int, tuple[str, ...]] = {2: ("small", "large"), 3: ("small", "medium", "large")}
+_PLACES: Mapping[int, tuple[str, ...]] = {2: ("left", "right"), 3: ("left", "middle", "right")}
+
+
+def labelled(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[Attractor, ...]:
+    """Return attractors with their places as labels, and with names."""
+    names = names_of(attractors, has_stops=has_stops)
+    return tuple(
+        dataclasses.replace(attractor, label=label, name=name)
+        for label, (attractor, name) in enumerate(zip(attractors, names, strict=True))
+    )
+
+
+def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, ...]:
+    """Return a short, distinct name for each attractor.
+
+    ``clear`` runs clear of the stops, ``hammering`` hits them, ``pressed`` stays in contact with one. In a scene
+    without stops an orbit is an ``oscillation``. An equilibrium clear of the stops is ``rest``, a limit cycle
+    ``cycle``; motion that never repeats is ``quasiperiodic`` or ``chaotic``. The period follows if it is not 1:
+    ``hammering-period-4``. Two or three attractors of one name become ``small-``, ``medium-`` and ``large-`` by
+    amplitude, or ``left-``, ``middle-`` and ``right-`` by place. Where neither distinguishes them, or where there are
+    more, all but the first are numbered.
+    """
+    bases = [_base(attractor, has_stops) for attractor in attractors]
+    names = list(bases)
+    for base in dict.fromkeys(bases):
+        group = [index for index, name in enumerate(bases) if name == base]
+        words = _distinguishing([attractors[index] for index in group])
+        for number, index in enumerate(group[1:], start=2):
+            names[index] = f"{base}-{number}"
+        for index, word in zip(group, words, strict=False):
+            names[index] = f"{word}-{base}"
+    return tuple(names)
+
+
+def _base(attractor: Attractor, has_stops: bool) -> str:
+    if attractor.kind in ("quasiperiodic", "chaotic"):
+        return attractor.kind
+    if attractor.kind == "limit cycle":
+        return "cycle"
+    touches = any(depth > 0 for depth in attractor.peak_depth.values())
+    if touches and not attractor.impacts:
+        motion = "pressed"
+    elif attractor.kind == "equilibrium":
+        motion = "rest"
+    else:
+        motion = "oscillation" if not has_stops else "hammering" if attractor.impacts else "clear"
+    return motion if attractor.period == 1 else f"{motion}-period-{attractor.period}"
+
+
+def _distinguishing(group: Sequence[Attractor]) -> tuple[str, ...]:
+    """Words that distinguish attractors of one name; empty if there are none."""
+    widths = [float(np.ptp(one.orbit[:, 0])) for one in group]
+    if len(group) in _SIZES and all(large > _RATIO * small > 0 for small, large in itertools.pairwise(sorted(widths))):
+        return _in_order(_SIZES[len(group)], widths)
+    middles = [float(one.orbit[:, 0].mean()) for one in group]
+    least = _SHIFT * max(*widths, 1e-9 * max(map(abs, middles)), 0.0)
+    if len(group) in _PLACES and all(right - left > least for left, right in itertools.pairwise(sorted(middles))):
+        return _in_order(_PLACES[len(group)], middles)
+    return ()
+
+
+def _in_order(words: Sequence[str], values: Sequence[float]) -> tuple[str, ...]:
+    """Return the word of each value, the first word for the smallest."""
+    ranks = np.argsort(np.argsort(values))
+    return tuple(words[rank] for rank in ranks)

@@ -1,0 +1,17 @@
+"""Tables as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return one line for each row, with columns of equal width; the first row has the headings."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def number_text(value: float, form: str = ".3g") -> str:
+    """Return a number in a format; a dash for NaN."""
+    return "–" if math.isnan(value) else format(value, form)
