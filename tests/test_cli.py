@@ -1,104 +1,361 @@
-import dataclasses
 import json
 import math
+import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
+from importlib.metadata import EntryPoint
+from types import SimpleNamespace
 
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.action_plot import ActionPlot
+from vibrokit import registry
+from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.settings import configured, setting
 from vibrokit.cli import main, parsed
+from vibrokit.errors import StructureError
+from vibrokit.progress import OutOfTime, advance, stage
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
 
 PLOT = ["--analyzer", "action-plot"]
-QUICK = ["--cells", "50", "--set", "points=200", *PLOT]
+TOY = ["run", "double-well", "--analyzer", "toy"]
+ZETA = 0.05  # of the double well
 
 
-def test_run_prints_a_table_and_saves_a_figure(tmp_path, monkeypatch, capsys):
+def found(source, target, value=0.05):
+    return ActivationEnergy(source, target, value, 0.9 * value, value, "toy", Bound.CERTIFIED, 1e-9, 1e-12)
+
+
+def nothing_happens(problem):
+    """What a toy analyzer does before it finds an energy."""
+
+
+class Toy(Analyzer):
+    """Finds an energy for each attractor at once, unless something happens before."""
+
+    happens = staticmethod(nothing_happens)
+    scale: float = 1.0
+
+    def analyze(self, problem):
+        with stage("toy", unit="steps", total=1):
+            type(self).happens(problem)
+            advance()
+        energy = found(problem.source, 1 - problem.source, 0.05 * self.scale)
+        remark = Finding.of(Code.REMARK, problem.source, text="a toy wrote this")
+        return Analysis(estimates=(energy,), branches=(energy,), findings=(remark,))
+
+
+class Toy2(Toy):
+    """Another one."""
+
+
+@pytest.fixture(scope="module")
+def well():
+    return vk.find_structure(vk.load_scene("double-well"), cells=(40, 40))
+
+
+@pytest.fixture
+def toys(well, monkeypatch, tmp_path):
+    """Toy analyzers are registered, the structure is known beforehand, and files go to a new folder."""
+    installed = registry._entry_points
+
+    def entry_points(group):
+        if group != registry.Group.ANALYZERS:
+            return installed(group)
+        points = [EntryPoint(name, f"{__name__}:{cls}", group) for name, cls in [("toy", "Toy"), ("toy-2", "Toy2")]]
+        for point in points:
+            vars(point)["dist"] = SimpleNamespace(name="toys")
+        return [*installed(group), *points]
+
+    monkeypatch.setitem(sys.modules, __name__, sys.modules.get(__name__) or SimpleNamespace(Toy=Toy, Toy2=Toy2))
+    monkeypatch.setattr(registry, "_entry_points", entry_points)
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", lambda osc, **options: well)
+    monkeypatch.setattr(Toy, "happens", staticmethod(nothing_happens))
     monkeypatch.chdir(tmp_path)
-    assert main(["run", "double-well", *QUICK, "-o", "r.nc"]) == 0
+    return tmp_path
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def press(times=1):
+    """Press Ctrl-C."""
+    for _ in range(times):
+        signal.raise_signal(signal.SIGINT)
+
+
+# What is printed and saved
+
+
+def test_run_prints_what_was_found_and_saves_it(toys, capsys):
+    assert main([*TOY, "-o", "r.nc"]) == 0
     out = capsys.readouterr().out
-    assert "equilibrium" in out
-    assert "ΔU" in out
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["double-well-action-plot.png", "r.nc"]
+    for text in ("left-rest", "equilibrium", "left-rest → right-rest", "ΔU/D", "certified", "A toy wrote this"):
+        assert text.lower() in out.lower()
+    assert "written: r.nc (toy)" in out
+    assert files(toys) == ["double-well-toy.png", "r.nc"]
+    assert vk.load_result("r.nc").energy("left-rest").value == 0.05
     assert main(["plot", "r.nc"]) == 0
-    assert (tmp_path / "r.png").stat().st_size > 5000
+    assert (toys / "r.png").stat().st_size > 5000
+    capsys.readouterr()
+    assert main(["report", "r.nc"]) == 0
+    assert "left-rest → right-rest  0.05  5  " in capsys.readouterr().out
 
 
-def test_json_is_one_object_of_the_promised_shape(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "double-well", *QUICK, "--json"]) == 0
+def test_json_has_the_words_of_the_interface(toys, well, capsys):
+    assert main([*TOY, "--json", "--seed", "7"]) == 0
     record = json.loads(capsys.readouterr().out)
-    assert list(record) == ["scene", "attractors", "saddles", "energies", "versions", "seed", "seconds"]
-    assert list(record["attractors"][0]) == ["label", "kind", "period", "impacts", "points", "basin_fraction"]
-    assert list(record["energies"][0]) == ["source", "target", "method", "value", "lower", "upper", "residual"]
-    assert not list(tmp_path.iterdir())
+    promised = ["scene", "attractors", "saddles", "energies", "versions", "seed", "seconds"]
+    assert set(promised) < set(record)
+    assert {"complete", "branches", "findings", "transitions", "settings", "stats", "files"} < set(record)
+    assert (record["scene"], record["complete"], record["seed"], record["files"]) == ("double-well", True, 7, {})
+    attractor = record["attractors"][0]
+    assert {"label", "kind", "period", "impacts", "points", "basin_fraction"} < set(attractor)
+    assert (attractor["name"], attractor["basin_fraction"]) == ("left-rest", well.attractors[0].basin_fraction)
+    energy = record["energies"][0]
+    assert {"source", "target", "method", "value", "lower", "upper", "residual"} < set(energy)
+    assert (energy["bound"], energy["numerical_error"], energy["exit"]) == (
+        "certified", 1e-9, "left-rest → right-rest",
+    )  # fmt: skip
+    assert energy["ratio"] == pytest.approx(5.0)
+    (remark, _) = [one for one in record["findings"] if one["record"] == "toy"]
+    assert (remark["code"], remark["severity"], remark["source"]) == ("remark", "info", 0)
+    assert (remark["values"], remark["text"]) == ({"text": "a toy wrote this"}, "A toy wrote this")
+    assert record["transitions"]["toy"]["energies"] == [[0, 0.05], [0.05, 0]]
+    assert {"trajectories", "intervals", "steps", "newton_iterations", "seconds"} == set(record["stats"]["toy"])
+    assert files(toys) == []
 
 
-def test_a_structure_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "double-well", "--cells", "40", "-o", "s.nc", "--analyzer"]) == 0
-    out = capsys.readouterr().out
-    assert "between" in out
-    assert "saddle" in out
-    assert "ΔU" not in out
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["double-well-structure.png", "s.nc"]
-    assert main(["plot", "s.nc"]) == 0
-    assert (tmp_path / "s.png").stat().st_size > 5000
-
-
-def test_saddles_are_in_the_json(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "double-well", "--cells", "40", "--json", "--analyzer"]) == 0
+def test_saddles_are_in_the_json(toys, capsys):
+    assert main(["run", "double-well", "--json", "--analyzer"]) == 0
     (saddle,) = json.loads(capsys.readouterr().out)["saddles"]
-    assert list(saddle) == ["period", "points", "multipliers"]
+    assert {"period", "points", "multipliers"} < set(saddle)
     assert saddle["points"][0] == pytest.approx([0.0, 0.0], abs=1e-9)
-    zeta = 0.05
-    rates = -zeta + (1 + zeta**2) ** 0.5, -zeta - (1 + zeta**2) ** 0.5
+    rates = -ZETA + (1 + ZETA**2) ** 0.5, -ZETA - (1 + ZETA**2) ** 0.5
     exact = [[math.exp(2 * math.pi * rate), 0.0] for rate in rates]
     assert saddle["multipliers"] == [pytest.approx(pair, rel=1e-8, abs=1e-12) for pair in exact]
 
 
-def test_one_attractor_is_a_finding_and_a_sentence(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "one.toml").write_text(
-        'natural_frequency = 1.0\ndamping_ratio = 0.1\nnoise = { name = "white", intensity = 1e-3 }\n'
-    )
-    assert main(["run", "one.toml", *QUICK, "--json"]) == 0
+def test_a_structure_is_saved_and_drawn(toys, capsys):
+    assert main(["run", "double-well", "-o", "s.nc", "--analyzer"]) == 0
+    out = capsys.readouterr().out
+    assert "saddle" in out
+    assert "left-rest | right-rest" in out
+    assert "ΔU" not in out
+    assert files(toys) == ["double-well-structure.png", "s.nc"]
+    assert vk.load_result("s.nc").names == ("left-rest", "right-rest")
+
+
+def test_each_of_several_analyzers_has_its_file(toys, capsys):
+    assert main([*TOY, "toy-2", "--set", "scale=2", "-o", "r.nc", "--figure", "f.png"]) == 0
+    assert files(toys) == ["f-toy-2.png", "f-toy.png", "r-toy-2.nc", "r-toy.nc"]
+    assert vk.load_result("r-toy-2.nc").energy(0).value == 0.1
+
+
+@pytest.mark.parametrize("given", [["--source", "right"], ["--source", "1"], ["--set", "source=right-rest"]])
+def test_the_source_is_a_name_or_a_label(toys, capsys, given):
+    assert main([*TOY, "--json", *given]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert [energy["source"] for energy in record["energies"]] == [1]
+    assert record["transitions"]["toy"]["missing"] == [0]
+
+
+def test_what_is_not_finite_is_null_in_json(toys, monkeypatch, capsys):
+    """An energy without an upper bound is still one object that other programs read."""
+    monkeypatch.setattr(f"{__name__}.found", lambda source, target, value: ActivationEnergy(
+        source, target, value, 0.0, math.inf, "toy", Bound.UPPER))  # fmt: skip
+    assert main([*TOY, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert {(energy["upper"], energy["residual"]) for energy in record["energies"]} == {(None, None)}
+
+
+# What fails
+
+
+def refuse(problem):
+    raise StructureError("no toys here.")
+
+
+def crash(problem):
+    raise ZeroDivisionError("of a plug-in")
+
+
+def test_one_attractor_that_fails_loses_no_other(toys, monkeypatch, capsys):
+    monkeypatch.setattr(Toy, "happens", lambda problem: problem.source or refuse(problem))
+    assert main([*TOY, "-o", "r.nc"]) == 1
+    assert "error: Left-rest could not be analyzed: no toys here." in capsys.readouterr().out
+    assert [energy.source for energy in vk.load_result("r.nc").energies] == [1]
+
+
+def test_an_analyzer_that_cannot_run_leaves_the_structure(toys, capsys):
+    assert main([*TOY, "-o", "r.nc", "--exit", "first-contact:right", "--json"]) == 1
     out, err = capsys.readouterr()
     record = json.loads(out)
-    assert len(record["attractors"]) == 1
-    assert record["energies"] == []
-    assert "one attractor only" in err
-
-
-def test_a_stop_that_is_not_there_is_a_sentence_beside_the_structure(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "double-well", *QUICK, "--exit", "first-contact:right"]) == 0
-    out, err = capsys.readouterr()
-    assert "equilibrium" in out
+    assert not record["complete"]
+    (finding,) = [one for one in record["findings"] if one["record"] == "run"]
+    assert (finding["code"], finding["severity"]) == ("analyzer-not-run", "error")
     assert "no right stop" in err
-    assert not list(tmp_path.iterdir())
+    assert record["files"] == {"structure": "r.nc"}
+    assert len(vk.load_result("r.nc").attractors) == 2
 
 
-def test_what_is_not_finite_is_null_in_json(tmp_path, monkeypatch, capsys):
-    """An energy without a lower bound is still one object that other programs read."""
-    monkeypatch.chdir(tmp_path)
-    original = ActionPlot.run
+def test_an_analyzer_that_crashes_leaves_the_others(toys, monkeypatch, capsys):
+    monkeypatch.setattr(Toy2, "happens", staticmethod(crash), raising=False)
+    assert main([*TOY, "toy-2", "-o", "r.nc"]) == 1
+    assert "ZeroDivisionError: of a plug-in" in capsys.readouterr().err
+    assert files(toys) == ["double-well-toy.png", "r-structure.nc", "r-toy.nc"]
 
-    def unbounded(self, osc, structure, *, progress=None):
-        result = original(self, osc, structure, progress=progress)
-        energies = tuple(dataclasses.replace(energy, upper=math.inf) for energy in result.energies)
-        return dataclasses.replace(result, energies=energies)
 
-    monkeypatch.setattr(ActionPlot, "run", unbounded)
-    assert main(["run", "double-well", *QUICK, "--json"]) == 0
-    record = json.loads(capsys.readouterr().out)
-    assert record["energies"]
-    assert {energy["upper"] for energy in record["energies"]} == {None}
+def test_a_file_that_cannot_be_written_leaves_the_tables(toys, monkeypatch, capsys):
+    (toys / "r.nc").mkdir()
+    assert main([*TOY, "-o", "r.nc"]) == 1
+    out, err = capsys.readouterr()
+    assert "left-rest → right-rest" in out
+    assert "no file was written" in out
+    assert "r.nc was not written" in err
+
+
+# Interrupts and time limits
+
+
+def test_ctrl_c_keeps_what_was_found_and_the_structure(toys, monkeypatch, capsys):
+    monkeypatch.setattr(Toy, "happens", lambda problem: problem.source and press())
+    assert main([*TOY, "toy-2", "-o", "r.nc"]) == 130
+    out, err = capsys.readouterr()
+    assert "written: r-toy.nc (toy), r-structure.nc (structure)" in err
+    assert "toy (incomplete)" in out
+    assert files(toys) == ["r-structure.nc", "r-toy.nc"]
+    result = vk.load_result("r-toy.nc")
+    assert not result.complete
+    assert [energy.source for energy in result.energies] == [0]
+    assert "toy-2 was not run" in err
+
+
+def test_ctrl_c_before_a_first_energy_keeps_the_structure(toys, monkeypatch, capsys):
+    monkeypatch.setattr(Toy, "happens", lambda problem: press())
+    assert main([*TOY, "-o", "r.nc", "--json"]) == 130
+    out, err = capsys.readouterr()
+    assert files(toys) == ["r.nc"]
+    assert vk.load_result("r.nc").complete
+    assert not json.loads(out)["complete"]
+    assert "written: r.nc (structure)" in err
+
+
+def test_ctrl_c_during_the_structure_keeps_what_it_has(toys, well, monkeypatch, capsys):
+    def half_found(osc, **options):
+        press()
+        with pytest.raises(KeyboardInterrupt), stage("basins"):
+            pytest.fail("the stage began")
+        return vk.Structure(**{**vars(well), "complete": False})
+
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", half_found)
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    out, err = capsys.readouterr()
+    assert not vk.load_result("r.nc").complete
+    assert "structure (incomplete)" in out
+    assert "toy was not run" in err
+
+
+def test_ctrl_c_before_anything_was_found_writes_nothing(toys, monkeypatch, capsys):
+    def nothing_found(osc, **options):
+        with stage("attractors"):
+            press()
+            advance()
+
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", nothing_found)
+    assert main([*TOY, "-o", "r.nc", "--json"]) == 130
+    out, err = capsys.readouterr()
+    assert "no file was written" in err
+    assert files(toys) == []
+    assert [one["code"] for one in json.loads(out)["findings"]] == ["stopped"]
+
+
+def test_a_time_limit_before_anything_was_found_says_so(toys, monkeypatch, capsys):
+    def nothing_found(osc, **options):
+        raise OutOfTime
+
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", nothing_found)
+    assert main([*TOY, "-o", "r.nc", "--time-limit", "1000"]) == 1
+    assert "during the search for steady states (time limit)" in capsys.readouterr().err
+    assert files(toys) == []
+
+
+def test_ctrl_c_while_the_input_is_read_ends_before_the_work(toys, monkeypatch, capsys):
+    original = vk.load_scene
+    monkeypatch.setattr("vibrokit.scene_file.load_scene", lambda name: press() or original(name))
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", lambda osc, **options: advance())
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    assert "no file was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("where", ["vibrokit.cli.run._save", "vibrokit.cli.run._print"])
+def test_ctrl_c_while_results_are_saved_or_printed_loses_nothing(toys, monkeypatch, capsys, where):
+    module, name = where.rsplit(".", 1)
+    original = getattr(sys.modules[module], name)
+    monkeypatch.setattr(where, lambda *arguments: press() or original(*arguments))
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    out, err = capsys.readouterr()
+    assert "left-rest → right-rest" in out
+    assert "written: r.nc (toy)" in err
+    assert vk.load_result("r.nc").complete
+
+
+def test_a_second_ctrl_c_stops_the_work_at_once(toys, monkeypatch, capsys):
+    def stuck(problem):
+        press(2)
+        pytest.fail("the second Ctrl-C did not stop")
+
+    monkeypatch.setattr(Toy, "happens", staticmethod(stuck))
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    assert files(toys) == ["r.nc"]
+    assert "written: r.nc (structure)" in capsys.readouterr().err
+
+
+def test_two_ctrl_c_while_saving_leave_the_old_file_whole(toys, monkeypatch, capsys):
+    (toys / "r.nc").write_text("an older file")
+    monkeypatch.setattr("vibrokit.results.atomic.os.replace", lambda *paths: press(2))
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    assert files(toys) == ["r.nc"]
+    assert (toys / "r.nc").read_text() == "an older file"
+    assert "written" not in capsys.readouterr().err
+
+
+def test_two_ctrl_c_just_after_saving_leave_the_new_file_whole(toys, monkeypatch, capsys):
+    import os
+
+    replace = os.replace
+    monkeypatch.setattr("vibrokit.results.atomic.os.replace", lambda *paths: replace(*paths) or press(2))
+    assert main([*TOY, "-o", "r.nc"]) == 130
+    assert files(toys) == ["r.nc"]
+    assert vk.load_result("r.nc").complete
+
+
+def test_ctrl_c_is_python_s_again_afterwards(toys):
+    before = signal.getsignal(signal.SIGINT)
+    main([*TOY])
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_time_limit_keeps_what_was_found(toys, monkeypatch, capsys):
+    def run_out(problem):
+        if problem.source:
+            raise OutOfTime
+
+    monkeypatch.setattr(Toy, "happens", staticmethod(run_out))
+    assert main([*TOY, "toy-2", "-o", "r.nc", "--time-limit", "1000", "--json"]) == 1
+    out, _ = capsys.readouterr()
+    record = json.loads(out)
+    assert not record["complete"]
+    assert record["files"] == {"toy": "r-toy.nc", "structure": "r-structure.nc"}
+    assert [one["values"] for one in record["findings"] if one["code"] == "stopped"] == [
+        {"stage": "Toy", "reason": "time limit"}
+    ]
+
+
+# The other commands
 
 
 def test_equations(capsys):
@@ -111,14 +368,25 @@ def test_equations(capsys):
 def test_list(capsys):
     assert main(["list"]) == 0
     out = capsys.readouterr().out
-    for name in ("hertz", "linear", "custom", "cubic", "harmonic", "white", "action-plot", "hertz-0.525"):
+    for name in (
+        "hertz",
+        "linear",
+        "custom",
+        "cubic",
+        "harmonic",
+        "white",
+        "action-plot",
+        "hertz-0.525",
+        "first-contact",
+        "least_action",
+    ):
         assert name in out
 
 
 def test_settings_reach_the_parts_of_an_analyzer():
-    given = dict(setting(text) for text in ("graph.cells=48,64", "plot=none", "orbits=2", "source=1"))
+    given = dict(setting(text) for text in ("graph.nodes=48,64", "shooting=none", "orbits=2", "source=clear"))
     made = configured(vk.LeastAction, given)
-    assert made == vk.LeastAction(graph=vk.ActionGraph(cells=(48, 64)), plot=None, orbits=2, source=1)
+    assert made == vk.LeastAction(graph=vk.GraphSearch(nodes=(48, 64)), shooting=None, orbits=2, source="clear")
 
 
 @pytest.mark.parametrize("place", [1, 3])
@@ -134,23 +402,25 @@ def test_the_scene_may_come_after_the_analyzers(place):
     [
         (["run", "herz-0.570"], "hertz-0.570"),
         (["run", "double-well", *PLOT, "--set", "ponts=3"], "points"),
-        (["run", "double-well", *PLOT, "--set", "points"], "FIELD=NUMBER"),
-        (["run", "double-well", *PLOT, "--set", "points=many"], "FIELD=NUMBER"),
-        (["run", "double-well", "--set", "points=300"], "write plot.points"),
+        (["run", "double-well", *PLOT, "--set", "points"], "FIELD=VALUE"),
+        (["run", "double-well", *PLOT, "--set", "points=many"], "points"),
+        (["run", "double-well", "--set", "points=300"], "write shooting.points"),
         (["run", "double-well", "--set", "exits=3"], "the nearest is 'exit'"),
-        (["run", "double-well", "--set", "graph.cell=3"], "the nearest is 'cells'"),
-        (["run", "double-well", "--set", "grph.cells=3,3"], "the nearest is 'graph'"),
-        (["run", "double-well", "--set", "orbits.cells=3"], "no part 'orbits'"),
-        (["run", "double-well", "--set", "graph.cells=3"], "two whole numbers"),
+        (["run", "double-well", "--set", "graph.node=3"], "the nearest is 'nodes'"),
+        (["run", "double-well", "--set", "grph.nodes=3,3"], "the nearest is 'graph'"),
+        (["run", "double-well", "--set", "orbits.nodes=3"], "no part 'orbits'"),
+        (["run", "double-well", "--set", "graph.nodes=3"], "nodes"),
         (["run", "double-well", *PLOT, "--cells", "1"], "--cells"),
         (["run", "double-well", *PLOT, "--stepper", "rk5:3"], "rk4"),
         (["run", "double-well", *PLOT, "--stepper", "rk4:few"], "rk4:few"),
         (["run", "double-well", *PLOT, "--stepper", "order8:7"], "tolerance"),
-        (["run", "double-well", *PLOT, "--exit", "leave-basins"], "the nearest is 'leave-basin'"),
-        (["run", "double-well", *PLOT, "--exit", "leave-basin:left"], "first-contact:left"),
+        (["run", "double-well", *PLOT, "--exit", "leave-basins"], "leave-basin"),
+        (["run", "double-well", *PLOT, "--exit", "leave-basin:left"], "takes 0 arguments"),
         (["run", "double-well", *PLOT, "--exit", "first-contact:top"], "'top'"),
+        (["run", "double-well", *PLOT, "--time-limit", "-1"], "time_limit"),
         (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
         (["plot", "nothing.nc"], "nothing.nc"),
+        (["report", "nothing.nc"], "nothing.nc"),
         (["check", "herz"], "hertz"),
         (["run", "double-well", "-o", "nowhere/r.nc"], "nowhere"),
     ],
@@ -173,13 +443,3 @@ def test_help_is_quick_and_light():
         subprocess.run([sys.executable, "-m", "vibrokit.cli", "--help"], check=True, capture_output=True)
         times.append(time.perf_counter() - began)
     assert min(times) < 0.5
-
-
-def test_interrupting_leaves_nothing_half_written(tmp_path, monkeypatch, capsys):
-    def interrupt(*arguments, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("vibrokit.structure.search.run_ensemble", interrupt)
-    assert main(["run", "double-well", *QUICK, "-o", "r.nc"]) == 130
-    assert not list(Path(tmp_path).iterdir())

@@ -59,8 +59,8 @@ def unexpected_warnings_fail():
 BROKEN = [
     pytest.param("no_such_package:Law", "ModuleNotFoundError: No module named 'no_such_package'", id="missing module"),
     pytest.param("NoSuchClass", "AttributeError", id="missing class"),
-    pytest.param("NOT_A_CLASS", "no subclass of Law", id="instance"),
-    pytest.param("pathlib:Path", "no subclass of Law", id="another kind"),
+    pytest.param("NOT_A_CLASS", "must be a subclass of Law, got <", id="instance"),
+    pytest.param("pathlib:Path", "must be a subclass of Law, got <class 'pathlib", id="another kind"),
 ]
 
 
@@ -88,7 +88,7 @@ def test_broken_plugin_asked_for_by_name(install, value, flaw):
     install(entry("bad", value, "bad-laws"))
     with (
         pytest.warns(UserWarning, match=flaw),
-        pytest.raises(UnknownNameError, match=r"'bad'.*bad-laws.*not load"),
+        pytest.raises(UnknownNameError, match=r"'bad'.*bad-laws.*cannot be loaded"),
     ):
         registry.load(LAWS, "bad", Law)
 
@@ -117,7 +117,7 @@ def test_two_of_one_name_warn_and_say_which_wins(install, soft_from, stiff_from,
         entry("other", "Soft", "other-laws"),
     )
     first, second = (soft_from, stiff_from) if winner is Soft else (stiff_from, soft_from)
-    message = f"'same' is registered by {first} and also by {second}; the one of {first} is used"
+    message = f"'same' is registered by {first} and also by {second}; {first} is used"
     with pytest.warns(UserWarning, match=message):
         assert registry.load(LAWS, "same", Law) is winner
     with pytest.warns(UserWarning, match=message):
@@ -128,8 +128,8 @@ def test_two_of_one_name_warn_and_say_which_wins(install, soft_from, stiff_from,
 def test_a_broken_winner_gives_way(install):
     install(entry("same", "no_such_package:Law", "a-laws"), entry("same", "Stiff", "b-laws"))
     with (
-        pytest.warns(UserWarning, match="the one of a-laws is used"),
-        pytest.warns(UserWarning, match="left out"),
+        pytest.warns(UserWarning, match="a-laws is used"),
+        pytest.warns(UserWarning, match="skipped"),
     ):
         assert registry.load(LAWS, "same", Law) is Stiff
 
@@ -158,11 +158,9 @@ def test_warnings_point_at_the_caller(install, ask):
 
 def test_unknown_name_suggests_the_nearest(install):
     install(entry("soft", "Soft", "soft-laws"), entry("stiff", "Stiff", "stiff-laws"))
-    with pytest.raises(
-        UnknownNameError, match=r"no contact law 'stif'\. Did you mean 'stiff'\? Registered are soft, stiff\."
-    ):
+    with pytest.raises(UnknownNameError, match=r"no contact law 'stif'; the nearest is 'stiff'\."):
         registry.load(LAWS, "stif")
-    with pytest.raises(UnknownNameError, match=r"no contact law 'qqq'\. Registered are soft, stiff\."):
+    with pytest.raises(UnknownNameError, match=r"no contact law 'qqq'; allowed: soft, stiff\."):
         registry.load(LAWS, "qqq")
 
 

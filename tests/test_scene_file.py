@@ -87,7 +87,7 @@ class TestSaving:
     @pytest.mark.parametrize("place", ["missing/scene.toml", "file/scene.toml", ""])
     def test_places_that_cannot_be_written(self, tmp_path, place):
         (tmp_path / "file").write_text("")
-        with pytest.raises(SceneError, match=r"cannot be written \(.*\); give a path in a folder that can be\.$"):
+        with pytest.raises(SceneError, match=r"cannot be written \(.*\); give .*\.$"):
             vk.save_scene(everything(), tmp_path / place)
         assert os.listdir(tmp_path) == ["file"]
 
@@ -99,6 +99,6 @@ class TestSaving:
 
     @pytest.mark.parametrize("thing", [None, "hertz-0.570", {}, vk.Hertz(1.0)])
     def test_what_is_no_scene(self, tmp_path, thing):
-        with pytest.raises(SceneError, match=r"^save_scene: .* is no scene; give an Oscillator\.$"):
+        with pytest.raises(SceneError, match=r"^save_scene: scene must be an Oscillator, got .*\.$"):
             vk.save_scene(thing, tmp_path / "scene.toml")
         assert not os.listdir(tmp_path)

@@ -5,11 +5,19 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.exits import FirstContact
-from vibrokit.analyzers.quasi_potential import local_potential
-from vibrokit.analyzers.shooting.starts import ring_starts
+from vibrokit.analyzers.paths.local_potential import local_potential
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.analyzers.shooting.starts import Ring
 from vibrokit.errors import SceneError, StructureError
+from vibrokit.progress import TRAJECTORIES
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Code
 from vibrokit.structure.orbits import refine_orbit
+
+
+def problem(osc, structure, source=0, exit_=None):
+    return ExitProblem(osc, structure, structure.attractors[source], exit_ or vk.LeaveBasin())
 
 
 def test_clear_state_is_near_what_the_paper_has_and_far_easier_to_leave(paper):
@@ -20,7 +28,12 @@ def test_clear_state_is_near_what_the_paper_has_and_far_easier_to_leave(paper):
     assert 6e-5 < clear.value < 1.1e-4
     assert 5 < hammering.value / clear.value < 40
     assert clear.target == 1
-    assert clear.lower <= clear.value <= clear.upper
+    assert clear.bound is Bound.UPPER
+    assert clear.method == "action plot (ring)"
+    assert clear.lower == 0
+    assert clear.value + clear.numerical_error == clear.upper > clear.value
+    assert not result.failed
+    assert result.complete
 
 
 def test_the_path_pays_its_action_and_starts_on_the_ring(paper):
@@ -40,7 +53,7 @@ def test_starts_lie_on_the_quadratic_quasi_potential(paper):
     osc, structure = paper
     orbit = refine_orbit(osc, structure.attractors[0].points[0], 1, vk.RK4())
     potential = local_potential(osc, orbit, vk.RK4())
-    starts = ring_starts(orbit.point, potential, 1e-3, np.linspace(0, 6, 7))
+    starts, _ = Ring(orbit.point, potential, 1e-3).states(np.linspace(0, 6, 7)[:, None] / 7)
     # Linear regime: Ψ = 2ζω_n³ δx² + 2ζω_n δv² = 0.02 radius² in all directions.
     np.testing.assert_allclose(starts[:, -1], 0.02 * 1e-6, rtol=1e-6)
 
@@ -48,7 +61,8 @@ def test_starts_lie_on_the_quadratic_quasi_potential(paper):
 def test_the_same_bits_on_every_run(paper):
     osc, structure = paper
     first, second = (vk.ActionPlot(points=200, rounds=4, source=0).run(osc, structure) for _ in range(2))
-    np.testing.assert_array_equal(first.data["action_0"], second.data["action_0"])
+    np.testing.assert_array_equal(first.data["action"], second.data["action"])
+    assert [energy.upper for energy in first.energies] == [energy.upper for energy in second.energies]
 
 
 def test_no_noise_is_refused(paper):
@@ -61,7 +75,7 @@ def test_no_noise_is_refused(paper):
 def test_one_attractor_is_refused():
     osc = vk.load_scene("double-well")
     structure = vk.find_structure(osc, region=((0.5, 1.5), (-0.1, 0.1)), starts=(3, 3), cells=(4, 4))
-    with pytest.raises(StructureError, match="one attractor only"):
+    with pytest.raises(StructureError, match="only one attractor"):
         vk.ActionPlot().run(osc, structure)
 
 
@@ -85,7 +99,7 @@ def test_bad_settings(bad):
 
 def test_unknown_source(paper):
     osc, structure = paper
-    with pytest.raises(StructureError, match="no attractor of label 7"):
+    with pytest.raises(StructureError, match="no attractor 7"):
         vk.ActionPlot(source=7).run(osc, structure)
 
 
@@ -95,20 +109,41 @@ def test_the_whole_domain_finds_no_worse_than_the_ring(paper):
     result = vk.ActionPlot(points=3000, source=0).run(osc, structure)
     domain = result.energies[0]
     assert domain.value <= ring.value
-    assert domain.lower <= domain.value <= domain.upper
-    data = result.data
-    for name in ("angle", "radius", "action", "status", "target", "exit_x", "exit_v"):
-        assert data[f"{name}_0"].dims == ("start_0",)
-    assert data["angle_0"].values.min() >= 0
-    assert data["angle_0"].values.max() < 2 * math.pi
-    assert data["radius_0"].values.min() > 0
-    assert data["radius_0"].values.max() < 1
-    assert np.nanmin(data["action_0"].values) <= domain.value
+    assert domain.value + domain.numerical_error == domain.upper
+    data = result.data.sel(source=0)
+    for name in ("angle", "radius", "action", "exit_status", "target", "exit_x", "exit_v"):
+        assert data[name].dims == ("start",)
+        assert data[name].attrs["long_name"]
+    assert {data[name].attrs["units"] for name in ("action", "exit_x", "exit_v")} == {"m2 s-3", "m", "m s-1"}
+    assert 0 <= data["angle"].min() < data["angle"].max() < 2 * math.pi
+    assert 0 < data["radius"].min() < data["radius"].max() < 1
+    assert data["action"].min() <= domain.value
+    assert set(data["exit_status"].values) <= set(data["exit_status"].attrs["flag_values"])
+    (shots,) = result.found(Code.SHOTS)
+    assert shots.values["paths"] == data.sizes["start"]
+    assert shots.values["escaped"] == np.isfinite(data["action"].values).sum()
+    (refinement,) = result.found(Code.REFINEMENT)
+    assert refinement.values["change"] <= vk.ActionPlot().tolerance
+
+
+def test_all_distinct_paths_are_branches_and_the_best_is_the_energy(paper):
+    osc, structure = paper
+    result = vk.ActionPlot(points=3000, rounds=4, source=0).run(osc, structure)
+    (found,) = result.found(Code.SHOTS)
+    actions = [branch.value for branch in result.branches]
+    assert actions == sorted(actions)
+    assert 1 < len(actions) == found.values["branches"]
+    assert result.branches[0] is result.energies[0]
+    for branch in result.branches:
+        assert branch.path.action[-1] == pytest.approx(branch.value, rel=1e-6)
+        assert branch.lower == 0
+        assert branch.upper >= branch.value
+    assert all(math.isnan(branch.numerical_error) for branch in result.branches[1:])
 
 
 def test_candidates_are_ranked_paths_on_the_grid_of_eighths(paper):
     osc, structure = paper
-    found = vk.ActionPlot(points=3000).search(osc, structure, 0)
+    found = Shooting(points=3000).search(problem(osc, structure))
     actions = [candidate.action for candidate in found.candidates]
     assert actions == sorted(actions)
     assert len(actions) > 1
@@ -123,34 +158,104 @@ def test_candidates_are_ranked_paths_on_the_grid_of_eighths(paper):
         assert np.linalg.norm(settled[0] - structure.attractors[1].points[0]) < 1e-3  # beyond the boundary
 
 
-def test_progress_grows_to_its_end(paper):
+def test_progress_counts_paths(paper):
     osc, structure = paper
     seen = []
-    vk.ActionPlot(points=300, rounds=3).run(osc, structure, progress=lambda done, total: seen.append(done / total))
-    assert seen == sorted(seen)
-    assert seen[-1] == 1
+    vk.ActionPlot(points=300, rounds=3, source=0).run(osc, structure, progress=seen.append)
+    shooting = [update for update in seen if update.stage == "action plot"]
+    counts = [update.done for update in shooting]
+    assert counts == sorted(counts)
+    assert counts[-1] >= 300
+    assert {update.unit for update in shooting} == {TRAJECTORIES}
+    assert {update.subject for update in shooting} == {"clear"}
+    assert {update.total for update in shooting} == {None}  # refinement ends when the actions no longer change
 
 
-def test_an_interrupt_ends_it_and_leaves_it_usable(paper):
+def test_progress_of_the_ring_knows_its_end(paper):
     osc, structure = paper
+    seen = []
+    vk.ActionPlot(radius=1e-6, points=300, source=0).run(osc, structure, progress=seen.append)
+    assert {update.total for update in seen if update.stage == "action plot"} == {300}
 
-    def interrupt(done, total):
-        raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        vk.ActionPlot(points=300).run(osc, structure, progress=interrupt)
+class Interrupt:
+    """A listener that interrupts the work when some stage has counted so many."""
+
+    def __init__(self, stage, count):
+        self.stage, self.count = stage, count
+
+    def __call__(self, update):
+        if update.stage == self.stage and update.done >= self.count and not update.finished:
+            self.count = math.inf
+            raise KeyboardInterrupt
+
+
+def test_an_interrupt_of_the_first_grid_leaves_nothing(paper):
+    osc, structure = paper
+    result = vk.ActionPlot(points=300).run(osc, structure, progress=Interrupt("action plot", 1))
+    assert result.energies == ()
+    assert not result.complete
+    assert result.found(Code.STOPPED)
     assert vk.ActionPlot(points=300, rounds=0, source=0).run(osc, structure).energies
 
 
+def test_an_interrupt_of_the_refinement_keeps_the_rounds_before(paper):
+    osc, structure = paper
+    result = vk.ActionPlot(points=1000, source=0).run(osc, structure, progress=Interrupt("action plot", 3000))
+    (stopped,) = result.found(Code.STOPPED)
+    assert stopped.values == {"stage": "action plot", "reason": "interrupt"}
+    assert not result.complete
+    (energy,) = result.energies
+    (shots,) = result.found(Code.SHOTS)
+    assert 1000 <= shots.values["paths"] <= 3000
+    assert math.isnan(energy.numerical_error)  # the error would take another integration
+    assert energy.upper == energy.value
+
+
+def test_an_interrupt_of_the_errors_keeps_the_paths(paper):
+    osc, structure = paper
+    listener = Interrupt("errors of the action plot", 1)
+    result = vk.ActionPlot(points=300, rounds=3, source=0).run(osc, structure, progress=listener)
+    whole = vk.ActionPlot(points=300, rounds=3, source=0).run(osc, structure)
+    assert [energy.value for energy in result.energies] == [energy.value for energy in whole.energies]
+    assert result.found(Code.STOPPED)
+    assert not result.complete
+
+
+def test_the_time_limit_is_named(paper):
+    osc, structure = paper
+    result = vk.ActionPlot().run(osc, structure, time_limit=0.5)
+    assert {finding.values["reason"] for finding in result.found(Code.STOPPED)} == {"time limit"}
+    assert not result.complete
+
+
 @pytest.mark.parametrize("kind", ["chaotic", "quasiperiodic", "limit cycle"])
-def test_motion_without_an_orbit_to_start_from_is_left_out_with_the_reason(paper, kind):
+def test_motion_without_an_orbit_to_start_from_is_a_finding(paper, kind):
     osc, structure = paper
     strange = dataclasses.replace(structure.attractors[1], kind=kind)
     changed = dataclasses.replace(structure, attractors=(structure.attractors[0], strange))
     result = vk.ActionPlot(points=300, rounds=0).run(osc, changed)
-    assert f"Attractor 1 was left out: it is {kind}" in result.status
+    (failed,) = result.found(Code.SOURCE_FAILED)
+    assert failed.source == 1
+    assert kind in failed.values["reason"]
+    assert [energy.source for energy in result.energies] == [0]
     with pytest.raises(StructureError, match=kind):
-        vk.ActionPlot().search(osc, changed, 1)
+        Shooting().search(problem(osc, changed, 1))
+
+
+def test_too_few_rounds_are_a_finding(paper):
+    osc, structure = paper
+    result = vk.ActionPlot(points=300, rounds=1, source=0).run(osc, structure)
+    assert result.found(Code.REFINEMENT_TOO_SHORT)
+    assert not result.found(Code.REFINEMENT)
+
+
+def test_no_exit_is_a_finding(paper):
+    osc, structure = paper
+    result = vk.ActionPlot(points=300, source=0, budget=1).run(osc, structure)
+    assert result.energies == ()
+    assert result.found(Code.NO_EXIT_FOUND)
+    assert result.failed
 
 
 def linear_scene(damping=0.05, amplitude=0.3, frequency=0.57, stop=1.0):
@@ -169,17 +274,21 @@ def test_first_contact_of_the_linear_scene():
     osc = linear_scene()
     structure = vk.find_structure(osc, cells=(20, 20), starts=(4, 4), saddles=False, manifolds=False)
     clear = next(a for a in structure.attractors if a.impacts == 0)
-    energy = vk.ActionPlot(points=2000, source=clear.label, exit=FirstContact()).run(osc, structure).energies[0]
+    energy = vk.ActionPlot(points=2000, source=clear.label, exit=vk.FirstContact()).run(osc, structure).energies[0]
     largest = 0.3 / math.hypot(1 - 0.57**2, 2 * 0.05 * 0.57)
     exact = 2 * 0.05 * (1.0 - largest) ** 2
-    # A look falls within T/64 of the touch, where the mass is at most ½ x (2π/64 · 1/0.57)² short of the stop.
+    # A test falls within T/64 of the touch, where the mass is at most ½ x (2π/64 · 1/0.57)² short of the stop.
     short = 0.5 * (2 * math.pi / 64 / 0.57) ** 2
     assert exact * (1 - 1e-3) <= energy.value <= exact * ((1 - largest + short) / (1 - largest)) ** 2
-    assert energy.lower <= exact
+    assert energy.target == -1
+    assert energy.value - energy.numerical_error <= exact <= energy.upper
 
 
-def test_a_state_that_touches_by_itself_is_left_out(paper):
+def test_a_state_that_touches_without_noise_has_energy_zero(paper):
     osc, structure = paper
-    result = vk.ActionPlot(points=300, rounds=0, exit=FirstContact("right")).run(osc, structure)
-    assert "Attractor 1 was left out: it counts as out by itself" in result.status
-    assert [energy.source for energy in result.energies] == [0]
+    result = vk.ActionPlot(points=300, rounds=0, exit=vk.FirstContact("right")).run(osc, structure)
+    (finding,) = result.found(Code.AT_EXIT)
+    assert finding.source == 1
+    assert [energy.source for energy in result.energies] == [0, 1]
+    assert result.energy(1).value == result.energy(1).upper == 0
+    assert result.data["source"].values.tolist() == [0]

@@ -1,56 +1,95 @@
-"""What is said, and what bounds are kept, when a polished path and the graph price one exit."""
+"""Bounds and findings where a polished path and the graph give the energy of one exit."""
 
+import math
 from types import SimpleNamespace
 
 import pytest
 
-from vibrokit.analyzers.agreement import agreed
-from vibrokit.results.energy import ActivationEnergy
+from vibrokit.analyzers.agreement import combined
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code
 
 ORBIT = SimpleNamespace(label=0, is_fixed=True)
 CHAOS = SimpleNamespace(label=0, is_fixed=False)
+ERROR = 1e-9
 
 
-def path(value, error=1e-9):
-    return ActivationEnergy(0, 1, value, value - error, value + error, "least action", 1e-12)
+def path(value, target=1):
+    return ActivationEnergy(0, target, value, 0.0, value + ERROR, "least action", Bound.UPPER, ERROR, residual=1e-12)
 
 
-def graph(value, error):
-    return ActivationEnergy(0, 1, value, max(0.0, value - error), value + error, "graph", float("nan"))
+def graph(value, error, target=1):
+    return ActivationEnergy(
+        0, target, value, max(0.0, value - error), value + error, "graph", Bound.ESTIMATE, numerical_error=error
+    )  # fmt: skip
+
+
+def only(attractor, paths, estimates):
+    (energy,), (finding,) = combined(attractor, paths, estimates)
+    return energy, finding
 
 
 @pytest.mark.parametrize(
-    ("polished", "screened", "words"),
+    ("estimate", "code", "lower"),
     [
-        (1.0, (1.01, 0.02), "they agree"),
-        (1.0, (1.2, 0.05), "its grid is too coarse here."),
-        (1.0, (1.0, 0.8), "too coarse here to say more of the 1 of the path polished"),
-        (1.0, (0.5, 0.1), "there is a cheaper way out that was not polished"),
+        ((1.01, 0.02), Code.AGREEMENT, 0.99),
+        ((1.01, 0.01 + 1e-9), Code.AGREEMENT, 1.0 - ERROR),
+        ((0.95, 0.1), Code.AGREEMENT, 0.85),
+        ((1.0, 0.8), Code.GRAPH_TOO_COARSE, 0.2),
+        ((1.3, 1.5), Code.GRAPH_TOO_COARSE, 0.0),
+        ((1.2, 0.05), Code.GRAPH_TOO_COARSE, 0.8),
+        ((0.9, 0.01), Code.CHEAPER_PATH_EXPECTED, 0.8),
+        ((0.3, 0.1), Code.CHEAPER_PATH_EXPECTED, 0.0),
     ],
+    ids=str,
 )
-def test_an_orbit_s_energy_is_the_path_s(polished, screened, words):
-    (energy,), (said,) = agreed(ORBIT, {1: path(polished)}, {1: graph(*screened)})
-    assert words in said
-    assert (energy.value, energy.method) == (polished, "least action")
-    assert energy.lower == (0.4 if "cheaper" in words else pytest.approx(polished))
+def test_the_lower_bound_is_what_the_graph_supports(estimate, code, lower):
+    """Where the graph is further off than its error, the difference stands for that."""
+    energy, finding = only(ORBIT, (path(1.0),), (graph(*estimate),))
+    assert finding.code is code
+    assert (finding.source, finding.target) == (0, 1)
+    assert finding.values == {"graph": estimate[0], "error": estimate[1], "path": 1.0}
+    assert (energy.value, energy.method, energy.residual) == (1.0, "least action", 1e-12)
+    assert energy.lower == pytest.approx(lower, abs=1e-12)
+    assert energy.upper == 1.0 + ERROR
+    assert energy.bound is (Bound.CERTIFIED if code is Code.AGREEMENT else Bound.UPPER)
 
 
-def test_a_set_s_energy_is_a_bracket():
-    (energy,), (said,) = agreed(CHAOS, {1: path(1.0)}, {1: graph(0.9, 0.2)})
-    assert "a bracket" in said
-    assert energy.method == "least action (bracket)"
+def test_the_cheapest_path_of_each_target_counts():
+    energies, findings = combined(
+        ORBIT, (path(1.0), path(1.5), path(2.0, target=-1)), (graph(2.1, 0.2, -1), graph(1.0, 0.1))
+    )  # fmt: skip
+    assert [(energy.target, energy.value) for energy in energies] == [(1, 1.0), (-1, 2.0)]
+    assert [finding.target for finding in findings] == [1, -1]
+
+
+def test_the_energy_of_a_set_is_a_bracket():
+    energy, finding = only(CHAOS, (path(1.0),), (graph(0.9, 0.2),))
+    assert finding.code is Code.BRACKET
+    assert energy.bound is Bound.BRACKET
     assert energy.value == 0.9
-    assert energy.lower == pytest.approx(0.7)
-    assert energy.upper == pytest.approx(1.0)
+    assert (energy.lower, energy.upper) == pytest.approx((0.7, 1.0))
 
 
-def test_without_a_path_the_graph_s_is_all_there_is():
-    (energy,), (said,) = agreed(ORBIT, {}, {1: graph(0.9, 0.2)})
-    assert energy.method == "graph"
-    assert "no path was polished" in said
+def test_without_a_path_there_is_the_graph_s_estimate():
+    estimate = graph(0.9, 0.2)
+    energy, finding = only(ORBIT, (), (estimate,))
+    assert energy is estimate
+    assert finding.code is Code.NO_POLISHED_PATH
+    assert finding.values == {"graph": 0.9, "error": 0.2}
 
 
-def test_without_a_graph_nothing_is_compared():
-    (energy,), said = agreed(ORBIT, {1: path(1.0)}, {})
-    assert energy.value == 1.0
-    assert said == []
+@pytest.mark.parametrize("attractor", [ORBIT, CHAOS], ids=["orbit", "set"])
+def test_without_a_graph_nothing_excludes_a_cheaper_path(attractor):
+    energy, finding = only(attractor, (path(1.0),), ())
+    assert finding.code is Code.NOT_SEARCHED
+    assert (energy.value, energy.lower, energy.bound) == (1.0, 0.0, Bound.UPPER)
+    assert math.isclose(energy.upper, 1.0, rel_tol=2 * ERROR)
+
+
+def test_every_finding_makes_a_sentence():
+    cases = [((path(1.0),), (graph(1.0, 0.1),)), ((), (graph(1.0, 0.1),)), ((path(1.0),), ())]
+    for attractor in (ORBIT, CHAOS):
+        for paths, estimates in cases:
+            _, finding = only(attractor, paths, estimates)
+            assert finding.sentence(("rest", "clear")).startswith("From rest to clear")

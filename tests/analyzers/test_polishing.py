@@ -1,19 +1,30 @@
-"""Polishing: from poor guesses to extremals, and what becomes of guesses that lead nowhere."""
+"""Polishing: from poor guesses to extremal paths, and what becomes of guesses that lead nowhere."""
+
+import dataclasses
+import functools
 
 import numpy as np
 import pytest
 from scipy.integrate import simpson, solve_ivp
+from scipy.linalg import solve_continuous_lyapunov
 
 import vibrokit as vk
-from vibrokit.analyzers.candidate import Candidate
-from vibrokit.analyzers.polishing.branches import polish_all
-from vibrokit.analyzers.polishing.carrier import Carrier
+from tests.scenes import Coloured
+from vibrokit.analyzers.exits import LeaveRegion
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.course import course_of
-from vibrokit.analyzers.polishing.ends import linear_end
-from vibrokit.analyzers.polishing.heteroclinic import Polisher, solved_again
+from vibrokit.analyzers.polishing.ends import ending_at
+from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
+from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
+from vibrokit.analyzers.polishing.polish import polish
+from vibrokit.analyzers.polishing.resampled import resampled
+from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import single_stepper
+from vibrokit.progress import working
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Code
 from vibrokit.symbolic.flow_kind import Flow
 
 DAMPING = 0.3
@@ -21,18 +32,23 @@ PIECE = 2 * np.pi / 8  # of a candidate; ω_n = 1
 BARRIER = 0.25
 
 
+def problem_of(osc, structure, label=0, leaving=None):
+    return ExitProblem(osc, structure, structure.attractor(label), leaving or vk.LeaveBasin())
+
+
+@functools.cache
 def well(damping):
     osc = vk.load_scene("double-well").replace({"damping_ratio": damping})
-    return osc, vk.find_structure(osc, cells=(40, 40), starts=(8, 8), manifolds=False)
+    return problem_of(osc, vk.find_structure(osc, cells=(40, 40), starts=(8, 8), manifolds=False))
 
 
 @pytest.fixture(scope="module")
-def scene():
+def problem():
     return well(DAMPING)
 
 
 def guess(path, action=0.33):
-    """A candidate along states (count, 2), said to cost a tenth more than the path does at the usual damping."""
+    """A candidate along states (count, 2), with an action a tenth above that of the path at the usual damping."""
     states = np.asarray(path, dtype=float)
     return Candidate(0, 1, PIECE * np.arange(len(states)), states, action, "guess")
 
@@ -62,8 +78,8 @@ GUESSES = {"straight": straight(), "few nodes": straight(4), "spiral": spiral(),
 
 
 @pytest.mark.parametrize("path", GUESSES.values(), ids=GUESSES)
-def test_poor_guesses_come_to_the_barrier(scene, path):
-    branch = only(polish_all(*scene, 0, (guess(path),), vk.LeaveBasin()))
+def test_poor_guesses_lead_to_the_barrier(problem, path):
+    branch = only(polish(problem, (guess(path),)))
     assert branch.value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
     assert branch.residual <= 1e-9
     assert (branch.source, branch.target, branch.saddle) == (0, 1, 0)
@@ -71,25 +87,30 @@ def test_poor_guesses_come_to_the_barrier(scene, path):
 
 @pytest.mark.parametrize("damping", [0.05, 1.0])
 def test_whatever_the_damping(damping):
-    branch = only(polish_all(*well(damping), 0, (guess(straight()),), vk.LeaveBasin()))
+    branch = only(polish(well(damping), (guess(straight()),)))
     assert branch.value == pytest.approx(4 * damping * BARRIER, rel=1e-6)
 
 
-def test_two_guesses_of_one_path_are_one_branch(scene):
-    both = polish_all(*scene, 0, (guess(straight()), guess(spiral())), vk.LeaveBasin())
+def test_a_branch_bounds_the_energy_from_above_only(problem):
+    branch = only(polish(problem, (guess(straight()),)))
+    assert branch.bound is Bound.UPPER
+    assert branch.lower == 0
+    assert branch.upper == branch.value + branch.numerical_error
+    assert abs(branch.value - 4 * DAMPING * BARRIER) <= branch.numerical_error < 1e-6 * branch.value
+
+
+def test_two_guesses_of_one_path_are_one_branch(problem):
+    both = polish(problem, (guess(straight()), guess(spiral())))
     assert len(both.branches) == 1
-    assert both.words == ()
+    assert both.findings == ()
 
 
-def test_a_guess_far_dearer_than_a_known_path_is_left_out_and_counted(scene):
-    seen = []
-    candidates = (guess(spiral(), 1.0), guess(straight()))
-    found = polish_all(*scene, 0, candidates, vk.LeaveBasin(), None, lambda *part: seen.append(part))
+def test_a_guess_far_costlier_than_a_known_path_is_skipped_and_counted(problem):
+    found = polish(problem, (guess(spiral(), 1.0), guess(straight())))
     assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
-    assert found.words == (
-        "Attractor 0: 1 of 2 candidates cost over 1.25 times the least path known and were not polished.",
-    )
-    assert seen == [(1, 2), (2, 2)]
+    (finding,) = found.findings
+    assert finding.code is Code.CANDIDATES_SKIPPED
+    assert finding.values == {"skipped": 1, "total": 2, "factor": 1.25}
 
 
 NOWHERE = {
@@ -101,41 +122,89 @@ NOWHERE = {
 
 
 @pytest.mark.parametrize("path", NOWHERE.values(), ids=NOWHERE)
-def test_a_guess_that_leads_nowhere_yields_words_or_the_truth(scene, path):
-    """There is one way out only: a number can be that of the barrier, and none other."""
-    found = polish_all(*scene, 0, (guess(path, 0.123),), vk.LeaveBasin())
+def test_a_guess_that_leads_nowhere_yields_a_finding_or_the_truth(problem, path):
+    """There is only one exit path: a number can be that of the barrier, and no other."""
+    found = polish(problem, (guess(path, 0.123),))
     if found.branches:
         assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
     else:
-        (words,) = found.words
-        assert words.startswith("A candidate of the guess with action 0.123 led to no path: ")
-        assert words.endswith(".")
+        (finding,) = found.findings
+        assert finding.code is Code.CANDIDATE_FAILED
+        assert (finding.values["finder"], finding.values["action"]) == ("guess", 0.123)
+        assert str(finding).endswith(".")
 
 
 @pytest.mark.parametrize("path", [NOWHERE["one state"], NOWHERE["not finite"]], ids=["one state", "not finite"])
-def test_no_number_comes_of_no_path(scene, path):
-    found = polish_all(*scene, 0, (guess(path),), vk.LeaveBasin())
+def test_no_number_without_a_path(problem, path):
+    found = polish(problem, (guess(path),))
     assert found.branches == ()
-    assert len(found.words) == 1
+    assert len(found.findings) == 1
 
 
-def test_no_candidate_no_word(scene):
-    found = polish_all(*scene, 0, (), vk.LeaveBasin())
-    assert (found.branches, found.words) == ((), ())
+def test_without_candidates_nothing_is_found(problem):
+    found = polish(problem, ())
+    assert (found.branches, found.findings) == ((), ())
 
 
-def test_progress_counts_candidates(scene):
-    seen, candidates = [], (guess(straight()), guess(NOWHERE["one state"]))
-    polish_all(*scene, 0, candidates, vk.LeaveBasin(), None, lambda *part: seen.append(part))
-    assert seen == [(1, 2), (2, 2)]
+def test_candidates_and_newton_iterations_are_counted(problem):
+    seen = []
+    candidates = (guess(straight()), guess(NOWHERE["one state"]))
+    with working(lambda update: seen.append((update.stage, update.unit, update.done, update.total))) as work:
+        polish(problem, candidates)
+    assert ("polishing", "candidates", 2, 2) in seen
+    assert seen[-1] == ("certifying", "paths", 1, 1)
+    assert work.stats.newton_iterations > 10
+
+
+@pytest.mark.parametrize(("doing", "kept"), [("polishing", 1), ("certifying", 0)])
+def test_what_was_found_before_a_stop_is_kept(problem, doing, kept):
+    def interrupt(update):
+        if update.stage == doing and update.done == 0 + kept and not update.finished:
+            raise KeyboardInterrupt
+
+    with working(interrupt):
+        found = polish(problem, (guess(straight()), guess(spiral(), 0.5)))
+    assert len(found.branches) == kept
+    (finding,) = (finding for finding in found.findings if finding.code is Code.STOPPED)
+    assert finding.values == {"stage": doing, "reason": "interrupt"}
+
+
+# --- ends that cannot be used
+
+
+def with_saddles(problem, **changes):
+    saddles = tuple(dataclasses.replace(saddle, **changes) for saddle in problem.structure.saddles)
+    return dataclasses.replace(problem, structure=dataclasses.replace(problem.structure, saddles=saddles))
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"kind": "chaotic"}, "chaotic"),
+        ({"duration": 1.0, "multipliers": np.array([2.0, 1.0])}, "a limit cycle"),
+    ],
+    ids=["chaotic", "limit cycle"],
+)
+def test_no_path_is_polished_to_what_is_not_a_hyperbolic_orbit(problem, changes, kind):
+    found = polish(with_saddles(problem, **changes), (guess(straight()),))
+    assert found.branches == ()
+    assert [finding.code for finding in found.findings] == [Code.SADDLE_NOT_USABLE, Code.CANDIDATE_FAILED]
+    assert found.findings[0].values == {"saddle": 0, "kind": kind}
+
+
+def test_saddles_of_others_are_used_where_there_is_no_own_one(problem):
+    found = polish(with_saddles(problem, leads_to=(1, 2)), (guess(straight()),))
+    assert [finding.code for finding in found.findings] == [Code.SADDLES_OF_OTHERS]
+    assert [branch.target for branch in found.branches] == [1, 2]
+    assert [branch.value for branch in found.branches] == pytest.approx([4 * DAMPING * BARRIER] * 2, rel=1e-6)
 
 
 # --- the path itself
 
 
 @pytest.fixture(scope="module")
-def path(scene):
-    return only(polish_all(*scene, 0, (guess(straight()),), vk.LeaveBasin())).path
+def path(problem):
+    return only(polish(problem, (guess(straight()),))).path
 
 
 def rates(t, z):
@@ -185,35 +254,121 @@ def test_the_action_is_what_the_noise_pays(path):
     assert path.action[-1] == pytest.approx(4 * DAMPING * BARRIER, rel=1e-5)
 
 
-# --- paths that begin on the orbit itself, in a finite time
+# --- paths that start on the orbit itself and take a finite time
 
 
 @pytest.fixture(scope="module")
-def held(scene):
-    osc, structure = scene
-    (goal,), _ = vk.LeaveBasin().goals(osc, structure, 0)
-    carrier = Carrier(goal.scene(osc), single_stepper(osc, Flow.HAMILTONIAN_VARIATIONAL))
-    source = linear_end(carrier, structure.attractor(0).points[0], 1).on_orbit()
-    cuts = goal.destination(carrier).cuts(course_of(carrier, guess(straight()), 32))
-    return carrier, Polisher(carrier, source).polished(cuts)
+def from_orbit(problem):
+    propagator = SegmentPropagator(problem.scene, single_stepper(problem.scene, Flow.HAMILTONIAN_VARIATIONAL))
+    source = linearized_orbit(propagator, problem.attractor.points[0], 1).with_start_on_orbit()
+    (end,) = problem.path_ends
+    cuts = ending_at(end, problem, propagator).cuts(resampled(propagator, guess(straight())))
+    return propagator, PathSolver(propagator, source).solve(cuts)
 
 
-def test_less_time_costs_more(held):
-    carrier, found = held
+def test_less_time_costs_more(from_orbit):
+    propagator, found = from_orbit
     exact = 4 * DAMPING * BARRIER
     assert found.points[0, :2] == pytest.approx([-1.0, 0.0], abs=1e-12)
-    costs = [solved_again(carrier, found, added, 0).action for added in (-16, -8, 0, 16, 32)]
+    costs = [solved_again(propagator, found, added, 0).action for added in (-16, -8, 0, 16, 32)]
     assert np.all(np.diff(costs) < 0)
     assert exact < costs[-1] < (1 + 1e-4) * exact
 
 
-def test_its_certificate_says_what_time_costs(held):
-    proof = certify(*held)
+def test_its_certificate_has_the_cost_of_time(from_orbit):
+    proof = certify(*from_orbit)
     assert proof.by_start > 0 > proof.by_length
     assert abs(proof.by_stepper) < 1e-9
 
 
-def test_none_is_made_shorter_than_it_is(held):
-    carrier, found = held
+def test_no_path_is_made_shorter_than_it_is(from_orbit):
+    propagator, found = from_orbit
     with pytest.raises(StructureError, match="cannot be made"):
-        solved_again(carrier, found, -len(found.points), 0)
+        solved_again(propagator, found, -len(found.points), 0)
+
+
+# --- faces of a region: ½ d²/Σ, d the least distance from the attractor and Σ the stationary variance per D
+
+
+class LeaveBox(LeaveRegion):
+    """Leaving a box in (x, v)."""
+
+    x: tuple[float, float] = (-np.inf, np.inf)
+    v: tuple[float, float] = (-np.inf, np.inf)
+
+    def bounds(self, osc):
+        return np.array([self.x, self.v])
+
+
+NATURAL, ZETA, RATE = 1.3, 0.2, 0.6
+FORCED = vk.Harmonic(amplitude=0.3, frequency=0.57)
+
+
+@functools.cache
+def linear(forced, filtered):
+    osc = vk.Oscillator(
+        natural_frequency=NATURAL,
+        damping_ratio=ZETA,
+        barriers=(),
+        excitations=(FORCED,) if forced else (),
+        noise=Coloured(intensity=1e-3, rate=RATE) if filtered else vk.WhiteNoise(1e-3),
+    )
+    return osc, vk.find_structure(osc, cells=(8, 8), starts=(3, 3), saddles=False, manifolds=False)
+
+
+def variances(filtered):
+    flow = np.array([[0, 1, 0], [-(NATURAL**2), -2 * ZETA * NATURAL, 1], [0, 0, -RATE]])
+    noise = np.diag([0, 0, RATE**2]) if filtered else np.diag([0, 1])
+    size = len(noise)
+    return np.diag(solve_continuous_lyapunov(flow[:size, :size], -noise))
+
+
+def swing(forced, times):
+    """The noise-free motion, as (x, v)."""
+    if not forced:
+        return np.zeros((len(times), 2))
+    turning = np.exp(1j * FORCED.frequency * times)
+    answer = FORCED.amplitude / (NATURAL**2 - FORCED.frequency**2 + 2j * ZETA * NATURAL * FORCED.frequency)
+    return np.stack([(answer * turning).real, (1j * FORCED.frequency * answer * turning).real], axis=1)
+
+
+def spiralling(forced, filtered, period, reach, turns=4):
+    """A candidate that leaves the orbit in growing turns, until it is far beyond every face."""
+    times = period / 16 * np.arange(16 * turns + 1)
+    size = reach * np.exp(0.4 * (times - times[-1]))
+    away = np.stack([size * np.cos(NATURAL * times), -size * np.sin(NATURAL * times)], axis=1)
+    states = np.hstack([swing(forced, times) + away, np.zeros((len(times), int(filtered)))])
+    return Candidate(0, -1, times, states, 1.0, "guess")
+
+
+FACES = {"right": ("x", 0, 1), "left": ("x", 0, -1), "up": ("v", 1, 1), "down": ("v", 1, -1)}
+
+
+@pytest.mark.parametrize("filtered", [False, True], ids=["white", "filtered"])
+@pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
+@pytest.mark.parametrize("face", FACES.values(), ids=FACES)
+def test_the_least_action_to_a_face(face, forced, filtered):
+    name, axis, sign = face
+    osc, structure = linear(forced, filtered)
+    leaving = LeaveBox(**{name: (-np.inf, 1.0) if sign > 0 else (-1.0, np.inf)})
+    candidate = spiralling(forced, filtered, osc.section_interval, 3.0)
+    found = polish(problem_of(osc, structure, 0, leaving), (candidate,))
+    branch = only(found)
+    farthest = np.max(sign * swing(forced, np.linspace(0, 2 * np.pi / FORCED.frequency, 100_001))[:, axis])
+    exact = 0.5 * (1.0 - farthest) ** 2 / variances(filtered)[axis]
+    assert branch.value == pytest.approx(exact, rel=1e-8)
+    assert (branch.target, branch.saddle) == (-1, -1)
+    assert branch.residual <= 1e-9
+    end, momenta = branch.path.q[-1], branch.path.p[-1]
+    assert end[axis] == pytest.approx(sign, abs=1e-9)
+    assert np.abs(np.delete(momenta, axis)).max() < 1e-7 * np.abs(branch.path.p).max()
+    assert np.all(sign * branch.path.q[:-1, axis] < 1.0)
+
+
+def test_a_path_that_leaves_by_another_face_first_is_refused():
+    """From an attractor next to one face, the path to the far one swings through the near one."""
+    osc, structure = linear(False, False)
+    candidate = spiralling(False, False, osc.section_interval, 3.0)
+    found = polish(problem_of(osc, structure, 0, LeaveBox(x=(-0.1, 1.0))), (candidate,))
+    assert only(found).value == pytest.approx(0.5 * 0.1**2 / variances(False)[0], rel=1e-8)
+    assert only(found).path.q[-1, 0] == pytest.approx(-0.1)

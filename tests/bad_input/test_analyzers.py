@@ -1,24 +1,28 @@
-"""What analyzers of least action say of scenes, structures and settings that they cannot work with."""
+"""Scenes, structures and settings that analyzers of least action refuse."""
 
 import dataclasses
 import subprocess
 import sys
 import time
 import tracemalloc
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.candidate import Candidate
-from vibrokit.analyzers.polishing.branches import polish_all
+from tests.scenes import Coloured
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.polishing.polish import polish
+from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
+from vibrokit.results.finding import Code
+
+pytestmark = pytest.mark.slow
 
 WELL = vk.load_scene("double-well")
 QUICK = {"cells": (20, 20), "starts": (8, 8), "manifolds": False}
-SMALL_GRAPH, SMALL_PLOT = vk.ActionGraph(cells=(40, 40)), vk.ActionPlot(points=200, rounds=2)
-BOTH = {"graph": SMALL_GRAPH, "plot": SMALL_PLOT}
+SMALL_GRAPH, SMALL_SHOOTING = vk.GraphSearch(nodes=(40, 40)), vk.Shooting(points=200, rounds=2)
+SMALL = {"graph": SMALL_GRAPH, "shooting": SMALL_SHOOTING}
 ANALYZERS = {"graph": vk.ActionGraph, "plot": vk.ActionPlot, "least": vk.LeastAction}
 
 
@@ -32,17 +36,21 @@ def analyzer(request):
     return request.param
 
 
+def problem_of(osc, structure, label=0):
+    return ExitProblem(osc, structure, structure.attractor(label), vk.LeaveBasin())
+
+
 def refused(kind, make, words):
-    """What was said: one line, whole sentences, at once."""
+    """Refused at once, in one line of whole sentences."""
     began = time.perf_counter()
     with pytest.raises(kind, match=words) as error:
         make()
     assert time.perf_counter() - began < 10
-    said = str(error.value)
+    text = str(error.value)
     assert isinstance(error.value, VibrokitError)
-    assert "\n" not in said
-    assert said.endswith(".")
-    assert len(said) < 600
+    assert "\n" not in text
+    assert text.endswith(".")
+    assert len(text) < 600
 
 
 # --- scenes
@@ -53,18 +61,18 @@ def test_a_scene_without_noise(analyzer, structure):
     refused(SceneError, lambda: analyzer().run(quiet, structure), "no noise")
 
 
-def test_one_attractor_only_and_another_basin_asked(analyzer):
+def test_only_one_attractor_and_no_other_basin(analyzer):
     one = vk.find_structure(WELL, region=((0.5, 1.5), (-0.1, 0.1)), starts=(3, 3), cells=(4, 4))
     assert len(one.attractors) == 1
-    refused(StructureError, lambda: analyzer().run(WELL, one), r"one attractor only.*FirstContact\(\)")
+    refused(StructureError, lambda: analyzer().run(WELL, one), r"only one attractor.*FirstContact\(\)")
 
 
 @pytest.mark.parametrize(("side", "words"), [(None, "no stop"), ("left", "no left stop")])
-def test_no_stop_and_its_touch_asked(analyzer, structure, side, words):
+def test_first_contact_without_a_stop(analyzer, structure, side, words):
     refused(StructureError, lambda: analyzer(exit=vk.FirstContact(side)).run(WELL, structure), words)
 
 
-def test_no_stop_on_that_side(analyzer):
+def test_first_contact_without_a_stop_on_that_side(analyzer):
     osc = vk.Oscillator(
         natural_frequency=1.0,
         damping_ratio=0.1,
@@ -76,8 +84,8 @@ def test_no_stop_on_that_side(analyzer):
 
 
 @pytest.mark.parametrize("side", ["up", 1, [], True])
-def test_sides_that_are_none(side):
-    refused(StructureError, lambda: vk.FirstContact(side), "side is")
+def test_unknown_sides(side):
+    refused(StructureError, lambda: vk.FirstContact(side), "side must be")
 
 
 @pytest.fixture(scope="module")
@@ -90,52 +98,48 @@ def centres(structure):
 
 def test_paths_are_not_polished_from_a_centre(centres):
     nowhere = Candidate(0, 1, np.array([0.0, 1.0]), np.array([[-1.0, 0.0], [0.1, 0.0]]), 1.0, "test")
-    polished = polish_all(*centres, 0, (nowhere,), vk.LeaveBasin())
-    assert polished.branches == ()
-    assert "not hyperbolic" in polished.words[0]
+    refused(StructureError, lambda: polish(problem_of(*centres), (nowhere,)), "not hyperbolic")
 
 
 def test_no_path_is_shot_from_a_centre(centres):
-    refused(StructureError, lambda: SMALL_PLOT.search(*centres, 0), "multiplier")
-    result = SMALL_PLOT.run(*centres)
+    refused(StructureError, lambda: SMALL_SHOOTING.search(problem_of(*centres)), "multiplier")
+    result = vk.ActionPlot(points=200, rounds=2).run(*centres)
     assert result.energies == ()
-    assert all(f"Attractor {label} was left out: " in result.status for label in (0, 1))
+    assert [finding.source for finding in result.found(Code.SOURCE_FAILED)] == [0, 1]
 
 
 def test_no_graph_grows_from_a_centre(centres):
-    refused(StructureError, lambda: SMALL_GRAPH.search(*centres, 0), "multiplier")
+    refused(StructureError, lambda: SMALL_GRAPH.search(problem_of(*centres)), "multiplier")
 
 
-class Slow(vk.NoiseModel):
-    """Noise through a low pass."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("r", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return self.rate
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y,)
+def test_least_action_names_each_method_that_fails(centres):
+    result = vk.LeastAction(source=0, **SMALL).run(*centres)
+    assert result.energies == ()
+    failed = result.found(Code.METHOD_FAILED)
+    assert [finding.values["method"] for finding in failed] == ["graph search", "action plot", "polishing"]
+    assert all("multiplier" in finding.values["reason"] for finding in failed)
+    assert [finding.source for finding in result.found(Code.NO_EXIT_FOUND)] == [0]
+    alone = vk.LeastAction(source=0, graph=None, shooting=SMALL_SHOOTING).run(*centres)
+    assert [finding.code for finding in alone.findings] == [Code.SOURCE_FAILED]
 
 
-SLOW = dataclasses.replace(WELL, noise=Slow(intensity=0.01, rate=0.3))
+SLOW = dataclasses.replace(WELL, noise=Coloured(intensity=0.01, rate=0.3))
 
 
-def test_noise_with_states_of_its_own():
-    """The graph covers x and v only, and says what to take instead; LeastAction does without it, and says so."""
+def test_noise_with_its_own_states():
+    """The graph covers x and v only, and names an alternative; LeastAction goes on without it, with a finding."""
     structure = vk.find_structure(SLOW, **QUICK)
-    refused(SceneError, lambda: SMALL_GRAPH.run(SLOW, structure), "of its own.*take ActionPlot")
-    refused(SceneError, lambda: vk.LeastAction(plot=None, graph=SMALL_GRAPH).run(SLOW, structure), "take ActionPlot")
-    result = vk.LeastAction(source=0, **BOTH).run(SLOW, structure)
-    assert "without a graph: the noise has" in result.status
+    alone = vk.LeastAction(shooting=None, graph=SMALL_GRAPH)
+    refused(SceneError, lambda: SMALL_GRAPH.search(problem_of(SLOW, structure)), "of its own.*ActionPlot")
+    refused(SceneError, lambda: alone.run(SLOW, structure), "ActionPlot")
+    result = vk.LeastAction(source=0, **SMALL).run(SLOW, structure)
+    (failed,) = result.found(Code.METHOD_FAILED)
+    assert failed.values["method"] == "graph search"
+    assert "the noise has" in failed.values["reason"]
+    assert [finding.code for finding in result.findings if finding.code is Code.NOT_SEARCHED] or not result.energies
 
 
-TOLD = """
+APART = """
 from tests.bad_input import test_analyzers as here
 structure = here.vk.find_structure(here.WELL, **here.QUICK)
 try:
@@ -147,8 +151,8 @@ except here.VibrokitError as error:
 
 @pytest.mark.parametrize("name", ANALYZERS)
 def test_a_structure_without_the_states_that_the_noise_has(name):
-    """Noise may differ, but not in what states are made of. Elsewhere, for kernels given short states end a process."""
-    done = subprocess.run([sys.executable, "-c", TOLD.format(name=name)], capture_output=True, text=True, check=False)
+    """Noise may differ, but not the size of a state. A kernel given short states ends its process, so this is apart."""
+    done = subprocess.run([sys.executable, "-c", APART.format(name=name)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-500:]
     assert "state" in done.stdout
     assert done.stdout.endswith(".\n")
@@ -157,15 +161,9 @@ def test_a_structure_without_the_states_that_the_noise_has(name):
 # --- structures
 
 
-def test_an_unknown_attractor(analyzer, structure):
-    refused(StructureError, lambda: analyzer(source=7).run(WELL, structure), "no attractor of label 7")
-    for search in (vk.ActionGraph().search, vk.ActionPlot().search):
-        refused(StructureError, lambda search=search: search(WELL, structure, 7), "no attractor of label 7")
-
-
-@pytest.mark.parametrize("source", ["0", 0.5, True, [0], np.nan], ids=repr)
-def test_labels_that_are_no_numbers(analyzer, structure, source):
-    refused(VibrokitError, lambda: analyzer(source=source).run(WELL, structure), "label|source")
+@pytest.mark.parametrize("source", [7, -1, "up", "", 0.5, True, [0], np.nan], ids=repr)
+def test_unknown_attractors(analyzer, structure, source):
+    refused(StructureError, lambda: analyzer(source=source).run(WELL, structure), "there is no attractor")
 
 
 def test_a_structure_of_another_scene(analyzer, structure):
@@ -174,45 +172,54 @@ def test_a_structure_of_another_scene(analyzer, structure):
 
 
 @pytest.mark.parametrize("given", [None, "double-well", 3, WELL], ids=lambda given: type(given).__name__)
-def test_what_is_no_structure(analyzer, given):
-    refused(StructureError, lambda: analyzer().run(WELL, given), "which is none")
+def test_what_is_not_a_structure(analyzer, given):
+    refused(StructureError, lambda: analyzer().run(WELL, given), "structure")
 
 
 @pytest.mark.parametrize("given", [None, "double-well", 3], ids=repr)
-def test_what_is_no_scene(analyzer, structure, given):
-    refused(SceneError, lambda: analyzer().run(given, structure), "oscillator")
+def test_what_is_not_a_scene(analyzer, structure, given):
+    refused(SceneError, lambda: analyzer().run(given, structure), "[Oo]scillator")
 
 
 # --- settings
 
 
 @pytest.mark.parametrize("given", ["x", None, 3, vk.LeaveBasin, vk.WhiteNoise(1.0)], ids=str)
-def test_what_is_no_exit(analyzer, structure, given):
-    refused(StructureError, lambda: analyzer(exit=given).run(WELL, structure), r"exit is .*LeaveBasin\(\) or FirstCo")
+def test_what_is_not_an_exit(analyzer, structure, given):
+    refused(StructureError, lambda: analyzer(exit=given).run(WELL, structure), r"exit must be an Exit.*LeaveBasin\(\)")
 
 
 @pytest.mark.parametrize("given", ["rk4", 3, vk.RK4], ids=str)
-def test_what_is_no_stepper(analyzer, structure, given):
-    refused(StepperError, lambda: analyzer(stepper=given).run(WELL, structure), "stepper")
+def test_what_is_not_a_stepper(analyzer, structure, given):
+    refused(StepperError, lambda: analyzer(stepper=given).run(WELL, structure), "stepper must be a Stepper")
 
 
-def test_what_is_no_progress(analyzer, structure):
-    refused(StructureError, lambda: analyzer().run(WELL, structure, progress=3), "progress")
+def test_what_is_not_a_listener(analyzer, structure):
+    refused(StructureError, lambda: analyzer().run(WELL, structure, progress=3), "progress must be")
 
 
-@pytest.mark.parametrize("name", ["graph", "plot"])
-@pytest.mark.parametrize("given", [3, "none", True, vk.LeaveBasin(), vk.ActionGraph, vk.ActionPlot], ids=str)
-def test_what_is_no_search(name, given):
-    refused(StructureError, lambda: vk.LeastAction(**{name: given}), f"{name} is .*None to do without")
+@pytest.mark.parametrize("limit", [0, -1.0, "1", np.nan, np.inf, True], ids=repr)
+def test_what_is_not_a_time_limit(analyzer, structure, limit):
+    refused(StructureError, lambda: analyzer().run(WELL, structure, time_limit=limit), "time_limit must be")
 
 
-def test_searches_are_not_taken_for_each_other():
-    refused(StructureError, lambda: vk.LeastAction(plot=vk.ActionGraph()), "plot is")
-    refused(StructureError, lambda: vk.LeastAction(graph=vk.ActionPlot()), "graph is")
+NO_SEARCHES = [3, "none", True, vk.LeaveBasin(), vk.GraphSearch, vk.Shooting, vk.ActionGraph(), vk.ActionPlot()]
+
+
+@pytest.mark.parametrize("name", ["graph", "shooting"])
+@pytest.mark.parametrize("given", NO_SEARCHES, ids=str)
+def test_what_is_not_a_search(name, given):
+    """A whole analyzer is none either: it has its own source, exit and stepper."""
+    refused(StructureError, lambda: vk.LeastAction(**{name: given}), f"{name} must be a .*None to do without")
+
+
+def test_searches_are_not_exchanged():
+    refused(StructureError, lambda: vk.LeastAction(shooting=vk.GraphSearch()), r"shooting must be a Shooting")
+    refused(StructureError, lambda: vk.LeastAction(graph=vk.Shooting()), r"graph must be a GraphSearch")
 
 
 def test_without_any_search():
-    refused(StructureError, lambda: vk.LeastAction(plot=None, graph=None), "one at least")
+    refused(StructureError, lambda: vk.LeastAction(shooting=None, graph=None), "at least one")
 
 
 @pytest.mark.parametrize("orbits", [-1, 1.5, "4", None, True, 10**9], ids=repr)
@@ -223,52 +230,57 @@ def test_numbers_of_orbits(orbits):
 @pytest.mark.parametrize(
     ("bad", "words"),
     [
-        ({"fraction": 7}, "even number"),
-        ({"fraction": 0}, "fraction is"),
-        ({"fraction": 8.0}, "fraction is"),
-        ({"fraction": True}, "fraction is"),
-        ({"fraction": 10**6}, "fraction is"),
-        ({"fraction": "8"}, "fraction is"),
-        ({"cells": (31, 320)}, "32 or more"),
-        ({"cells": (0, 0)}, "cells"),
-        ({"cells": 320}, "cells"),
-        ({"cells": (320,)}, "cells"),
-        ({"cells": (320.5, 320)}, "cells"),
-        ({"cells": None}, "cells"),
-        ({"memory": 0.0}, "positive number of GiB"),
-        ({"memory": -1}, "positive number of GiB"),
-        ({"memory": float("nan")}, "positive number of GiB"),
-        ({"memory": "4"}, "positive number of GiB"),
-        ({"memory": True}, "positive number of GiB"),
+        ({"steps_per_period": 7}, "even number"),
+        ({"steps_per_period": 0}, "steps_per_period"),
+        ({"steps_per_period": 8.0}, "steps_per_period"),
+        ({"steps_per_period": True}, "steps_per_period"),
+        ({"steps_per_period": 10**6}, "steps_per_period"),
+        ({"steps_per_period": "8"}, "steps_per_period"),
+        ({"nodes": (31, 320)}, "32 or more"),
+        ({"nodes": (0, 0)}, "nodes"),
+        ({"nodes": 320}, "nodes"),
+        ({"nodes": (320,)}, "nodes"),
+        ({"nodes": (320.5, 320)}, "nodes"),
+        ({"nodes": None}, "nodes"),
+        ({"max_memory_gib": 0.0}, "positive number of GiB"),
+        ({"max_memory_gib": -1}, "positive number of GiB"),
+        ({"max_memory_gib": float("nan")}, "positive number of GiB"),
+        ({"max_memory_gib": "4"}, "positive number of GiB"),
+        ({"max_memory_gib": True}, "positive number of GiB"),
     ],
     ids=str,
 )
-def test_settings_of_the_graph(bad, words):
-    refused(StructureError, lambda: vk.ActionGraph(**bad), words)
+@pytest.mark.parametrize("graph", [vk.GraphSearch, vk.ActionGraph])
+def test_settings_of_the_graph(graph, bad, words):
+    refused(StructureError, lambda: graph(**bad), words)
 
 
 # --- memory
 
 
-@pytest.mark.parametrize("cells", [(20_000, 20_000), (31_000, 31_000), (32, 30_000_000)], ids=str)
-def test_memory_is_named_before_it_is_taken(structure, cells):
+@pytest.mark.parametrize("nodes", [(20_000, 20_000), (31_000, 31_000), (32, 30_000_000)], ids=str)
+def test_memory_is_named_before_it_is_taken(structure, nodes):
     tracemalloc.start()
     try:
-        refused(StructureError, lambda: vk.ActionGraph(cells=cells).search(WELL, structure, 0), "needs .* GiB")
+        graph = vk.GraphSearch(nodes=nodes)
+        refused(StructureError, lambda: graph.search(problem_of(WELL, structure)), "needs .* GiB")
         assert tracemalloc.get_traced_memory()[1] < 50e6
     finally:
         tracemalloc.stop()
 
 
-def test_too_much_memory_leaves_nothing_of_the_graph_and_says_so(structure):
-    result = vk.ActionGraph(cells=(20_000, 20_000)).run(WELL, structure)
+def test_a_graph_that_needs_too_much_memory_is_a_finding(structure):
+    result = vk.ActionGraph(nodes=(20_000, 20_000)).run(WELL, structure)
     assert result.energies == ()
-    for label in (0, 1):
-        assert f"Attractor {label} was left out: a graph of 20000 × 20000 nodes" in result.status
-    least = vk.LeastAction(plot=SMALL_PLOT, graph=vk.ActionGraph(cells=(20_000, 20_000)), source=0).run(WELL, structure)
-    assert "without a graph: a graph of 20000 × 20000 nodes" in least.status
+    assert [finding.source for finding in result.found(Code.SOURCE_FAILED)] == [0, 1]
+    too_large = vk.GraphSearch(nodes=(20_000, 20_000))
+    least = vk.LeastAction(shooting=SMALL_SHOOTING, graph=too_large, source=0).run(WELL, structure)
+    for finding in (*result.found(Code.SOURCE_FAILED), *least.found(Code.METHOD_FAILED)):
+        assert "a graph of 20000 × 20000 nodes" in finding.values["reason"]
+    assert len(least.found(Code.METHOD_FAILED)) == 1
 
 
 def test_more_memory_may_be_allowed_and_less(structure):
-    refused(StructureError, lambda: vk.ActionGraph(memory=1e-3).search(WELL, structure, 0), "0.001 GiB are allowed")
-    assert vk.ActionGraph(cells=(40, 40), memory=0.01).search(WELL, structure, 0).targets
+    little = vk.GraphSearch(max_memory_gib=1e-3)
+    refused(StructureError, lambda: little.search(problem_of(WELL, structure)), "max_memory_gib is 0.001")
+    assert vk.GraphSearch(nodes=(40, 40), max_memory_gib=0.01).search(problem_of(WELL, structure)).estimates

@@ -54,28 +54,27 @@ def test_the_good_one_is_good(tmp_path):
     assert vk.load_scene(tmp_path / "scene.toml").parameters["barriers.0.law.stiffness"] == 50.0
 
 
-LOW, POSITIVE = "; give a finite number at least 0.", "; give a finite number greater than 0."
-NO_NUMBER = "which is no number; give a finite number at least 0."
+LOW, POSITIVE = "must be a finite number at least 0, got ", "must be a finite number greater than 0, got "
 VALUES = {
-    "negative stiffness": ("stiffness = 50.0", "stiffness = -50.0", "barriers.0.law: Hertz: stiffness is -50" + LOW),
-    "nan stiffness": ("stiffness = 50.0", "stiffness = nan", "stiffness is nan" + LOW),
-    "damping": ("damping_ratio = 0.01", "damping_ratio = -1", "damping_ratio is -1" + LOW),
-    "nan damping": ("damping_ratio = 0.01", "damping_ratio = nan", "damping_ratio is nan" + LOW),
-    "negative intensity": ("intensity = 2e-5", "intensity = -2e-5", "noise: WhiteNoise: intensity is -2e-05" + LOW),
-    "zero frequency": ("\nfrequency = 0.57", "\nfrequency = 0", "excitations.0: Harmonic: frequency is 0" + POSITIVE),
-    "zero": ("natural_frequency = 1.0", "natural_frequency = 0", "natural_frequency is 0" + POSITIVE),
-    "text": ("stiffness = 50.0", 'stiffness = "50"', "stiffness is '50', " + NO_NUMBER),
-    "list": ("stiffness = 50.0", "stiffness = [50.0]", "stiffness is [50.0], " + NO_NUMBER),
-    "table": ("stiffness = 50.0", "stiffness = {k = 1}", "stiffness is {'k': 1}, " + NO_NUMBER),
-    "bool": ("stiffness = 50.0", "stiffness = true", "stiffness is True, " + NO_NUMBER),
-    "date": ("stiffness = 50.0", "stiffness = 2020-01-01", "stiffness is datetime.date(2020, 1, 1), " + NO_NUMBER),
-    "too large": ("stiffness = 50.0", "stiffness = 1e400", "stiffness is inf; give"),
-    "large integer": ("stiffness = 50.0", "stiffness = 1" + "0" * 400, "stiffness is beyond 1.8e308; give"),
-    "integer too long": ("stiffness = 50.0", "stiffness = 1" + "0" * 5000, "is no TOML: "),
-    "side": ('side = "right"', 'side = "rigth"', "barriers.0: Barrier: side is 'rigth'; give 'right' or 'left'."),
-    "side as number": ('side = "right"', "side = 1", "side is 1; give 'right' or 'left'."),
-    "adhesive": ('side = "right"', 'side = "right"\nadhesive = 1', "adhesive is 1; give True or False."),
-    "position": ("position = 0.5", 'position = "0.5"', "position is '0.5', which is no number; give a finite number."),
+    "negative stiffness": ("stiffness = 50.0", "stiffness = -50.0", f"barriers.0.law: Hertz: stiffness {LOW}-50."),
+    "nan stiffness": ("stiffness = 50.0", "stiffness = nan", f"stiffness {LOW}nan."),
+    "damping": ("damping_ratio = 0.01", "damping_ratio = -1", f"damping_ratio {LOW}-1."),
+    "nan damping": ("damping_ratio = 0.01", "damping_ratio = nan", f"damping_ratio {LOW}nan."),
+    "negative intensity": ("intensity = 2e-5", "intensity = -2e-5", f"noise: WhiteNoise: intensity {LOW}-2e-05."),
+    "zero frequency": ("\nfrequency = 0.57", "\nfrequency = 0", f"excitations.0: Harmonic: frequency {POSITIVE}0."),
+    "zero": ("natural_frequency = 1.0", "natural_frequency = 0", f"natural_frequency {POSITIVE}0."),
+    "text": ("stiffness = 50.0", 'stiffness = "50"', f"stiffness {LOW}'50'."),
+    "list": ("stiffness = 50.0", "stiffness = [50.0]", f"stiffness {LOW}[50.0]."),
+    "table": ("stiffness = 50.0", "stiffness = {k = 1}", f"stiffness {LOW}{{'k': 1}}."),
+    "bool": ("stiffness = 50.0", "stiffness = true", f"stiffness {LOW}True."),
+    "date": ("stiffness = 50.0", "stiffness = 2020-01-01", f"stiffness {LOW}datetime.date(2020, 1, 1)."),
+    "too large": ("stiffness = 50.0", "stiffness = 1e400", f"stiffness {LOW}inf."),
+    "large integer": ("stiffness = 50.0", "stiffness = 1" + "0" * 400, f"stiffness {LOW}one above 1.8e308."),
+    "integer too long": ("stiffness = 50.0", "stiffness = 1" + "0" * 5000, "is not valid TOML: "),
+    "side": ('side = "right"', 'side = "rigth"', "barriers.0: Barrier: side must be 'right' or 'left', got 'rigth'."),
+    "side as number": ('side = "right"', "side = 1", "side must be 'right' or 'left', got 1."),
+    "adhesive": ('side = "right"', 'side = "right"\nadhesive = 1', "adhesive must be True or False, got 1."),
+    "position": ("position = 0.5", 'position = "0.5"', "position must be a finite number, got '0.5'."),
 }  # fmt: skip
 
 
@@ -106,15 +105,19 @@ NAMES = {
         "ampltude",
         "(harmonic) has an unknown entry 'ampltude'; the nearest is 'amplitude'.",
     ),
-    "key of noise": ("intensity", "strength", "noise (white) has an unknown entry 'strength'; there is intensity."),
-    "law": ('name = "hertz"', 'name = "herz"', "There is no contact law 'herz'. Did you mean 'hertz'?"),
-    "excitation": ('name = "harmonic"', 'name = "harmonics"', "Did you mean 'harmonic'?"),
-    "noise model": ('name = "white"', 'name = "wite"', "Did you mean 'white'?"),
-    "law of another kind": ('name = "hertz"', 'name = "white"', "There is no contact law 'white'."),
-    "long name": ('name = "hertz"', f'name = "{"h" * 5000}"', "a name has at most 100 characters."),
+    "key of noise": ("intensity", "strength", "noise (white) has an unknown entry 'strength'; allowed: intensity."),
+    "law": ('name = "hertz"', 'name = "herz"', "There is no contact law 'herz'; the nearest is 'hertz'."),
+    "excitation": ('name = "harmonic"', 'name = "harmonics"', "the nearest is 'harmonic'."),
+    "noise model": ('name = "white"', 'name = "wite"', "the nearest is 'white'."),
+    "law of another kind": ('name = "hertz"', 'name = "white"', "There is no contact law 'white'"),
+    "long name": (
+        'name = "hertz"',
+        f'name = "{"h" * 5000}"',
+        "barriers.0.law: name may have at most 100 characters, got 'hhh",
+    ),
     "long key": ("intensity", "i" * 5000, "unknown entry 'iii"),
-    "empty name": ('name = "hertz"', 'name = ""', "There is no contact law ''."),
-    "class path": ('name = "hertz"', 'name = "os:system"', "There is no contact law 'os:system'."),
+    "empty name": ('name = "hertz"', 'name = ""', "There is no contact law ''"),
+    "class path": ('name = "hertz"', 'name = "os:system"', "There is no contact law 'os:system'"),
     "dunder key": ("stiffness = 50.0", "stiffness = 50.0, __class__ = 1", "unknown entry '__class__'"),
     "self": ("stiffness = 50.0", "stiffness = 50.0, self = 1", "unknown entry 'self'"),
 }
@@ -129,22 +132,26 @@ MISSING = {
     "natural frequency": (
         "natural_frequency = 1.0\n",
         "",
-        "scene lacks natural_frequency; it needs natural_frequency, damping_ratio.",
+        "scene has no entry natural_frequency; it needs natural_frequency, damping_ratio.",
     ),
-    "damping": ("damping_ratio = 0.01\n", "", "scene lacks damping_ratio"),
-    "law": ('law = { name = "hertz", stiffness = 50.0 }\n', "", "barriers.0 lacks law; it needs law, position, side."),
-    "position": ("position = 0.5\n", "", "barriers.0 lacks position"),
-    "side": ('side = "right"\n', "", "barriers.0 lacks side"),
-    "stiffness": (", stiffness = 50.0", "", "barriers.0.law (hertz) lacks stiffness; it needs stiffness."),
+    "damping": ("damping_ratio = 0.01\n", "", "scene has no entry damping_ratio"),
+    "law": (
+        'law = { name = "hertz", stiffness = 50.0 }\n',
+        "",
+        "barriers.0 has no entry law; it needs law, position, side.",
+    ),
+    "position": ("position = 0.5\n", "", "barriers.0 has no entry position"),
+    "side": ('side = "right"\n', "", "barriers.0 has no entry side"),
+    "stiffness": (", stiffness = 50.0", "", "barriers.0.law (hertz) has no entry stiffness; it needs stiffness."),
     "name of a law": (
         'name = "hertz", ',
         "",
-        "barriers.0.law is {'stiffness': 50.0}; write a table with the part's name",
+        "barriers.0.law must be a table with the name of the part and its parameters, got {'stiffness': 50.0}.",
     ),
-    "name of the noise": ('name = "white"\n', "", "noise is {'intensity': 2e-05}; write a table with the part's name"),
-    "name of an excitation": ('name = "harmonic"\n', "", "excitations.0 is {"),
-    "intensity": ("intensity = 2e-5\n", "", "noise (white) lacks intensity"),
-    "everything": (GOOD, "", "scene lacks natural_frequency"),
+    "name of the noise": ('name = "white"\n', "", "got {'intensity': 2e-05}."),
+    "name of an excitation": ('name = "harmonic"\n', "", "excitations.0 must be a table"),
+    "intensity": ("intensity = 2e-5\n", "", "noise (white) has no entry intensity"),
+    "everything": (GOOD, "", "scene has no entry natural_frequency"),
 }
 
 
@@ -157,42 +164,47 @@ SHAPES = {
     "[barriers]": (
         "[[barriers]]",
         "[barriers]",
-        "scene: barriers is {'law': {",
-        "write a table [[barriers]] for each.",
+        "scene: barriers must be a list of tables [[barriers]], got {'law': {",
+        "}.",
     ),
     "[excitations]": (
         "[[excitations]]",
         "[excitations]",
-        "scene: excitations is {",
-        "write a table [[excitations]] for each.",
+        "scene: excitations must be a list of tables [[excitations]], got {",
+        "}.",
     ),
-    "[[noise]]": ("[noise]", "[[noise]]", "noise is [{", "write a table with the part's name and its parameters."),
-    "law as text": ('{ name = "hertz", stiffness = 50.0 }', '"hertz"', "barriers.0.law is 'hertz'; write a table", "."),
-    "name as list": ('name = "white"', 'name = ["white"]', "noise is {", "."),
-    "name as number": ('name = "white"', "name = 1", "'name': 1}; write a table", "."),
+    "[[noise]]": ("[noise]", "[[noise]]", "noise must be a table", "}]."),
+    "law as text": (
+        '{ name = "hertz", stiffness = 50.0 }',
+        '"hertz"',
+        "barriers.0.law must be a table",
+        "got 'hertz'.",
+    ),
+    "name as list": ('name = "white"', 'name = ["white"]', "noise must be a table", "}."),
+    "name as number": ('name = "white"', "name = 1", "noise must be a table", "'name': 1}."),
     "noise as number": (
         '[noise]\nname = "white"\nintensity = 2e-5\n',
         "[noise.white]\n",
-        "noise is {'white': {}}",
-        ".",
+        "noise must be a table",
+        "got {'white': {}}.",
     ),
     "barriers of numbers": (
         GOOD,
         "natural_frequency=1\ndamping_ratio=0\nbarriers=[1, 2]\n",
-        "barriers.0 is 1, no table; it has law",
-        ".",
+        "barriers.0 must be a table with law, ",
+        "got 1.",
     ),
     "excitations of text": (
         GOOD,
         "natural_frequency=1\ndamping_ratio=0\nexcitations=['a']\n",
-        "excitations.0 is 'a'; write a table",
-        ".",
+        "excitations.0 must be a table",
+        "got 'a'.",
     ),
     "barriers as text": (
         GOOD,
         "natural_frequency=1\ndamping_ratio=0\nbarriers='two'\n",
-        "barriers is 'two', no list",
-        ".",
+        "barriers must be a list",
+        "got 'two'.",
     ),
 }
 
@@ -209,7 +221,7 @@ STOP = '[[barriers]]\nlaw = { name = "linear", stiffness = 1.0 }\n'
 
 def test_two_stops_on_one_side(tmp_path):
     said = refused(tmp_path, GOOD + STOP + 'position = 0.7\nside = "right"\n')
-    assert "2 stops on the right side, at 0.5, 0.7; give at most one on each side." in said
+    assert "2 on the right side, at 0.5, 0.7." in said
 
 
 def test_crossed_stops(tmp_path):
@@ -233,27 +245,25 @@ NO_TOML = {
 @pytest.mark.parametrize("content", NO_TOML.values(), ids=NO_TOML)
 def test_what_is_no_toml(tmp_path, content):
     said = refused(tmp_path, content)
-    assert "is no TOML: " in said or "is nested too deeply" in said
+    assert "is not valid TOML: " in said or "is nested too deeply" in said
 
 
 def test_binary(tmp_path):
-    assert "is no text in UTF-8 (at byte 0); a scene is a TOML file." in refused(
-        tmp_path, b"\x89PNG\r\n\x1a\n" + bytes(99)
-    )
+    assert "is not UTF-8 text (byte 0)" in refused(tmp_path, b"\x89PNG\r\n\x1a\n" + bytes(99))
 
 
 def test_utf16(tmp_path):
-    assert "is no text in UTF-8" in refused(tmp_path, GOOD.encode("utf-16"))
+    assert "is not UTF-8 text" in refused(tmp_path, GOOD.encode("utf-16"))
 
 
 def test_deep_dotted_keys(tmp_path):
     deep = "stiffness" + ".a" * 3000
-    assert "stiffness is " in refused(tmp_path, changed("stiffness = 50.0", f"{deep} = 1"), limit=2.0)
+    assert "stiffness must be " in refused(tmp_path, changed("stiffness = 50.0", f"{deep} = 1"), limit=2.0)
 
 
 def test_huge(tmp_path):
     said = refused(tmp_path, GOOD + "#" * 100_000)
-    assert "is too large for a scene; at most 100000 bytes are read." in said
+    assert "is too large for a scene; at most 100000 bytes" in said
 
 
 def test_a_megabyte_of_formula(tmp_path):
@@ -270,7 +280,7 @@ def test_endless_files_are_not_read_to_their_end():
 
 def test_many_barriers(tmp_path):
     many = "".join(f"{STOP}position = {i}\nside = 'left'\n" for i in range(1000))
-    assert "scene: barriers has 1001 entries; at most 100 are allowed." in refused(tmp_path, GOOD + many)
+    assert "scene: at most 100 entries of barriers are allowed, got 1001." in refused(tmp_path, GOOD + many)
 
 
 RUNS_CODE = {
@@ -301,7 +311,8 @@ def test_unknown_symbols_of_a_formula(tmp_path):
     said = refused(
         tmp_path, changed('name = "hertz", stiffness = 50.0', 'name = "custom", formula = "kk*depth", k = 1')
     )
-    assert "the name 'kk' is unknown; names allowed are pi, depth, rate, k" in said
+    assert "'kk'" in said
+    assert "'k'" in said
 
 
 @pytest.mark.parametrize(
@@ -330,7 +341,7 @@ def test_a_folder(tmp_path):
 
 @pytest.mark.parametrize("source", [None, 3, b"hertz-0.570", ["hertz-0.570"]])
 def test_what_is_no_path(source):
-    with pytest.raises(SceneError, match=r"^the scene is .*; give the path of a TOML file or one of .*\.$"):
+    with pytest.raises(SceneError, match=r"^the scene must be the path of a TOML file or one of .*, got .*\.$"):
         vk.load_scene(source)
 
 

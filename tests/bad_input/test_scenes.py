@@ -56,8 +56,7 @@ NO_NUMBERS = [
 def test_numbers_of_the_scene(name, value):
     said = refused(ParameterError, lambda: scene(**{name: value}))
     allowed = "greater than 0" if name == "natural_frequency" else "at least 0"
-    assert said.startswith(f"scene: {name} is ")
-    assert said.endswith(f", which is no number; give a finite number {allowed}.")
+    assert said.startswith(f"scene: {name} must be a finite number {allowed}, got ")
 
 
 @pytest.mark.parametrize(
@@ -74,35 +73,57 @@ def test_numbers_of_the_scene(name, value):
 )
 def test_ranges_of_the_scene(name, value, allowed):
     said = refused(ParameterError, lambda: scene(**{name: value}))
-    assert said == f"scene: {name} is {value:g}; give a finite number {allowed}."
+    assert said == f"scene: {name} must be a finite number {allowed}, got {value:g}."
 
 
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: vk.Hertz(-50.0), "Hertz: stiffness is -50; give a finite number at least 0."),
-        (lambda: vk.Linear(math.nan), "Linear: stiffness is nan; give a finite number at least 0."),
-        (lambda: vk.WhiteNoise(-2e-5), "WhiteNoise: intensity is -2e-05; give a finite number at least 0."),
-        (lambda: vk.WhiteNoise(math.nan), "WhiteNoise: intensity is nan; give a finite number at least 0."),
-        (lambda: vk.Harmonic(0.1, 0.0), "Harmonic: frequency is 0; give a finite number greater than 0."),
-        (lambda: vk.Harmonic(math.inf, 1.0), "Harmonic: amplitude is inf; give a finite number."),
-        (lambda: vk.CustomLaw("k*depth", k=math.nan), "CustomLaw: k is nan; give a finite number."),
-        (lambda: vk.CubicSpring(1.0, "b"), "CubicSpring: cubic is 'b', which is no number; give a finite number."),
+        (lambda: vk.Hertz(-50.0), "Hertz: stiffness must be a finite number at least 0, got -50."),
+        (lambda: vk.Linear(math.nan), "Linear: stiffness must be a finite number at least 0, got nan."),
+        (lambda: vk.WhiteNoise(-2e-5), "WhiteNoise: intensity must be a finite number at least 0, got -2e-05."),
+        (lambda: vk.WhiteNoise(math.nan), "WhiteNoise: intensity must be a finite number at least 0, got nan."),
+        (lambda: vk.Harmonic(0.1, 0.0), "Harmonic: frequency must be a finite number greater than 0, got 0."),
+        (lambda: vk.Harmonic(math.inf, 1.0), "Harmonic: amplitude must be a finite number, got inf."),
+        (lambda: vk.CustomLaw("k*depth", k=math.nan), "CustomLaw: k must be a finite number, got nan."),
+        (lambda: vk.CubicSpring(1.0, "b"), "CubicSpring: cubic must be a finite number, got 'b'."),
     ],
 )
 def test_parts(make, said):
     assert refused(ParameterError, make) == said
 
 
+@pytest.mark.parametrize(
+    "changes", [3, "noise", [("damping_ratio", 0.1)], {3: 0.1}, {"": 0.1}, {"ratio": 0.1}, {None: 1}]
+)
+def test_changes_that_name_no_parameter(changes):
+    refused(ParameterError, lambda: scene().replace(changes))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        ({"damping_ratio": -1.0}, ParameterError),
+        ({"noise": 0.1}, SceneError),
+        ({"barriers": vk.Hertz(1.0)}, SceneError),
+        ({"barriers": [stop("left", 1.0), stop("right", 0.0)]}, SceneError),
+        ({"intensity": 0.1}, ParameterError),
+        ({"position": 0.1}, ParameterError),
+    ],
+    ids=str,
+)
+def test_keywords_of_replace(change, kind):
+    refused(kind, lambda: scene(barriers=[stop("left", -0.5), stop("right", 0.5)]).replace(**change))
+
+
 def test_two_stops_on_one_side():
     said = refused(SceneError, lambda: scene(barriers=[stop("left", -0.5), stop("left", -0.7)]))
-    assert said == "scene: 2 stops on the left side, at -0.5, -0.7; give at most one on each side."
+    assert "got 2 on the left side, at -0.5, -0.7" in said
 
 
 def test_crossed_stops():
     said = refused(SceneError, lambda: scene(barriers=[stop("left", 0.25), stop("right", -0.75)]))
     assert "the left stop, at 0.25, is to the right of the right stop, at -0.75" in said
-    assert "equal places are allowed" in said
 
 
 def test_a_zero_gap_is_legal():
@@ -120,16 +141,15 @@ def test_what_is_no_sequence_of_parts(name, value):
 
 
 def test_a_single_part_where_a_sequence_is_due():
-    assert "is a single Barrier; give a sequence" in refused(SceneError, lambda: scene(barriers=stop("right")))
-    assert "is a single Constant; give a seq" in refused(SceneError, lambda: scene(excitations=vk.Constant(1.0)))
+    assert "a single Barrier" in refused(SceneError, lambda: scene(barriers=stop("right")))
+    assert "a single Constant" in refused(SceneError, lambda: scene(excitations=vk.Constant(1.0)))
 
 
 @pytest.mark.parametrize("value", [0.1, "white", vk.WhiteNoise, [vk.WhiteNoise(0.1)], vk.Hertz(1.0)])
 @pytest.mark.parametrize(("name", "kind"), [("noise", "NoiseModel"), ("spring", "Spring")])
 def test_what_is_no_part(name, kind, value):
     said = refused(SceneError, lambda: scene(**{name: value}))
-    assert said.startswith(f"scene: {name} has ")
-    assert said.endswith(f"which is no {kind}; give one.")
+    assert said.startswith(f"scene: {name} must be of type {kind}, got ")
 
 
 ATTACKS = {
@@ -172,9 +192,9 @@ ATTACKS = {
 @pytest.mark.parametrize("text", ATTACKS.values(), ids=ATTACKS)
 def test_formulas_that_would_run_code_or_never_end(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    start = time.perf_counter()
+    start = time.process_time()
     said = refused(VibrokitError, lambda: vk.CustomLaw(text))
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     assert said.startswith("The formula ")
     assert seconds < 0.1
     assert not os.listdir(tmp_path)
@@ -220,8 +240,7 @@ class TestIntegration:
     @pytest.mark.parametrize("periods", [-1, 1.5, "2", None, True, math.nan, [1]])
     def test_periods(self, periods):
         said = refused(ParameterError, lambda: scene().section_map([[0.0, 0.0]], periods))
-        assert said.startswith("section_map: periods is ")
-        assert said.endswith("; give a whole number, 0 or more.")
+        assert said.startswith("section_map: periods must be a whole number, at least 0, got ")
 
     @pytest.mark.parametrize(
         ("arguments", "name"),
@@ -246,7 +265,7 @@ class TestIntegration:
 
     def test_noise_that_is_not_there(self):
         said = refused(SceneError, lambda: scene().section_map([[0.0, 0.0]], rng=1))
-        assert "the scene has no noise" in said
+        assert "no noise" in said
 
     def test_no_section(self):
         osc = scene(excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, math.e)))
@@ -255,9 +274,9 @@ class TestIntegration:
     @pytest.mark.parametrize("stepper", ["rk4", 256, vk.RK4])
     def test_what_is_no_stepper(self, stepper):
         said = refused(StepperError, lambda: scene().section_map([[0.0, 0.0]], stepper=stepper))
-        assert said.startswith("the stepper is ")
-        assert "RK4(steps=256)" in said
+        assert "stepper must be a Stepper" in said
+        assert repr(stepper)[:20] in said
 
     @pytest.mark.parametrize("steps", [0, -1, 2.5, "256", True, None, 10**9])
     def test_steps(self, steps):
-        assert refused(StepperError, lambda: vk.RK4(steps=steps)).startswith("RK4: steps is ")
+        assert refused(StepperError, lambda: vk.RK4(steps=steps)).startswith("RK4: steps must be ")

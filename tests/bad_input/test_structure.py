@@ -1,4 +1,4 @@
-"""What the searches say of arguments that are not what they must be."""
+"""Arguments that the searches refuse."""
 
 import concurrent.futures
 import math
@@ -21,7 +21,7 @@ def structure():
 @pytest.mark.parametrize("osc", [None, "hertz-0.570", 3])
 def test_what_is_no_oscillator(osc):
     for search in (vk.find_structure, lambda o: vk.unstable_orbits(o, 1), lambda o: vk.continuation(o, "a", [1.0])):
-        with pytest.raises(SceneError, match="oscillator"):
+        with pytest.raises(SceneError, match="must be an Oscillator"):
             search(osc)
 
 
@@ -29,7 +29,7 @@ def test_what_is_no_oscillator(osc):
     ("name", "value", "kind"),
     [
         ("executor", 3, StructureError), ("executor", [], StructureError), ("executor", np.ones(2), StructureError),
-        ("progress", 3, StructureError), ("stepper", "rk4", StepperError), ("stepper", [], StepperError),
+        ("progress", 3, StructureError), ("stepper", 3, StepperError), ("stepper", [], StepperError),
         ("stepper", np.array([1]), StepperError),
     ],
     ids=str,
@@ -46,10 +46,18 @@ def test_wrong_types_are_told_before_any_work(structure, name, value, kind):
             search(**{name: value})
 
 
+@pytest.mark.parametrize("text", ["rk5", "rk4:0", "rk4:a", ""])
+def test_texts_of_steppers(text):
+    searches = (vk.find_structure, lambda osc, **k: vk.continuation(osc, "damping_ratio", [0.1], **k))
+    for search in searches:
+        with pytest.raises(StepperError):
+            search(WELL, stepper=text)
+
+
 @pytest.mark.parametrize("name", ["saddles", "manifolds"])
 @pytest.mark.parametrize("value", ["yes", math.nan, np.array([1, 2]), None])
 def test_flags_are_true_or_false(name, value):
-    with pytest.raises(StructureError, match=f"{name} is .*True or False"):
+    with pytest.raises(StructureError, match=f"{name} must be True or False"):
         vk.find_structure(WELL, **{name: value})
 
 
@@ -69,7 +77,7 @@ def test_a_structure_of_another_scene(structure):
         with pytest.raises(StructureError, match="another scene"):
             use()
     for nothing in (None, "abc", structure.basins):
-        with pytest.raises(StructureError, match="which is none"):
+        with pytest.raises(StructureError, match="must be a Structure"):
             vk.shape_stability(WELL, nothing)
 
 
@@ -92,7 +100,8 @@ def test_motion_that_grows_without_bound():
 @pytest.mark.parametrize(
     ("path", "values"),
     [
-        ("nowhere", [1.0]), (["damping_ratio"], [0.1]), ("damping_ratio", []), ("damping_ratio", [0.1, math.nan]),
+        ("nowhere", [1.0]), ("ratio", [0.1]), ("", [0.1]),
+        (["damping_ratio"], [0.1]), ("damping_ratio", []), ("damping_ratio", [0.1, math.nan]),
         ("damping_ratio", [0.1, 0.1]), ("damping_ratio", "abc"), ("damping_ratio", None),
     ],
     ids=str,

@@ -1,10 +1,9 @@
-"""Least action at the extremes: energies against exact ones, what the bounds say, and what was refused.
+"""Least action at the extremes: energies and bounds against exact values, with the findings.
 
     python tests/benchmarks/action_extremes.py [WORDS …] [--limit 300] [--full] [--list] [--out FILE]
 
-Takes the scenes of `tests/extremes/scenes_of_action.py` whose names have all the words, one by one, each in a process
-of its own that is ended at the limit, and prints the rows of a list-table. A row marked WRONG has an exact energy
-outside its bounds and no word of it in the status.
+Runs the scenes of `tests/extremes/scenes_of_action.py` whose names contain all the words, each in a separate process
+with a time limit, and prints the rows of a list-table. A row marked WRONG has an exact energy outside its bounds.
 """
 
 import argparse
@@ -18,6 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
 from tests.extremes.scenes_of_action import ActionScene, scenes
 from vibrokit.errors import VibrokitError
+from vibrokit.progress import Update
+from vibrokit.results.finding import Code, Severity
 
 HEADER = (
     "scene",
@@ -28,10 +29,10 @@ HEADER = (
     "residual",
     "graph",
     "CPU seconds",
-    "what was said",
+    "findings",
 )
-AGREED = "they agree"
-ROUNDING = 1e-9  # relative: an exact energy so near a bound is not outside it
+ROUNDING = 1e-9  # relative: an exact energy this close to a bound is not outside it
+COMPARED = (Code.AGREEMENT, Code.CHEAPER_PATH_EXPECTED, Code.GRAPH_TOO_COARSE, Code.NO_POLISHED_PATH, Code.BRACKET)
 
 
 def structure_of(scene: ActionScene, full: bool) -> vk.Structure:
@@ -43,7 +44,7 @@ def structure_of(scene: ActionScene, full: bool) -> vk.Structure:
 def analyzer(full: bool, **changes) -> vk.LeastAction:
     if full:
         return vk.LeastAction(**changes)
-    return vk.LeastAction(plot=vk.ActionPlot(points=3000), graph=vk.ActionGraph(cells=(120, 120)), **changes)
+    return vk.LeastAction(shooting=vk.Shooting(points=3000), graph=vk.GraphSearch(nodes=(120, 120)), **changes)
 
 
 def exact_energies(scene: ActionScene, structure: vk.Structure) -> dict[int, float]:
@@ -54,53 +55,43 @@ def exact_energies(scene: ActionScene, structure: vk.Structure) -> dict[int, flo
     return {attractor.label: exact for attractor, exact in zip(by_place, scene.exact, strict=True)}
 
 
-class Told:
-    """Progress, to the standard error, for a run that is ended at the limit."""
-
-    def __init__(self) -> None:
-        self.percent = -1
-
-    def __call__(self, done: int, total: int) -> None:
-        percent = 100 * done // max(1, total)
-        if percent != self.percent:
-            self.percent = percent
-            print(f"{percent} % of the least action done", file=sys.stderr, flush=True)
+def tell(update: Update) -> None:
+    """Print the stage under way to standard error, for a run that is stopped at the limit."""
+    if not update.finished:
+        print(f"{update.stage}, {update.subject}: {update.done} {update.unit}", file=sys.stderr, flush=True)
 
 
 def least(scene: ActionScene, structure: vk.Structure, full: bool, exact: dict[int, float], **changes) -> list[dict]:
-    """Run, and return one row for each energy; one with a reason only where there is none."""
+    """Run, and return one row for each energy; one row with the reason if there is none."""
     began = time.process_time()
     try:
-        result = analyzer(full, **changes).run(scene.oscillator, structure, progress=Told())
-    except VibrokitError as refusal:
-        return [{"said": f"{type(refusal).__name__}: {refusal}", "seconds": time.process_time() - began}]
-    seconds, said = time.process_time() - began, result.status
-    graphs = {key: graph_words(said, key) for key in {(e.source, e.target) for e in result.energies}}
+        result = analyzer(full, **changes).run(scene.oscillator, structure, progress=tell)
+    except VibrokitError as error:
+        return [{"findings": f"{type(error).__name__}: {error}", "seconds": time.process_time() - began}]
+    seconds = time.process_time() - began
+    found = " ".join(f.sentence(result.names) for f in result.findings if f.severity is not Severity.INFO)
     rows = [
         {
-            "way": f"{e.source} → {e.target if e.target >= 0 else 'stop'}",
+            "way": result.exit_of(e),
             "value": e.value,
             "bounds": [e.lower, e.upper],
-            "method": e.method,
+            "method": f"{e.method}, {e.bound}",
             "exact": exact.get(e.source),
             "residual": e.residual,
-            "graph": graphs[e.source, e.target],
-            "said": said,
+            "graph": graph_value(result, e),
+            "findings": found,
             "seconds": seconds,
         }
         for e in result.energies
     ]
-    return rows or [{"said": said, "seconds": seconds}]
+    return rows or [{"findings": found, "seconds": seconds}]
 
 
-def graph_words(status: str, key: tuple[int, int]) -> str:
-    """Return the graph's value and error, out of the sentence that compares it."""
-    source, target = key
-    _, found, after = status.partition(f"From {source} to {target if target >= 0 else 'the exit'}:")
-    for opening in ("the graph has ", "the graph's "):
-        _, here, value = after.partition(opening) if found else ("", "", "")
-        if here:
-            return " ".join(value.split()[:3]).rstrip(",;")
+def graph_value(result: vk.Result, energy: vk.ActivationEnergy) -> str:
+    """Return the graph's value and error of an exit."""
+    for finding in result.findings:
+        if finding.code in COMPARED and (finding.source, finding.target) == (energy.source, energy.target):
+            return f"{finding.values['graph']:.4g} ± {finding.values['error']:.1g}"
     return ""
 
 
@@ -109,7 +100,7 @@ def rows_of(scene: ActionScene, full: bool) -> list[dict]:
     try:
         structure = structure_of(scene, full)
     except VibrokitError as refusal:
-        return [{"said": f"structure, {type(refusal).__name__}: {refusal}", "seconds": time.process_time() - began}]
+        return [{"findings": f"structure, {type(refusal).__name__}: {refusal}", "seconds": time.process_time() - began}]
     found = f"[{len(structure.attractors)} attractors, {len(structure.saddles)} saddles] "
     print(f"{scene.name}: {found}{time.process_time() - began:.1f} s. {structure.status}", file=sys.stderr, flush=True)
     if scene.contact is None:
@@ -118,22 +109,22 @@ def rows_of(scene: ActionScene, full: bool) -> list[dict]:
         first = {attractor.label: scene.contact for attractor in structure.attractors if not attractor.impacts}
         rows = least(scene, structure, full, first, exit=vk.FirstContact())
     for row in rows:
-        row["said"] = found + row["said"]
+        row["findings"] = found + row["findings"]
     return rows
 
 
 def limited(name: str, full: bool, limit: float) -> list[dict]:
-    """Run a scene in a process of its own, so many seconds at most."""
+    """Run a scene in a separate process with a time limit (s)."""
     command = [sys.executable, __file__, "--scene", name, *(["--full"] if full else [])]
     began = time.perf_counter()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
     except subprocess.TimeoutExpired as ended:
         last = ((ended.stderr or b"").decode().splitlines() or ["no structure yet"])[-1]
-        return [{"said": f"ended after {limit:g} s: {last}", "seconds": time.perf_counter() - began}]
+        return [{"findings": f"stopped after {limit:g} s: {last}", "seconds": time.perf_counter() - began}]
     if done.returncode:
-        last = (done.stderr.strip().splitlines() or ["no words"])[-1]
-        return [{"said": f"CRASH ({done.returncode}): {last}", "seconds": time.perf_counter() - began}]
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return [{"findings": f"CRASH ({done.returncode}): {last}", "seconds": time.perf_counter() - began}]
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -143,13 +134,13 @@ def verdict(row: dict) -> str:
         return ""
     low, high = row["bounds"]
     if low > exact * (1 + ROUNDING) or high < exact * (1 - ROUNDING):
-        return "WRONG " if not row["said"].count("cheaper way out") else "wrong, and said so "
+        return "WRONG "
     return ""
 
 
 def cells_of(name: str, row: dict) -> tuple[str, ...]:
     if "value" not in row:
-        return name, "", "", "", "", "", "", f"{row['seconds']:.0f}", row["said"]
+        return name, "", "", "", "", "", "", f"{row['seconds']:.0f}", row["findings"]
     value, (low, high), exact = row["value"], row["bounds"], row["exact"]
     return (
         name,
@@ -160,7 +151,7 @@ def cells_of(name: str, row: dict) -> tuple[str, ...]:
         f"{row['residual']:.0e}",
         row["graph"],
         f"{row['seconds']:.0f}",
-        "agreed" if AGREED in row["said"] and len(row["said"]) < 400 else row["said"],
+        row["findings"],
     )
 
 

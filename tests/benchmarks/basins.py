@@ -26,7 +26,8 @@ from scipy.ndimage import maximum_filter, minimum_filter
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
 from vibrokit.kernels.choice import CoarseStepsWarning
-from vibrokit.structure.settle import Settler, settle_grid
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.grid import classify_grid
 
 SCENE = vk.load_scene("hertz-0.570")
 STEPS, MARGIN = 256, 2
@@ -113,13 +114,13 @@ def scalar(acceleration, structure) -> Contestant:
 # --- vibrokit's
 
 
-def follower(structure, steps: int) -> Settler:
+def follower(structure, steps: int) -> BasinClassifier:
     region = structure.basins.region
-    return Settler(SCENE, structure.attractors, region, structure.settling, structure.budget, vk.RK4(steps))
+    return BasinClassifier(SCENE, structure.attractors, region, structure.settling, structure.budget, vk.RK4(steps))
 
 
 def sharing(structure, steps: int = STEPS, margin: int | None = MARGIN) -> Contestant:
-    return lambda cells: settle_grid(follower(structure, steps), (cells, cells), margin=margin).labels
+    return lambda cells: classify_grid(follower(structure, steps), (cells, cells), margin=margin).labels
 
 
 # --- comparing

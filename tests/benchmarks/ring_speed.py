@@ -16,7 +16,6 @@ neighbours in time whatever else the machine does. The processor's time, of all 
 
 import argparse
 import concurrent.futures as futures
-import math
 import sys
 import time
 from collections.abc import Callable
@@ -43,9 +42,9 @@ from hamiltonian_ensemble import (
 )
 
 import vibrokit as vk
-from vibrokit.analyzers.quasi_potential import local_potential
+from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.shooting.outcomes import default_budget
-from vibrokit.analyzers.shooting.starts import ring_starts
+from vibrokit.analyzers.shooting.starts import Ring
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -209,8 +208,8 @@ def main() -> None:
         for source in options.source:
             attractor = structure.attractors[source]
             orbit = refine_orbit(SCENE, attractor.points[0], attractor.period, vk.RK4(STEPS))
-            angles = 2 * math.pi * np.arange(options.points) / options.points
-            starts = ring_starts(orbit.point, local_potential(SCENE, orbit, vk.RK4(STEPS)), RADIUS, angles)
+            ring = Ring(orbit.point, local_potential(SCENE, orbit, vk.RK4(STEPS)), RADIUS)
+            starts, _ = ring.states(np.arange(options.points)[:, None] / options.points)
             stop = vk.LeaveBasin().stop(SCENE, structure, source)
             budget = default_budget(float(np.abs(attractor.multipliers).max()), attractor.period, 1 / RADIUS)
             ours = {OURS: generated(stop, budget, pool)}

@@ -1,17 +1,19 @@
 """Every registered part, built in or of an installed plug-in, conforms; so do formulas."""
 
 import math
-from typing import ClassVar
 
 import pytest
 
 import vibrokit as vk
+from tests.scenes import Coloured
 from vibrokit import testing
 from vibrokit.parts.contact.contact_law import ContactLaw
 from vibrokit.parts.excitation.excitation import Excitation
 from vibrokit.parts.noise.noise_model import NoiseModel
 from vibrokit.parts.spring.spring import Spring
 from vibrokit.registry import Group, load_all
+
+pytestmark = pytest.mark.slow
 
 KINDS = [
     (Group.CONTACT_LAWS, ContactLaw, testing.contact_law_checks),
@@ -56,7 +58,7 @@ EXAMPLES = [
 @pytest.mark.parametrize(("checks", "part"), EXAMPLES, ids=lambda value: repr(value) if "=" in repr(value) else "")
 def test_examples(checks, part):
     for name, make in checks(part, rng=2):
-        if name != "another process":  # told of every class already, and slow
+        if name != "another process":  # checked for every class above, and slow
             make()
 
 
@@ -80,23 +82,6 @@ class Pulse(vk.Excitation):
     @property
     def period(self):
         return math.inf
-
-
-class Coloured(vk.NoiseModel):
-    """Ornstein–Uhlenbeck noise: a state of its own."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("r", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return self.rate
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y,)
 
 
 def test_excitation_that_never_repeats():

@@ -1,17 +1,21 @@
-"""Least action at the extremes: exact energies where they are certified, bounds that hold them, and words where not."""
+"""Least action at the extremes: exact energies where a path is certified, bounds and findings where none is."""
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
 from tests.extremes.scenes_of_action import damped_wells, first_contact, paper_scene, pressed_wells, tilted_wells
-from vibrokit.analyzers.analyzer import stepper_for
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Code
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
+pytestmark = pytest.mark.slow
+
 EXACT = 1e-6  # relative, of certified energies
 CERTIFIED = 1e-9  # residual
-PLOT = vk.ActionPlot(points=2000)
+SHOOTING = vk.Shooting(points=2000)
 
 
 def by_name(scenes, *names):
@@ -45,19 +49,17 @@ STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05
 
 
 def energies_of(scene):
-    """Energies, each with its exact value, and the status."""
+    """Energies, each with its exact value, and the result."""
     structure = structure_of(scene)
     exact = exact_energies(scene, structure)
-    result = vk.LeastAction(plot=PLOT, graph=vk.ActionGraph(cells=(64, 64), fraction=8)).run(
-        scene.oscillator, structure
-    )
-    assert {energy.source for energy in result.energies} == {
-        attractor.label for attractor in structure.attractors if is_inside(attractor, structure)
-    }
-    for label in set(exact) - {energy.source for energy in result.energies}:
-        assert f"attractor {label} lies outside the region of the structure" in result.status
-        assert f"Attractor {label}: no way out was found." in result.status
-    return [(energy, exact[energy.source]) for energy in result.energies], result.status
+    graph = vk.GraphSearch(nodes=(64, 64), steps_per_period=8)
+    result = vk.LeastAction(shooting=SHOOTING, graph=graph).run(scene.oscillator, structure)
+    left = {energy.source for energy in result.energies}
+    assert left == {attractor.label for attractor in structure.attractors if is_inside(attractor, structure)}
+    outside = set(exact) - left
+    assert {finding.source for finding in result.found(Code.NO_EXIT_FOUND)} == outside
+    assert outside <= {finding.source for finding in result.found(Code.METHOD_FAILED)}
+    return [(energy, exact[energy.source]) for energy in result.energies], result
 
 
 def check_certified(energy, exact):
@@ -78,11 +80,13 @@ def test_wells_cost_four_zeta_times_their_barriers(scene):
 
 
 @pytest.mark.parametrize("scene", STIFF)
-def test_wells_at_a_stiff_stop_are_certified_or_said_not_to_be(scene):
-    energies, status = energies_of(scene)
+def test_wells_at_a_stiff_stop_are_certified_or_found_not_to_be(scene):
+    energies, result = energies_of(scene)
+    uncertified = {(finding.source, finding.target) for finding in result.found(Code.NO_POLISHED_PATH)}
     for energy, exact in energies:
+        assert (energy.certificate is None) == ((energy.source, energy.target) in uncertified)
         if energy.certificate is None:
-            assert f"From {energy.source} to {energy.target}: no path was polished" in status
+            assert energy.bound is Bound.ESTIMATE
             check_bounds(energy, exact)
         else:
             check_certified(energy, exact)
@@ -97,7 +101,9 @@ def test_the_first_contact_of_an_orbit_near_grazing(scene):
     )
     clear = next(attractor for attractor in structure.attractors if not attractor.impacts)
     exits = vk.FirstContact("right")
-    result = vk.LeastAction(plot=PLOT, graph=None, source=clear.label, exit=exits).run(scene.oscillator, structure)
+    result = vk.LeastAction(shooting=SHOOTING, graph=None, source=clear.label, exit=exits).run(
+        scene.oscillator, structure
+    )
     (energy,) = result.energies
     check_certified(energy, scene.contact)
 
@@ -106,16 +112,16 @@ def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
     (scene,) = (scene for scene in damped_wells() if scene.name == "double well, zeta=2")
     structure = structure_of(scene)
     exact = exact_energies(scene, structure)
-    for energy in vk.ActionGraph(cells=(120, 120)).run(scene.oscillator, structure).energies:
+    for energy in vk.ActionGraph(nodes=(120, 120)).run(scene.oscillator, structure).energies:
         assert energy.lower <= exact[energy.source] <= energy.upper
 
 
 def test_steps_are_fine_enough_for_the_stability_of_an_orbit_at_a_stiff_stop():
-    """With the default steps of ensembles, this orbit of period 6 is there, but unstable."""
+    """With the default steps of ensembles, this orbit of period 6 exists, but is unstable."""
     osc = paper_scene("hertz", stiffness=1e4)
     structure = vk.find_structure(osc, cells=(20, 20), starts=(8, 8), saddles=False, manifolds=False)
     hammering = next(attractor for attractor in structure.attractors if attractor.impacts)
-    stepper = stepper_for(osc, hammering, Flow.STATE, None)
+    stepper = ExitProblem(osc, structure, hammering, vk.LeaveBasin()).ensemble_stepper(Flow.STATE)
     orbit = refine_orbit(osc, hammering.points[0], hammering.period, stepper)
     sizes = np.sort(np.abs(np.linalg.eigvals(orbit.monodromy)))
     assert sizes == pytest.approx(np.sort(np.abs(hammering.multipliers)), abs=1e-3)

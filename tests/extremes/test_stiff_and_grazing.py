@@ -6,6 +6,8 @@ import pytest
 import vibrokit as vk
 from tests.extremes.exact import exact_period
 
+pytestmark = pytest.mark.slow
+
 CYCLES = 10
 STEPPERS = [vk.FreeFlight(tolerance=1e-12), vk.Order8(tolerance=1e-12)]
 

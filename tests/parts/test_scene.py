@@ -70,29 +70,91 @@ class TestParameters:
         with pytest.raises(SceneError, match=r"the left stop, at -0\.5, is to the right of the right stop, at -1"):
             full.replace({"barriers.0.position": -1.0})
 
+    def test_fields_by_keyword(self, full):
+        noise = vk.WhiteNoise(intensity=1e-4)
+        changed = full.replace(damping_ratio=0.02, noise=noise, excitations=[harmonic(0.6)])
+        assert (changed.damping_ratio, changed.noise, changed.excitations) == (0.02, noise, (harmonic(0.6),))
+        assert (changed.barriers, changed.spring) == (full.barriers, full.spring)
+        assert full.replace({"noise": noise}) == full.replace(noise=noise)
+        assert full.replace(noise=None).noise is None
+        assert full.replace() == full
+
+    def test_paths_and_keywords_together(self, full):
+        changed = full.replace({"noise.intensity": 1e-4, "barriers.0.law.stiffness": 60.0}, damping_ratio=0.02)
+        assert changed.parameters == full.parameters | {
+            "noise.intensity": 1e-4, "barriers.0.law.stiffness": 60.0, "damping_ratio": 0.02,
+        }  # fmt: skip
+
+    def test_a_path_leads_into_a_part_that_is_given_with_it(self, full):
+        changed = full.replace({"noise.intensity": 1e-4}, noise=vk.WhiteNoise(1.0))
+        assert changed.noise == vk.WhiteNoise(1e-4)
+
+    def test_short_paths(self, full):
+        assert full.replace({"frequency": 0.6}) == full.replace({"excitations.0.frequency": 0.6})
+        assert full.replace(frequency=0.6).natural_frequency == full.natural_frequency
+        assert full.replace({"1.position": -0.6}) == full.replace({"barriers.1.position": -0.6})
+        assert full.replace({"law.stiffness": 60.0, "c": 0.4}).parameters["noise.c"] == 0.4
+        assert full.entry("frequency").path == "excitations.0.frequency"
+        assert full.entry("natural_frequency").value == 1.0
+
+    def test_a_full_path_is_never_short_for_another(self):
+        osc = scene(harmonic(2.0), spring=vk.CustomSpring("damping_ratio*x", damping_ratio=3.0))
+        assert osc.entry("damping_ratio").value == 0.01
+        assert osc.replace({"spring.damping_ratio": 4.0}).damping_ratio == 0.01
+
+    def test_ambiguous_paths_are_refused_with_all_that_match(self, full):
+        with pytest.raises(ParameterError) as refused:
+            full.replace(position=0.25)
+        assert "'position' matches 2 parameters, barriers.0.position, barriers.1.position;" in str(refused.value)
+        many = scene(*(harmonic(float(k)) for k in range(1, 40)))
+        with pytest.raises(ParameterError) as refused:
+            many.entry("amplitude")
+        assert all(f"excitations.{k}.amplitude" in str(refused.value) for k in range(39))
+
     @pytest.mark.parametrize(
-        ("path", "said"),
+        ("changes", "more", "path"),
         [
-            ("excitations.0.freqency", "the nearest is 'excitations.0.frequency'"),
-            ("barriers.7.position", "the nearest is 'barriers.1.position'"),
-            ("barriers", "."),
-            ("barriers.0.side", "."),
-            ("", "there are "),
-            (3, "there are "),
-            ("x" * 10000, "there are "),
+            ({"frequency": 0.6, "excitations.0.frequency": 0.7}, {}, "excitations.0.frequency"),
+            ({"noise.intensity": 1e-4}, {"intensity": 1e-4}, "noise.intensity"),
+            ({"damping_ratio": 0.1}, {"damping_ratio": 0.2}, "damping_ratio"),
         ],
     )
-    def test_unknown_paths(self, full, path, said):
+    def test_one_parameter_given_twice(self, full, changes, more, path):
+        with pytest.raises(ParameterError, match=f"{path} is given 2 times"):
+            full.replace(changes, **more)
+
+    @pytest.mark.parametrize(
+        ("path", "value"),
+        [
+            ("excitations.0.freqency", "the nearest is 'excitations.0.frequency'"),
+            ("freqency", "the nearest is 'excitations.0.frequency'"),
+            ("stifness", "the nearest is 'barriers.0.law.stiffness'"),
+            ("barriers.7.position", "the nearest is 'barriers.1.position'"),
+            ("atural_frequency", "the nearest is 'natural_frequency'"),
+            ("equency", "the nearest is 'excitations.0.frequency'"),
+            ("barriers.0.side", "'barriers.0.side'"),
+            ("side", "'side'"),
+            ("", "natural_frequency, "),
+            (".", "natural_frequency, "),
+            (3, "natural_frequency, "),
+            ("x" * 10000, "natural_frequency, "),
+        ],
+    )
+    def test_unknown_paths(self, full, path, value):
         with pytest.raises(ParameterError) as refused:
             full.replace({path: 1.0})
         message = str(refused.value)
-        assert message.startswith("scene has no parameter ")
-        assert said in message
+        assert value in message
         assert message.endswith(".")
         assert len(message) < 600
 
+    @pytest.mark.parametrize("field", ["barriers", "excitations", "noise", "spring"])
+    def test_fields_are_checked(self, full, field):
+        with pytest.raises(SceneError, match=f"scene: {field} "):
+            full.replace(**{field: 1.0})
+
     def test_replaced_values_are_checked(self, full):
-        with pytest.raises(ParameterError, match="Hertz: stiffness is -1; give a finite number at least 0"):
+        with pytest.raises(ParameterError, match="Hertz: stiffness must be a finite number at least 0, got -1"):
             full.replace({"barriers.0.law.stiffness": -1.0})
 
     def test_values(self, full):
@@ -211,7 +273,9 @@ def test_a_period_is_a_positive_number(period):
         def period(self):
             return period
 
-    with pytest.raises(SceneError, match=r"^scene: excitations\.0, a Strange, has the period .*; give a positive.*\.$"):
+    with pytest.raises(
+        SceneError, match=r"^scene: the period of excitations\.0 \(Strange\) must be a positive .*, got "
+    ):
         scene(Strange())
 
 

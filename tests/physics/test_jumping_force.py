@@ -8,7 +8,7 @@ import pytest
 import vibrokit as vk
 from vibrokit.errors import DerivationError, StepperError
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.structure.orbits import section_derivative
+from vibrokit.structure.linear_map import linear_map
 from vibrokit.symbolic.flow_kind import Flow
 
 LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
@@ -30,7 +30,7 @@ def kelvin_voigt(adhesive=False, noise=None):
 def test_derivatives_are_those_of_the_map(stepper, adhesive):
     osc = kelvin_voigt(adhesive)
     start = np.array([0.3, 0.5])
-    _, derivative = section_derivative(osc, start, 1, stepper)
+    (derivative,) = linear_map(osc, start[None], stepper).derivatives
     step = 1e-5
     moved = start + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
     images = osc.section_map(moved, 1, stepper=stepper)
@@ -61,7 +61,7 @@ def test_steady_states_are_found():
 
 def test_fixed_steps_refuse_derivatives():
     with pytest.raises(StepperError, match="FreeFlight or Order8"):
-        section_derivative(kelvin_voigt(), np.array([0.3, 0.5]), 1, vk.RK4())
+        linear_map(kelvin_voigt(), np.array([[0.3, 0.5]]), vk.RK4())
 
 
 @pytest.mark.parametrize("formula", ["1/depth", "-log(depth)"])
@@ -69,7 +69,7 @@ def test_a_force_without_bound_is_refused(formula):
     osc = vk.Oscillator(
         natural_frequency=1.0, damping_ratio=0.01, barriers=(vk.Barrier(vk.CustomLaw(formula), 0.0, "right"),)
     )
-    with pytest.raises(DerivationError, match="no bound at first touch"):
+    with pytest.raises(DerivationError, match="unbounded at first touch"):
         osc.trajectory((0.0, 0.5), duration=1.0)
 
 

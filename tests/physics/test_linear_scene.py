@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.quasi_potential import local_potential
+from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.structure.orbits import refine_orbit
 
 STEPPERS = [vk.RK4(steps=8192), vk.Order8(tolerance=1e-14), vk.FreeFlight(tolerance=1e-14)]

@@ -11,6 +11,8 @@ from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.symbolic.flow_kind import Flow
 
+pytestmark = pytest.mark.slow
+
 LEVELS = (16, 32, 64, 128, 256)
 
 

@@ -8,6 +8,8 @@ import pytest
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import blended, known_sections, pieced
 
+pytestmark = pytest.mark.slow
+
 COARSE = 96  # elements a period; elements at the stops are 40 times shorter
 
 

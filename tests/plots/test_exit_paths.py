@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from vibrokit.errors import VibrokitError
 from vibrokit.plots.axes import colour
 from vibrokit.plots.exit_paths import exit_paths, path_history
 from vibrokit.plots.quasi_potential import quasi_potential_map
-from vibrokit.results.energy import ActivationEnergy, ExitPath
-from vibrokit.results.path_pictures import plot_exit_paths
+from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
+from vibrokit.results.result import Result
 from vibrokit.results.section import Section
 
 BOX = ((-1.0, 1.0), (-0.5, 0.5))
@@ -28,24 +29,20 @@ def names(axes):
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
-def drawn(artists, colour_of):
-    """Lines of a colour that are no markers of attractors."""
-    return [line for line in artists if getattr(line, "get_color", lambda: None)() == colour_of]
-
-
 def test_a_path_is_joined_point_by_point():
-    artists = exit_paths(LABELS, BOX, [[[0.0, 0.0]], [[0.5, 0.0]]], [LONG], sources=[0], names=["the way out"])
-    _, strand = drawn(artists, colour(0))[:2]
+    two = [[[0.0, 0.0]], [[0.5, 0.0]]]
+    artists = exit_paths(LABELS, BOX, two, [LONG], sources=[0], titles=["a path"], names=["clear", "hammering"])
+    ((strand,),) = artists.strands
     np.testing.assert_array_equal(strand.get_xydata(), LONG)
-    assert strand.get_linestyle() == "-"
-    *_, start, end = artists
+    assert (strand.get_linestyle(), strand.get_color()) == ("-", colour(0))
+    (start,), (end,) = artists.starts, artists.ends
     np.testing.assert_array_equal(start.get_xydata(), LONG[:1])
     np.testing.assert_array_equal(end.get_xydata(), LONG[-1:])
     assert start.get_marker() != end.get_marker()
-    assert names(strand.axes) == [
-        "attractor 0",
-        "attractor 1",
-        "the way out",
+    assert names(artists.ax) == [
+        "clear",
+        "hammering",
+        "a path",
         "not settled",
         "start of a path",
         "end of a path",
@@ -54,19 +51,19 @@ def test_a_path_is_joined_point_by_point():
 
 def test_a_path_from_an_orbit_of_period_four_is_four_strands():
     artists = exit_paths(LABELS, BOX, [FOUR], [LONG], sources=[0])
-    strands = drawn(artists, colour(0))[1:5]
+    (strands,) = artists.strands
+    assert len(strands) == 4
     for first, strand in enumerate(strands):
         np.testing.assert_array_equal(strand.get_xydata(), LONG[first::4])
-    assert [name for name in names(artists[-1].axes) if "exit path" in name] == ["exit path from 0"]
+    assert [name for name in names(artists.ax) if "exit path" in name] == ["exit path from attractor 0"]
 
 
 def test_a_path_given_all_along_is_a_line_without_dots():
-    artists = exit_paths(LABELS, BOX, [FOUR], [LONG, -LONG], sources=[0, 0], names=["a", "b"], curves=[True, False])
-    by_name = {artist.get_label(): artist for artist in artists}
-    np.testing.assert_array_equal(by_name["a"].get_xydata(), LONG)
-    assert by_name["a"].get_marker() == ""
-    np.testing.assert_array_equal(by_name["b"].get_xydata(), -LONG[::4])
-    assert by_name["b"].get_marker() == "o"
+    a, b = exit_paths(LABELS, BOX, [FOUR], [LONG, -LONG], sources=[0, 0], curves=[True, False]).strands
+    np.testing.assert_array_equal(a[0].get_xydata(), LONG)
+    assert (len(a), a[0].get_marker()) == (1, "")
+    np.testing.assert_array_equal(b[0].get_xydata(), -LONG[::4])
+    assert (len(b), b[0].get_marker()) == (4, "o")
 
 
 @pytest.mark.parametrize(("swing", "shown"), [(0.0, 41), (0.3, 5)])
@@ -75,37 +72,36 @@ def test_paths_from_rest_are_shown_whole_and_others_on_the_section(swing, shown)
     x = np.exp(2 * (t - 4.0)) + swing * np.sin(2 * np.pi * t)
     q = np.stack([x, np.gradient(x, t)], axis=1)
     path = ExitPath(t, q, 0 * q, t, np.arange(0, 41, 10))
-    energy = ActivationEnergy(0, 1, 1.0, 1.0, 1.0, "least action", 0.0, path)
-    data = Section(LABELS.astype(np.int16), np.array(BOX), (FOUR[:1], FOUR[1:2])).data
-    artists = plot_exit_paths(data, [energy])
-    (line,) = [artist for artist in artists if artist.get_label().startswith("path 0 → 1")]
+    energy = ActivationEnergy(0, 1, 1.0, 1.0, 1.0, "least action", Bound.UPPER, path=path)
+    section = Section(LABELS.astype(np.int16), np.array(BOX), (FOUR[:1], FOUR[1:2]), ("rest", "hammering"))
+    ((line,),) = Result(energies=(energy,), section=section, scene={}).plot().strands
+    assert line.get_label().startswith("rest → hammering, ")
     np.testing.assert_array_equal(line.get_xydata(), q if swing == 0 else q[path.section])
     assert len(line.get_xydata()) == shown
 
 
 def test_a_path_from_chaos_is_dots():
     artists = exit_paths(LABELS, BOX, [CROWD], [LONG], sources=[0])
-    _, dots = drawn(artists, colour(0))[:2]
+    ((dots,),) = artists.strands
     np.testing.assert_array_equal(dots.get_xydata(), LONG)
     assert dots.get_linestyle() == "None"
 
 
 def test_saddles_and_manifolds_lie_under_the_path():
     artists = exit_paths(LABELS, BOX, [FOUR], [LONG], sources=[0], saddles=[SADDLE], chaotic=[CROWD], stable=[MANIFOLD])
-    axes = artists[0].axes
-    assert (axes.get_xlim(), axes.get_ylim()) == BOX
-    by_name = {artist.get_label(): artist for artist in artists}
-    np.testing.assert_allclose(by_name["stable manifold"].get_xydata(), [[0.9, -0.5], [0.9, 0.5]])
-    np.testing.assert_array_equal(by_name["saddle"].get_xydata(), SADDLE)
-    np.testing.assert_array_equal(by_name["chaotic saddle"].get_xydata(), CROWD)
-    assert by_name["stable manifold"].get_zorder() < by_name["exit path from 0"].get_zorder()
+    assert (artists.ax.get_xlim(), artists.ax.get_ylim()) == BOX
+    (manifold,), (saddle, chaotic) = artists.section.stable, artists.section.saddles
+    np.testing.assert_allclose(manifold.get_xydata(), [[0.9, -0.5], [0.9, 0.5]])
+    np.testing.assert_array_equal(saddle.get_xydata(), SADDLE)
+    np.testing.assert_array_equal(chaotic.get_xydata(), CROWD)
+    assert (saddle.get_label(), chaotic.get_label()) == ("saddle", "chaotic saddle")
+    assert manifold.get_zorder() < artists.strands[0][0].get_zorder()
 
 
 def test_two_ways_out_of_one_attractor_look_different():
     two = [FOUR[:1], FOUR[1:2]]
-    artists = exit_paths(LABELS, BOX, two, [LONG, -LONG, LONG], sources=[0, 0, 1], names=["a", "b", "c"])
-    by_name = {artist.get_label(): artist for artist in artists}
-    a, b, c = (by_name[name] for name in "abc")
+    artists = exit_paths(LABELS, BOX, two, [LONG, -LONG, LONG], sources=[0, 0, 1])
+    (a,), (b,), (c,) = artists.strands
     assert a.get_color() == b.get_color() != c.get_color()
     assert a._dash_pattern != b._dash_pattern
 
@@ -115,7 +111,7 @@ def test_the_legend_is_outside_of_the_picture(tmp_path):
     axes = figure.subplots(1, 2)
     drawings = [None, axes[0]]
     for ax in drawings:
-        own = exit_paths(LABELS, BOX, [FOUR], [LONG], sources=[0], ax=ax)[0].axes
+        own = exit_paths(LABELS, BOX, [FOUR], [LONG], sources=[0], ax=ax).ax
         own.get_figure().savefig(tmp_path / "p.png", dpi=60)
         box, legend = own.get_window_extent(), own.get_legend().get_window_extent()
         assert not box.overlaps(legend.padded(-1))
@@ -123,18 +119,23 @@ def test_the_legend_is_outside_of_the_picture(tmp_path):
 
 def test_without_paths_the_section_is_drawn():
     artists = exit_paths(np.full((2, 2), -1), BOX, [])
-    assert names(artists[0].axes) == ["not settled"]
-    empty = exit_paths(LABELS, BOX, [FOUR], [np.empty((0, 2))], sources=[0])
-    assert empty
+    assert names(artists.ax) == ["not settled"]
+    assert artists.strands == artists.starts == ()
+    (strands,) = exit_paths(LABELS, BOX, [FOUR], [np.empty((0, 2))], sources=[0]).strands
+    assert [len(strand.get_xydata()) for strand in strands] == [0, 0, 0, 0]
 
 
 def test_histories_carry_momentum_action_and_section_points():
-    line, dots, action, action_dots = path_history([HISTORY], sources=[1], names=["out"], period=2.0)
+    artists = path_history([HISTORY], sources=[1], titles=["out"], period=2.0)
+    (line,), (dots,), (action,), (action_dots,) = (
+        artists.momenta, artists.momentum_points, artists.actions, artists.action_points,
+    )  # fmt: skip
     np.testing.assert_array_equal(line.get_xydata(), np.stack([TIME / 2, HISTORY[1]], axis=1))
     np.testing.assert_array_equal(dots.get_xdata(), np.arange(21))
     np.testing.assert_array_equal(action.get_ydata(), ACTION)
     np.testing.assert_array_equal(action_dots.get_ydata(), ACTION[::20])
-    upper, lower = line.axes, action.axes
+    upper, lower = artists.ax, action.axes
+    assert line.axes is upper
     assert upper.get_ylabel() == r"momentum $p_2$ (m s$^{-2}$)"
     assert lower.get_ylabel() == r"action $S$ (m$^2$ s$^{-3}$)"
     assert "T" in lower.get_xlabel()
@@ -145,22 +146,24 @@ def test_histories_carry_momentum_action_and_section_points():
 
 
 def test_the_time_axis_begins_where_the_action_does():
-    line, *_ = path_history([HISTORY])
-    low, high = line.axes.get_xlim()
+    artists = path_history([HISTORY])
+    low, high = artists.ax.get_xlim()
     begins = 40 - np.log(1e4) / 0.5
     assert begins - 3 < low < begins < 40 < high < 43
-    assert "(s)" in line.get_figure().axes[1].get_xlabel()
+    assert "(s)" in artists.figure.axes[1].get_xlabel()
 
 
 def test_each_path_has_its_own_panels():
-    artists = path_history([HISTORY, HISTORY], sources=[0, 1])
-    assert len({artist.axes for artist in artists}) == 4
-    figure = Figure()
-    axes = figure.subplots(2, 2)
-    own = path_history([HISTORY, HISTORY], ax=axes)
-    assert {artist.axes for artist in own} == set(axes.ravel())
+    def panels(artists):
+        return {line.axes for line in (*artists.momenta, *artists.actions)}
+
+    assert len(panels(path_history([HISTORY, HISTORY], sources=[0, 1]))) == 4
+    axes = Figure().subplots(2, 2)
+    assert panels(path_history([HISTORY, HISTORY], ax=axes)) == set(axes.ravel())
     single = Figure().subplots(2)
-    assert {artist.axes for artist in path_history([HISTORY], ax=single)} == set(single)
+    assert panels(path_history([HISTORY], ax=single)) == set(single)
+    with pytest.raises(VibrokitError, match=r"ax has 1 axes; give an array of shape \(2, 2\)"):
+        path_history([HISTORY, HISTORY], ax=Figure().add_subplot())
 
 
 # Quasi-potential
@@ -174,9 +177,13 @@ def potential(shape=(40, 30)):
 def test_the_quasi_potential_lies_where_it_belongs():
     psi = potential()
     psi[:5] = np.inf
-    image, levels, point, saddle, path = quasi_potential_map(
-        psi, BOX, FOUR[:1], saddles=[SADDLE], paths=[LONG], top=0.5
+    artists = quasi_potential_map(
+        psi, BOX, FOUR[:1], label=1, names=["clear", "hammering"], saddles=[SADDLE], paths=[LONG], top=0.5
     )
+    image, levels, point, (saddle,), (path,) = (
+        artists.image, artists.contours, artists.attractor, artists.saddles, artists.paths,
+    )  # fmt: skip
+    assert names(artists.ax) == ["hammering", "saddle", "exit path"]
     assert image.get_extent() == [-1, 1, -0.5, 0.5]
     np.testing.assert_array_equal(image.get_array().mask.T, np.isinf(psi))
     np.testing.assert_array_equal(image.get_array().filled(np.inf).T, psi)
@@ -191,8 +198,9 @@ def test_the_quasi_potential_lies_where_it_belongs():
 
 @pytest.mark.parametrize("psi", [np.full((3, 3), np.inf), np.zeros((3, 3)), np.ones((1, 4))])
 def test_flat_and_unknown_potentials_are_drawn(psi, tmp_path):
-    image, *_ = quasi_potential_map(psi, BOX, FOUR)
-    image.get_figure().savefig(tmp_path / "p.png", dpi=40)
+    artists = quasi_potential_map(psi, BOX, FOUR)
+    assert artists.contours is None
+    artists.figure.savefig(tmp_path / "p.png", dpi=40)
 
 
 def test_no_window_is_ever_opened():

@@ -1,3 +1,4 @@
+import dataclasses
 import subprocess
 import sys
 
@@ -8,11 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from vibrokit.plots import basins as cells
+from vibrokit.plots.actions import action_map, action_plot
 from vibrokit.plots.axes import COLOURS, colour
 from vibrokit.plots.basins import STABLE, UNSTABLE, basin_map, section_portrait
 from vibrokit.plots.bifurcation import basin_fractions, bifurcation_diagram
 from vibrokit.plots.clipping import clipped
-from vibrokit.plots.portraits import steady_motions
+from vibrokit.plots.portraits import phase_portrait, steady_motions
 from vibrokit.results import basins as records
 
 BOX = ((-1.0, 1.0), (-0.5, 0.5))
@@ -82,12 +84,16 @@ def test_cells_have_the_same_labels_as_in_the_records():
 
 
 def test_basins_carry_labels_and_points():
-    image, clear, hammering = basin_map(LABELS, BOX, POINTS)
+    artists = basin_map(LABELS, BOX, POINTS)
+    image, (clear, hammering) = artists.image, artists.attractors
+    assert artists.hatching is None
     np.testing.assert_array_equal(image.get_array(), LABELS.T)
     assert image.get_extent() == [-1, 1, -0.5, 0.5]
     np.testing.assert_array_equal(clear.get_xydata(), [[0.2, 0.1]])
     np.testing.assert_array_equal(hammering.get_xydata(), POINTS[1])
     assert [clear.get_label(), hammering.get_label()] == ["attractor 0", "attractor 1"]
+    called = basin_map(LABELS, BOX, POINTS, names=["clear", "hammering"]).attractors
+    assert [marker.get_label() for marker in called] == ["clear", "hammering"]
     assert (image.axes.get_xlabel(), image.axes.get_ylabel()) == (X_LABEL, V_LABEL)
 
 
@@ -95,7 +101,8 @@ def test_cells_of_every_label_look_different():
     labels = np.arange(-3, 20)[:, None]
     box = ((-3.5, 19.5), (0, 1))
     points = [[[k, 0.5]] for k in range(20)]
-    image, under, *markers = basin_map(labels, box, points)
+    artists = basin_map(labels, box, points)
+    image, under, markers = artists.image, artists.hatching, artists.attractors
     shown = [pixel(image, (label, 0.5)) for label in range(-3, 20)]
     assert len(set(shown)) == len(shown)
     for label, marker in enumerate(markers):  # basins are pale versions of their attractors' colours
@@ -116,18 +123,18 @@ def test_twenty_attractors_have_twenty_colours():
 
 
 def test_hatching_is_drawn_only_where_motion_leaves():
-    assert len(basin_map(LABELS, BOX, POINTS)) == 3
-    assert len(basin_map(np.where(LABELS == 0, -2, 1), BOX, POINTS)) == 4
+    assert basin_map(LABELS, BOX, POINTS).hatching is None
+    assert basin_map(np.where(LABELS == 0, -2, 1), BOX, POINTS).hatching.get_hatch()
 
 
 def test_kinds_choose_markers():
     kinds = ("periodic", "equilibrium", "limit cycle", "chaotic", "quasiperiodic")
-    _, *markers = basin_map(np.zeros((2, 2)), BOX, [[[0.0, 0.0]]] * 5, kinds=kinds)
+    markers = basin_map(np.zeros((2, 2)), BOX, [[[0.0, 0.0]]] * 5, kinds=kinds).attractors
     assert [marker.get_marker() for marker in markers] == ["o", "s", "D", "o", "o"]
     assert markers[3].get_markersize() < markers[0].get_markersize() / 2
-    _, _, _, *saddles = section_portrait(
+    saddles = section_portrait(
         LABELS, BOX, POINTS, saddles=[[[0, 0]]] * 4, saddle_kinds=("saddle", "flip saddle", "repeller", "chaotic")
-    )
+    ).saddles
     assert [saddle.get_marker() for saddle in saddles] == ["X", "P", "^", "o"]
     assert names(saddles[0].axes)[2:] == ["saddle", "flip saddle", "repeller", "chaotic saddle"]
 
@@ -139,7 +146,7 @@ def test_the_portrait_carries_saddles_and_clipped_manifolds():
     artists = section_portrait(
         LABELS, BOX, POINTS, kinds=("periodic", "chaotic"), saddles=[saddle], stable=[across, along], unstable=[along]
     )
-    _, _, _, stable, more, unstable, cross = artists
+    (stable, more), (unstable,), (cross,) = artists.stable, artists.unstable, artists.saddles
     np.testing.assert_allclose(stable.get_xydata(), [[-1, 0], [0, 0.1], [1, 0.2]], atol=1e-15)
     np.testing.assert_array_equal(more.get_xydata(), along)
     np.testing.assert_array_equal(unstable.get_xydata(), along)
@@ -155,14 +162,20 @@ def test_the_portrait_carries_saddles_and_clipped_manifolds():
 
 def test_the_legend_names_cells_without_attractor():
     labels = np.array([[-1, -2], [-3, 0]])
-    image, *_ = section_portrait(labels, BOX, POINTS[:1])
-    assert names(image.axes) == ["attractor 0", "not settled", "leaves the region", "not followed"]
+    artists = section_portrait(labels, BOX, POINTS[:1])
+    assert names(artists.ax) == ["attractor 0", "not settled", "leaves the region", "not followed"]
 
 
 def test_a_region_without_attractors_is_drawn():
-    image, *rest = section_portrait(np.full((3, 4), -1), BOX, [])
-    assert rest == []
-    assert names(image.axes) == ["not settled"]
+    artists = section_portrait(np.full((3, 4), -1), BOX, [])
+    assert (artists.hatching, artists.attractors, artists.saddles) == (None, (), ())
+    assert names(artists.ax) == ["not settled"]
+
+
+def test_limit_cycles_are_curves_in_the_colour_of_their_attractor():
+    (cycle,) = section_portrait(LABELS, BOX, POINTS, cycles={1: SMALL}).cycles
+    np.testing.assert_array_equal(cycle.get_xydata(), SMALL)
+    assert cycle.get_color() == colour(1)
 
 
 # Steady motions
@@ -174,7 +187,8 @@ LARGE = np.stack([0.6 * np.cos(ANGLE), 0.6 * np.sin(ANGLE)], axis=1)
 
 def test_steady_motions_carry_orbits_section_points_and_stops():
     artists = steady_motions([SMALL, LARGE], [SMALL[:1], LARGE[:2]], stops=[(0.5, "right"), (-0.7, "left")])
-    small, small_points, large, large_points, right, right_wall, left, left_wall = artists
+    (small, large), (small_points, large_points) = artists.orbits, artists.points
+    (right, left), (right_wall, left_wall) = artists.stops, artists.walls
     np.testing.assert_array_equal(small.get_xydata(), SMALL)
     np.testing.assert_array_equal(small_points.get_xydata(), SMALL[:1])
     np.testing.assert_array_equal(large.get_xydata(), LARGE)
@@ -193,13 +207,14 @@ def test_steady_motions_carry_orbits_section_points_and_stops():
 
 def test_equilibria_are_not_blown_up_to_their_rounding():
     rest = np.array([[1.0, 2e-16], [1.0, 1e-16]])
-    line, *_ = steady_motions([rest, -rest], [rest[:1], -rest[:1]], names=["one", "other"])
-    assert np.diff(line.axes.get_ylim()) > 0.1
-    assert names(line.axes) == ["one", "other"]
+    axes = steady_motions([rest, -rest], [rest[:1], -rest[:1]], names=["one", "other"]).ax
+    assert np.diff(axes.get_ylim()) > 0.1
+    assert names(axes) == ["one", "other"]
 
 
 def test_walls_where_nothing_moves():
-    face, wall = steady_motions([], [], stops=[(0.0, "left")])
+    artists = steady_motions([], [], stops=[(0.0, "left")])
+    (face,), (wall,) = artists.stops, artists.walls
     assert face.get_xdata()[0] == 0
     assert wall.get_width() > 0
 
@@ -210,7 +225,8 @@ def test_walls_where_nothing_moves():
 def test_the_bifurcation_diagram_carries_points_and_marks():
     values, x, branches = [1.0, 1.0, 2.0, 3.0], [0.1, 0.5, 0.2, 0.3], [0, 4, 0, 0]
     marks = [("grazing", 1.5, 0.15), ("fold", 2.5, 0.25), ("grazing", 2.8, np.nan), ("grazing", 2.9, np.nan)]
-    first, other, grazing, at, also, fold = bifurcation_diagram(values, x, branches, marks, label=FREQUENCY)
+    artists = bifurcation_diagram(values, x, branches, marks, label=FREQUENCY)
+    (first, other), (grazing, at, also, fold) = artists.branches, artists.marks
     np.testing.assert_array_equal(first.get_xydata(), [[1, 0.1], [2, 0.2], [3, 0.3]])
     np.testing.assert_array_equal(other.get_xydata(), [[1, 0.5]])
     assert (first.get_color(), other.get_color()) == (colour(0), colour(4))
@@ -225,9 +241,11 @@ def test_the_bifurcation_diagram_carries_points_and_marks():
 
 
 def test_a_kind_that_is_new_has_a_marker_and_a_name():
-    line = bifurcation_diagram([1.0], [0.0], [0], [("crisis", 1.0, 0.0), ("unheard of", 2.0, 0.0)], label="k (1)")
-    assert line[1].get_marker() != line[2].get_marker()
-    assert names(line[0].axes) == ["branch 0", "crisis", "unheard of"]
+    marks = [("crisis", 1.0, 0.0), ("unheard of", 2.0, 0.0)]
+    artists = bifurcation_diagram([1.0], [0.0], [0], marks, label="k (1)")
+    first, second = artists.marks
+    assert first.get_marker() != second.get_marker()
+    assert names(artists.ax) == ["branch 0", "crisis", "unheard of"]
 
 
 def heights(area, value):
@@ -238,8 +256,8 @@ def heights(area, value):
 
 
 def test_fractions_are_stacked():
-    areas = basin_fractions([3, 1, 2], [[0.5, 0.25, 0.5], [np.nan, 0.5, 0.25]], ["a", "b"], label=FREQUENCY)
-    a, b, rest = areas
+    artists = basin_fractions([3, 1, 2], [[0.5, 0.25, 0.5], [np.nan, 0.5, 0.25]], ["a", "b"], label=FREQUENCY)
+    (a, b), rest = artists.areas, artists.remainder
     assert [heights(a, value) for value in (1, 2, 3)] == [(0, 0.25), (0, 0.5), (0, 0.5)]
     assert [heights(b, value) for value in (1, 2, 3)] == [(0.25, 0.75), (0.5, 0.75), (0.5, 0.5)]
     assert [heights(rest, value) for value in (1, 2, 3)] == [(0.75, 1), (0.75, 1), (0.5, 1)]
@@ -250,20 +268,62 @@ def test_fractions_are_stacked():
 
 def test_a_gap_where_nothing_is_known():
     nan = np.nan
-    areas = basin_fractions([1, 2, 3, 4, 5], [[0.5, 0.5, nan, 0.5, nan]] * 2, ["a", "b"], label=FREQUENCY)
-    assert len(areas) == 2
-    for area in areas:
+    artists = basin_fractions([1, 2, 3, 4, 5], [[0.5, 0.5, nan, 0.5, nan]] * 2, ["a", "b"], label=FREQUENCY)
+    assert artists.remainder is None
+    for area in artists.areas:
         assert np.unique(np.concatenate([path.vertices[:, 0] for path in area.get_paths()])).tolist() == [1, 2, 4]
 
 
 def test_a_diagram_without_points_is_drawn():
-    assert bifurcation_diagram([], [], [], [], label=FREQUENCY) == []
+    artists = bifurcation_diagram([], [], [], [], label=FREQUENCY)
+    assert (artists.branches, artists.marks) == ((), ())
 
 
 def test_nothing_is_left_where_all_is_reached():
-    areas = basin_fractions([1, 2], [[0.9, 0.8], [0.1, 0.2]], ["a", "b"], label=FREQUENCY, branches=[3, 7])
-    assert len(areas) == 2
-    assert [tuple(area.get_facecolor()[0][:3]) for area in areas] == [to_rgba(colour(k))[:3] for k in (3, 7)]
+    artists = basin_fractions([1, 2], [[0.9, 0.8], [0.1, 0.2]], ["a", "b"], label=FREQUENCY, branches=[3, 7])
+    assert artists.remainder is None
+    assert [tuple(area.get_facecolor()[0][:3]) for area in artists.areas] == [to_rgba(colour(k))[:3] for k in (3, 7)]
+
+
+# Action plots
+
+ANGLES = [np.linspace(0, 6, 50), np.linspace(0, 6, 60)]
+RADII = [np.linspace(0, 1, 50), np.zeros(60)]
+ACTIONS = [1e-4 * (2 + np.cos(ANGLES[0])), 1e-3 * (2 + np.cos(ANGLES[1]))]
+ACTIONS[0][:5] = np.nan
+
+
+def test_actions_are_drawn_against_the_angle():
+    artists = action_plot(ANGLES, RADII, ACTIONS, labels=[2, 0], names=["a", "b"], energies=[(2, 1e-4), (0, 1e-3)])
+    for marks, angle, action in zip(artists.starts, ANGLES, ACTIONS, strict=True):
+        np.testing.assert_allclose(marks.get_xdata(), np.degrees(angle))
+        np.testing.assert_array_equal(marks.get_ydata(), action)
+    assert [marks.get_color() for marks in artists.starts] == [colour(2), colour(0)]
+    (least,) = artists.least  # the second search is a ring
+    finite = least.get_ydata()[np.isfinite(least.get_ydata())]
+    assert (finite.min(), len(finite)) == (np.nanmin(ACTIONS[0]), 45)
+    assert [line.get_ydata()[0] for line in artists.energies] == [1e-4, 1e-3]
+    assert "1.000 \\times 10^{-4}" in artists.numbers[0].get_text()
+    assert names(artists.ax) == ["leaving a", "leaving b"]
+    assert artists.ax.get_yscale() == "log"
+
+
+def test_the_map_of_actions_marks_the_least():
+    artists = action_map(ANGLES[0], RADII[0], ACTIONS[0], name="hammering")
+    assert len(artists.others.get_xydata()) == 5
+    best = int(np.nanargmin(ACTIONS[0]))
+    np.testing.assert_allclose(artists.best.get_xydata(), [[np.degrees(ANGLES[0][best]), RADII[0][best]]])
+    np.testing.assert_allclose(np.sort(artists.starts.get_array()), np.sort(ACTIONS[0][5:]))
+    assert artists.ax.get_title() == "leaving hammering"
+    assert "hammering" not in action_map(ANGLES[0], RADII[0], ACTIONS[0]).ax.get_title()
+
+
+def test_a_search_that_found_no_exit_is_drawn(tmp_path):
+    nothing = np.full(50, np.nan)
+    artists = action_map(ANGLES[0], RADII[0], nothing)
+    assert artists.best is None
+    assert action_plot([], [], [], labels=[], names=[]).starts == ()
+    action_plot(ANGLES[:1], RADII[:1], [nothing], labels=[0], names=["a"]).figure.savefig(tmp_path / "p.png", dpi=40)
 
 
 # All of them
@@ -273,6 +333,8 @@ PICTURES = {
     "section_portrait": lambda ax: section_portrait(LABELS, BOX, POINTS, stable=[SMALL], ax=ax),
     "steady_motions": lambda ax: steady_motions([SMALL], [SMALL[:1]], stops=[(0.5, "right")], ax=ax),
     "bifurcation_diagram": lambda ax: bifurcation_diagram([1], [2], [0], [("fold", 1, 2)], label="k (1)", ax=ax),
+    "phase_portrait": lambda ax: phase_portrait(SMALL[:, 0], SMALL[:, 1], stops=(0.5,), ax=ax),
+    "action_plot": lambda ax: action_plot(ANGLES, RADII, ACTIONS, labels=[0, 1], names=["a", "b"], ax=ax),
     "basin_fractions": lambda ax: basin_fractions([1, 2], [[0.5, 0.5]], ["a"], label="k (1)", ax=ax),
 }
 
@@ -282,16 +344,21 @@ def test_axes_that_are_given_are_drawn_into(draw, tmp_path):
     figure = Figure(layout="constrained")
     axes, other = figure.subplots(1, 2)
     artists = draw(axes)
-    assert artists
-    assert all(artist.axes is axes for artist in artists)
+    assert artists.ax is axes
+    assert artists.figure is figure
+    for field in dataclasses.fields(artists)[1:]:
+        part = getattr(artists, field.name)
+        for artist in part if isinstance(part, tuple) else [part]:
+            assert artist is None or getattr(artist, "axes", axes) is axes
     assert not other.has_data()
-    assert {artist.axes is axes for artist in draw(None)} == {False}
+    assert draw(None).ax is not axes
     figure.savefig(tmp_path / "p.png", dpi=50)
 
 
 def test_no_window_is_ever_opened():
     code = (
-        "import sys, vibrokit.plots.basins, vibrokit.plots.portraits, vibrokit.plots.bifurcation\n"
+        "import sys, vibrokit.plots.actions, vibrokit.plots.basins, vibrokit.plots.bifurcation\n"
+        "import vibrokit.plots.portraits, vibrokit.plots.trade\n"
         "assert not {'matplotlib.pyplot', 'vibrokit.results', 'numba', 'sympy'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

@@ -9,17 +9,19 @@ import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
 import vibrokit as vk
+from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.region import Region
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.grid import BasinGrid, classify_grid
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.settle import Settler, settle_grid
 
 PAPER_STATES = ((0.466551, 0.002566), (0.023582, -0.049071))
 
 
 def attractor(points, kind="periodic", orbit=None):
-    """A record with what a settler reads."""
+    """A record with what a classifier reads."""
     points = np.atleast_2d(points)
     none = np.empty(0, dtype=complex)
     return Attractor(
@@ -29,10 +31,10 @@ def attractor(points, kind="periodic", orbit=None):
     )  # fmt: skip
 
 
-def settler(osc, points, bounds, **changes):
+def classifier(osc, points, bounds, **changes):
     region = Region.of(bounds)
     settings = {"tolerance": 1e-3 * float(np.ptp(region.bounds, axis=1).min()), "budget": 700, "stepper": vk.RK4(256)}
-    return Settler(osc, [attractor(p) for p in points], region, **settings | changes)
+    return BasinClassifier(osc, [attractor(p) for p in points], region, **settings | changes)
 
 
 def far_from_others(labels, cells):
@@ -47,19 +49,19 @@ def duffing():
     carried = osc.section_map([[0.0, 0.0], [1.0, 1.0], [-2.0, 2.0], [3.0, 0.0]], 300)
     farthest = np.argmax(np.linalg.norm(carried - carried[0], axis=1))
     orbits = [refine_orbit(osc, carried[index], 1, vk.RK4(256)) for index in (0, farthest)]
-    return settler(osc, [orbit.point for orbit in orbits], ((-3, 3), (-3, 3)))
+    return classifier(osc, [orbit.point for orbit in orbits], ((-3, 3), (-3, 3)))
 
 
 @pytest.fixture(scope="module")
 def hertz():
     osc = vk.load_scene("hertz-0.570")
     orbits = [refine_orbit(osc, np.array(guess), 1, vk.RK4(256)) for guess in PAPER_STATES]
-    return settler(osc, [orbit.point for orbit in orbits], ((-1, 1), (-1, 1)))
+    return classifier(osc, [orbit.point for orbit in orbits], ((-1, 1), (-1, 1)))
 
 
 @pytest.fixture(scope="module")
 def wells():
-    return settler(vk.load_scene("double-well"), [(-1.0, 0.0), (1.0, 0.0)], ((-2, 2), (-2, 2)))
+    return classifier(vk.load_scene("double-well"), [(-1.0, 0.0), (1.0, 0.0)], ((-2, 2), (-2, 2)))
 
 
 # --- exact, or known from elsewhere
@@ -74,7 +76,7 @@ def test_duffing_fractions_are_those_of_two_other_codes(duffing):
 
 @pytest.mark.parametrize("margin", [None, 2])
 def test_the_double_well_is_symmetric_to_the_last_cell(wells, margin):
-    labels = settle_grid(wells, (100, 100), margin=margin).labels
+    labels = classify_grid(wells, (100, 100), margin=margin).labels
     np.testing.assert_array_equal(labels, 1 - labels[::-1, ::-1])
 
 
@@ -82,9 +84,9 @@ def test_a_softening_spring_lets_go_beyond_its_saddles():
     """x″ + 0.1x′ + x − x³ = 0: energy ¼ at the saddles x = ±1; it falls, so that below it the side decides."""
     spring = vk.CubicSpring(linear=1.0, cubic=-1.0)
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=spring)
-    escaping = settler(osc, [(0.0, 0.0)], ((-1.6, 1.6), (-1.2, 1.2)))
+    escaping = classifier(osc, [(0.0, 0.0)], ((-1.6, 1.6), (-1.2, 1.2)))
     for margin in (None, 2):
-        basins = settle_grid(escaping, (80, 80), margin=margin)
+        basins = classify_grid(escaping, (80, 80), margin=margin)
         x, v = basins.region.cell_centres((80, 80)).T
         low = 0.5 * v**2 + 0.5 * x**2 - 0.25 * x**4 < 0.25
         beyond = x * v > 0  # past the saddle and still going out, where the spring pushes it on
@@ -101,12 +103,12 @@ def circles():
     angles = np.linspace(0, 2 * np.pi, 401)
     circle = attractor((2.0, 0.0), "limit cycle", 2 * np.stack([np.cos(angles), -np.sin(angles)], axis=1))
     rest = attractor((0.0, 0.0), "equilibrium")
-    return Settler(osc, [rest, circle], Region((-2.5, 2.5), (-2.5, 2.5)), 5e-3, 300, vk.RK4(256))
+    return BasinClassifier(osc, [rest, circle], Region((-2.5, 2.5), (-2.5, 2.5)), 5e-3, 300, vk.RK4(256))
 
 
 @pytest.mark.parametrize("margin", [None, 2])
 def test_a_limit_cycle_is_reached_wherever_it_is_met(margin):
-    basins = settle_grid(circles(), (100, 100), margin=margin)
+    basins = classify_grid(circles(), (100, 100), margin=margin)
     radius = np.linalg.norm(basins.region.cell_centres((100, 100)), axis=1).reshape(100, 100)
     np.testing.assert_array_equal(basins.labels, (radius > 1).astype(int))
 
@@ -122,8 +124,8 @@ def test_chaos_is_told_from_the_orbit_beside_it():
     many = many[np.linalg.norm(many - orbit.point, axis=1) > 1e-3][:128]
     points = np.concatenate([many := osc.section_map(many) for _ in range(32)])
     region = Region((0.5, 4.5), (-7.0, 7.0))
-    found = Settler(osc, [attractor(orbit.point), attractor(points, "chaotic")], region, 4e-3, 500, vk.RK4(256))
-    for labels in (found.labels(region.cell_centres((40, 40))), settle_grid(found, (40, 40)).labels.ravel()):
+    found = BasinClassifier(osc, [attractor(orbit.point), attractor(points, "chaotic")], region, 4e-3, 500, vk.RK4(256))
+    for labels in (found.labels(region.cell_centres((40, 40))), classify_grid(found, (40, 40)).labels.ravel()):
         ends = osc.section_map(region.cell_centres((40, 40)), 1000)
         np.testing.assert_array_equal(labels, np.linalg.norm(ends - orbit.point, axis=1) > 1e-3)
         assert 0.01 < np.mean(labels == 0) < 0.5
@@ -135,7 +137,7 @@ def test_a_curve_that_is_crossed_is_not_reached():
     angles = np.random.default_rng(0).uniform(0, 2 * np.pi, 4096)
     circle = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     records = [attractor((0.0, 0.0), "equilibrium"), attractor(circle, "quasiperiodic")]
-    rest = Settler(osc, records, Region((-1, 1), (-1, 1)), 5e-3, 1000, vk.RK4(256))
+    rest = BasinClassifier(osc, records, Region((-1, 1), (-1, 1)), 5e-3, 1000, vk.RK4(256))
     assert (rest.labels(rest.region.cell_centres((20, 20))) == 0).all()
 
 
@@ -145,23 +147,23 @@ def test_a_curve_that_is_crossed_is_not_reached():
 @pytest.mark.parametrize("scene", ["duffing", "hertz"])
 def test_cells_that_share_agree_with_cells_followed_to_the_end(scene, request):
     follower = request.getfixturevalue(scene)
-    alone = settle_grid(follower, (150, 150), margin=None).labels
-    shared = settle_grid(follower, (150, 150), margin=2).labels
+    alone = classify_grid(follower, (150, 150), margin=None).labels
+    shared = classify_grid(follower, (150, 150), margin=2).labels
     far = far_from_others(alone, 3)
     assert far.mean() > 0.3
     assert np.mean((alone == shared)[far]) >= 0.999
     assert np.mean(alone == shared) >= 0.999  # thin tongues too
 
 
-def test_a_settler_with_a_grid_answers_as_one_without(duffing):
-    quick = duffing.sharing(settle_grid(duffing, (100, 100)), 2)
+def test_a_classifier_with_a_grid_agrees_with_one_without(duffing):
+    quick = duffing.sharing(classify_grid(duffing, (100, 100)), 2)
     states = np.random.default_rng(1).uniform(-4, 4, (500, 2))  # some start outside
     assert np.mean(quick.labels(states) == duffing.labels(states)) >= 0.998
 
 
 def test_refined_cells_agree_with_a_fine_grid(duffing):
-    refined = settle_grid(duffing, (60, 60), refine=2)
-    fine = settle_grid(duffing, (240, 240), margin=None).labels
+    refined = classify_grid(duffing, (60, 60), refine=2)
+    fine = classify_grid(duffing, (240, 240), margin=None).labels
     assert refined.labels.shape == (240, 240)
     assert np.mean(refined.labels == fine) >= 0.99
     assert np.mean((refined.labels == fine)[far_from_others(fine, 4)]) >= 0.999
@@ -171,26 +173,26 @@ def test_refined_cells_agree_with_a_fine_grid(duffing):
 
 
 def test_leaving_the_region_on_the_way_is_no_end(wells):
-    small = settler(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.3, 1.3), (-0.3, 0.3)), tolerance=wells.tolerance)
+    small = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.3, 1.3), (-0.3, 0.3)), tolerance=wells.tolerance)
     gone = wells.osc.section_map(small.region.cell_centres((30, 30)))
     assert np.mean(np.abs(gone[:, 1]) > 0.3) > 0.05  # some do leave
     states = small.region.cell_centres((30, 30))
     np.testing.assert_array_equal(small.labels(states), wells.labels(states))
-    quick = small.sharing(settle_grid(small, (60, 60)), 2)
+    quick = small.sharing(classify_grid(small, (60, 60)), 2)
     assert np.mean(quick.labels(states) == wells.labels(states)) >= 0.998
 
 
 def test_an_attractor_outside_the_region_is_found(wells):
-    left_only = settler(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.6, -0.4), (-0.5, 0.5)), tolerance=wells.tolerance)
-    labels = settle_grid(left_only, (40, 40)).labels
+    left_only = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.6, -0.4), (-0.5, 0.5)), tolerance=wells.tolerance)
+    labels = classify_grid(left_only, (40, 40)).labels
     states = left_only.region.cell_centres((40, 40))
     np.testing.assert_array_equal(labels.ravel(), wells.labels(states))
     assert set(labels.ravel()) == {0, 1}
 
 
 def test_too_small_a_budget_leaves_cells_unsettled(duffing):
-    short = settler(duffing.osc, [a.points for a in duffing.attractors], ((-3, 3), (-3, 3)), budget=3)
-    labels = settle_grid(short, (20, 20)).labels
+    short = classifier(duffing.osc, [a.points for a in duffing.attractors], ((-3, 3), (-3, 3)), budget=3)
+    labels = classify_grid(short, (20, 20)).labels
     assert set(labels.ravel()) <= {UNSETTLED, LEFT, 0, 1}
     assert np.mean(labels == UNSETTLED) > 0.8
     assert (short.labels(np.array([[40.0, 0.0]])) == LEFT).all()  # outside when the time is up
@@ -209,42 +211,60 @@ def test_states_between_sections_are_carried_to_the_next(duffing, share):
 # --- interruption, executors
 
 
-def test_ctrl_c_leaves_what_was_done(duffing):
-    whole = settle_grid(duffing, (240, 240))
+def interrupted(grid, calls):
+    """The labels of a grid whose work is interrupted at a call of its listener, and what the listener was told."""
+    seen = []
 
-    def interrupt(done, total):
-        assert 0 < done <= total
-        if done > 0.6 * total:
+    def listener(update):
+        seen.append(update)
+        if len(seen) == calls:
             raise KeyboardInterrupt
 
-    partial = settle_grid(duffing, (240, 240), progress=interrupt).labels
-    followed = partial != NOT_FOLLOWED
-    assert 0 < followed.mean() < 1
-    np.testing.assert_array_equal(partial[followed], whole.labels[followed])
+    with working(listener):
+        try:
+            grid.fill()
+        except KeyboardInterrupt:
+            assert len(seen) >= calls
+    return grid.basins.labels, seen
 
 
-def test_ctrl_c_while_refining_keeps_the_cells_taken_over(duffing):
-    def interrupt(done, total):
-        if done > 3600:  # beyond the first grid
-            raise KeyboardInterrupt
+def test_an_interrupt_leaves_what_was_done(duffing):
+    whole = classify_grid(duffing, (240, 240))
+    _, seen = interrupted(BasinGrid(duffing, (240, 240)), math.inf)
+    counts = []
+    for calls in np.linspace(1, len(seen), 7).astype(int):
+        partial, _ = interrupted(BasinGrid(duffing, (240, 240)), calls)
+        followed = partial != NOT_FOLLOWED
+        np.testing.assert_array_equal(partial[followed], whole.labels[followed])
+        counts.append(int(followed.sum()))
+    assert counts == sorted(counts)
+    assert counts[0] == 0
+    assert counts[-1] == 240**2
+    assert 0 < counts[-2] < 240**2
 
-    partial = settle_grid(duffing, (60, 60), refine=2, progress=interrupt).labels
+
+def test_an_interrupt_while_refining_keeps_the_other_cells(duffing):
+    _, seen = interrupted(BasinGrid(duffing, (60, 60), refine=2), math.inf)
+    first = next(n for n, update in enumerate(seen, start=1) if update.done > 60 * 60)
+    partial, _ = interrupted(BasinGrid(duffing, (60, 60), refine=2), first)
     assert partial.shape == (240, 240)
     assert 0 < np.mean(partial == NOT_FOLLOWED) < 0.7
 
 
 def test_progress_counts_every_cell(duffing):
-    seen = []
-    settle_grid(duffing, (80, 80), refine=1, progress=lambda done, total: seen.append((done, total)))
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    assert seen[-1] == (40 * 40 + 80 * 80 + 160 * 160,) * 2
+    _, seen = interrupted(BasinGrid(duffing, (80, 80), refine=1), math.inf)
+    total = 40 * 40 + 80 * 80 + 160 * 160
+    assert {(update.stage, update.unit, update.total) for update in seen} == {("basins", "cells", total)}
+    done = [update.done for update in seen]
+    assert done == sorted(done)
+    assert (done[0], done[-1]) == (0, total)
 
 
 def test_executors_carry_the_work_to_the_same_labels(duffing):
     points = [a.points for a in duffing.attractors]
-    expected = settle_grid(duffing, (70, 70)).labels
+    expected = classify_grid(duffing, (70, 70)).labels
     pools = (futures.ThreadPoolExecutor(2), futures.ProcessPoolExecutor(1, mp_context=get_context("spawn")))
     for pool in pools:
         with pool:
-            carried = settler(duffing.osc, points, ((-3, 3), (-3, 3)), executor=pool)
-            np.testing.assert_array_equal(settle_grid(carried, (70, 70)).labels, expected)
+            carried = classifier(duffing.osc, points, ((-3, 3), (-3, 3)), executor=pool)
+            np.testing.assert_array_equal(classify_grid(carried, (70, 70)).labels, expected)

@@ -13,6 +13,8 @@ from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.tracing.following import family_of, follow
 from vibrokit.symbolic.flow_kind import Flow
 
+pytestmark = pytest.mark.slow
+
 FREQUENCY, AMPLITUDE = "excitations.0.frequency", "excitations.0.amplitude"
 CLEAR, HAMMERING = (0.4666, 0.0026), (0.0236, -0.0491)  # of hertz-0.570
 

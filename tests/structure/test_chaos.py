@@ -1,34 +1,18 @@
-from typing import ClassVar
-
 import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import Coloured
 from vibrokit.errors import StructureError
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.structure.attractors.bands import pieces, separate
 from vibrokit.structure.attractors.lyapunov import LyapunovEstimate, kind_of, lyapunov_exponent, standard_error
 from vibrokit.structure.attractors.survival import fit_decay, watch
 
+pytestmark = pytest.mark.slow
+
 CLEAR = np.array([[0.448438, 0.001891]])  # the attractors of hertz-0.525 that repeat
 HAMMERING = np.array([[0.096614, -0.027017], [0.135228, -0.025599], [0.096896, -0.026171], [0.136309, -0.026357]])
-
-
-class Slow(vk.NoiseModel):
-    """Coloured noise with a state of its own, here without noise."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("r", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return self.rate
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y,)
 
 
 def starts(count, low, high, seed=0):
@@ -77,7 +61,7 @@ def test_the_exponent_of_three_states():
         natural_frequency=1.0,
         damping_ratio=0.2,
         excitations=(vk.Harmonic(amplitude=1.0, frequency=1.3),),
-        noise=Slow(intensity=0.0, rate=0.05),
+        noise=Coloured(intensity=0.0, rate=0.05),
     )
     found = lyapunov_exponent(osc, np.zeros((2, 3)), vk.RK4(256), periods=200, skipped=50)
     assert found.value == pytest.approx(-0.05, abs=1e-6)  # the slowest of −0.2 and −0.05
@@ -237,7 +221,7 @@ def test_watching_an_orbit_and_what_runs_away():
     survival, left, labels = watch(osc, states[::2], [], tolerance=1e-3, periods=30, stepper=vk.RK4(256))
     np.testing.assert_array_equal(labels, UNSETTLED)
     np.testing.assert_allclose(left, osc.section_map(states[::2], 30, stepper=vk.RK4(256)))
-    assert str(survival) == "2 of 2 starts had not settled after 30 periods (RK4(steps=256)), and none ever did"
+    assert str(survival) == "2 of 2 starts had not settled after 30 periods (RK4(steps=256)), and none ever settled"
 
 
 # --- hertz-0.525: a chaotic attractor beside a chaotic transient ---

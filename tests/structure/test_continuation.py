@@ -1,5 +1,6 @@
 import concurrent.futures
 import dataclasses
+import itertools
 import multiprocessing
 
 import numpy as np
@@ -9,14 +10,16 @@ from scipy.integrate import solve_ivp
 import vibrokit as vk
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.results.content import open_content
-from vibrokit.results.continuation_file import read_continuation
+from vibrokit.progress import OutOfTime
+from vibrokit.results.finding import Code
 from vibrokit.structure import continuation as module
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.continuation import continuation
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.tracing.branches import Tracing
 from vibrokit.symbolic.flow_kind import Flow
+
+pytestmark = pytest.mark.slow
 
 FREQUENCY = "excitations.0.frequency"
 QUICK = {"cells": (30, 30), "starts": (10, 10)}
@@ -33,9 +36,9 @@ def duffing():
 
 
 def same(first, second):
-    """Compare records to the last bit, but for the time that they took."""
+    """Compare records to the last bit, except for the time that they took."""
     if dataclasses.is_dataclass(first):
-        names = [field.name for field in dataclasses.fields(first) if field.name != "seconds"]
+        names = [field.name for field in dataclasses.fields(first) if field.name not in ("seconds", "stats")]
         return type(first) is type(second) and all(same(getattr(first, n), getattr(second, n)) for n in names)
     if isinstance(first, tuple):
         return len(first) == len(second) and all(map(same, first, second))
@@ -48,20 +51,15 @@ def same(first, second):
 def test_branches_keep_their_identity(paper):
     np.testing.assert_array_equal(paper.values, [0.565, 0.58, 0.595, 0.61])
     assert paper.complete
-    clear, hammering = (
-        next(
-            branch
-            for attractor, branch in zip(paper.states[0].attractors, paper.states[0].branches, strict=True)
-            if attractor.period == 1 and (attractor.impacts > 0) is hits
-        )
-        for hits in (False, True)
-    )
-    assert len(paper.branch(clear)) == len(paper.branch(hammering)) == 4
-    for value, attractor in paper.branch(clear):
+    assert {"clear", "hammering"} <= set(paper.branch_names)
+    assert len(paper.branch("clear")) == len(paper.branch("hammering")) == 4
+    for number, name in enumerate(paper.branch_names):
+        assert same(paper.branch(number), paper.branch(name))
+    for value, attractor in paper.branch("clear"):
         # Closed form of the linear response, displaced by the constant force.
         response = 0.18 / (1 - value**2 + 2j * 0.01 * value)
         np.testing.assert_allclose(attractor.points[0], [response.real + 0.2, (1j * value * response).real], atol=1e-9)
-    assert all(attractor.period == 1 and attractor.hits["right"] > 0 for _, attractor in paper.branch(hammering))
+    assert all(attractor.period == 1 and attractor.hits["right"] > 0 for _, attractor in paper.branch("hammering"))
 
 
 def test_basin_fractions_are_shares_of_one_region(paper):
@@ -103,7 +101,8 @@ def test_an_attractor_that_the_search_missed_is_found_from_its_neighbour(monkeyp
     assert len(at_middle) == 2
     kept, added = result.states[1].attractors
     np.testing.assert_allclose(added.points, at_middle[0].points, atol=1e-9)
-    assert "1 attractor was found from a neighbouring value" in result.status
+    (finding,) = result.found(Code.FOUND_BY_NEIGHBOUR)
+    assert finding.values["count"] == 1
     # Both codes that the basin fractions of this case are known from say 0.571 and 0.429 on this region.
     assert sorted([kept.basin_fraction, added.basin_fraction]) == pytest.approx([0.429, 0.571], abs=0.02)
 
@@ -147,15 +146,24 @@ def test_wells_meet_in_a_pitchfork():
 
 def test_processes_give_the_same_to_the_last_bit():
     osc, values = vk.load_scene("double-well"), [-1.0, -0.6]
-    seen = []
+    seen, serial_seen = [], []
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         parallel = continuation(
             osc, "spring.linear", values, cells=(20, 20), starts=(6, 6), executor=pool,
-            progress=lambda done, tasks: seen.append((done, tasks)),
+            progress=seen.append,
         )  # fmt: skip
-    serial = continuation(osc, "spring.linear", values, cells=(20, 20), starts=(6, 6))
+    serial = continuation(osc, "spring.linear", values, cells=(20, 20), starts=(6, 6), progress=serial_seen.append)
     assert same(serial, parallel)
-    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert parallel.stats.trajectories == serial.stats.trajectories > 0  # whichever process integrated them
+    totals = {"values": 2, "branches": 3, "basin fractions": 2}
+    for updates in (seen, serial_seen):
+        assert [name for name in dict.fromkeys(update.stage for update in updates) if name in totals] == list(totals)
+        for name, total in totals.items():
+            own = [update for update in updates if update.stage == name]
+            assert {update.total for update in own} == {total}
+            assert [update.done for update in own] == sorted(update.done for update in own)
+            assert own[-1].done == total
+            assert own[-1].finished
     assert len(serial.branches) == 2
     for value, attractor in serial.branch(0):
         assert abs(attractor.points[0, 0]) == pytest.approx(np.sqrt(-value), abs=1e-9)
@@ -163,32 +171,40 @@ def test_processes_give_the_same_to_the_last_bit():
 
 def test_saved_and_opened(paper, tmp_path):
     paper.save(tmp_path / "sweep.nc")
-    assert same(read_continuation(open_content(tmp_path / "sweep.nc")), paper)
+    assert same(vk.load_result(tmp_path / "sweep.nc"), paper)
 
 
 def test_pictures(paper):
-    axes = paper.plot()[0].axes
+    axes = paper.plot().ax
     assert "omega" in axes.get_xlabel()
-    assert len(paper.plot_fractions()) >= len(paper.branches)
+    assert len(paper.plot_fractions().areas) == len(paper.branches)
 
 
-def test_cells_that_lead_nowhere_are_told_once_at_each_value():
+def test_cells_without_an_attractor_are_one_finding_at_each_value():
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
     region = ((-1.5, 1.5), (-1.5, 1.5))
     result = continuation(osc, "damping_ratio", [0.1, 0.2], region=region, cells=(15, 15), starts=(6, 6))
-    assert [at.status.count("of the cells left the region.") for at in result.states] == [1, 1]
+    for at in result.states:
+        cells = {f.code: f.values["fraction"] for f in at.findings if f.code.value.startswith("cells-")}
+        assert len(cells) == sum(f.code.value.startswith("cells-") for f in at.findings)
+        assert cells[Code.CELLS_LEFT_REGION] > 0.1
+        assert sum(cells.values()) + sum(a.basin_fraction for a in at.attractors) == pytest.approx(1.0)
 
 
 def test_values_that_the_scene_refuses_stand_with_the_reason():
     result = continuation(vk.load_scene("duffing"), "damping_ratio", [-0.1, 0.0, 0.05], cells=(8, 8), starts=(6, 6))
     refused, undamped, damped = result.states
-    assert "at least 0" in refused.status
-    assert "no attractors" in undamped.status
+    for at, words in ((refused, "at least 0"), (undamped, "no attractors")):
+        (finding,) = at.findings
+        assert (finding.code, finding.values["value"]) == (Code.NOTHING_AT, at.value)
+        assert words in finding.values["reason"]
+        assert finding in result.findings
     assert damped.attractors
     assert result.complete
     assert np.isnan(result.fractions()[0][:2]).all()
-    with pytest.raises(StructureError, match="no branch 7"):
-        result.branch(7)
+    for unknown in (7, -1, "hammering", "", True, None):
+        with pytest.raises(StructureError, match="no branch"):
+            result.branch(unknown)
 
 
 def test_what_was_found_before_an_interrupt_stays(monkeypatch, tmp_path):
@@ -204,17 +220,101 @@ def test_what_was_found_before_an_interrupt_stays(monkeypatch, tmp_path):
         vk.load_scene("duffing"), FREQUENCY, [1.35, 1.4, 1.5, 1.6], region=((-3, 3), (-3, 3)), **QUICK
     )
     assert not result.complete
-    assert result.status.startswith("The work was stopped after 2 of 4 values.")
+    (stopped,) = result.found(Code.STOPPED)
+    assert dict(stopped.values) == {"stage": "values", "reason": "interrupt"}
     np.testing.assert_array_equal(result.values, [1.35, 1.4])
     assert [len(result.branch(number)) for number in result.branches] == [2, 2]
     result.save(tmp_path / "part.nc")
-    assert same(read_continuation(open_content(tmp_path / "part.nc")), result)
+    assert same(vk.load_result(tmp_path / "part.nc"), result)
+
+
+def test_attractors_have_labels_and_names_at_each_value(paper):
+    for at in paper.states:
+        assert [attractor.label for attractor in at.attractors] == list(range(len(at.attractors)))
+        names = [attractor.name for attractor in at.attractors]
+        assert all(names)
+        assert len(set(names)) == len(names)
+
+
+def test_findings_name_the_branches(duffing):
+    assert set(duffing.branch_names) == {"small-oscillation", "large-oscillation"}
+    folds = duffing.found(Code.BIFURCATION)
+    assert [(one.values["kind"], one.source) for one in folds] == [("fold", b.branch) for b in duffing.bifurcations]
+    for one in folds:
+        assert duffing.branch_names[one.source] in one.sentence(duffing.names)
+    (branches,) = duffing.found(Code.BRANCHES)
+    assert dict(branches.values) == {"branches": 2, "values": 5, "parameter": FREQUENCY}
+
+
+@pytest.mark.parametrize("given", [{}, {"region": ((-3, 3), (-3, 3)), "stepper": vk.RK4(512), "rng": 4}])
+def test_settings_repeat_the_call(given, tmp_path):
+    osc = vk.load_scene("duffing")
+    continuation(osc, "frequency", np.array([1.3, 1.2]), cells=(6, 6), starts=(6, 6), **given).save(tmp_path / "c.nc")
+    saved = vk.load_result(tmp_path / "c.nc")
+    assert same(continuation(saved.oscillator, **saved.settings), saved)
+
+
+SMALL = {"values": [-1.0, -0.6, -0.3], "cells": (10, 10), "starts": (6, 6)}
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A short continuation of the double well, and what a listener was told meanwhile."""
+    osc, seen = vk.load_scene("double-well"), []
+    continuation(osc, "spring.linear", **SMALL)  # so that everything is compiled
+    return osc, continuation(osc, "spring.linear", **SMALL, progress=seen.append), seen
+
+
+def test_an_interrupt_at_any_moment_leaves_the_values_found(small):
+    osc, whole, seen = small
+    stages = ("values", "branches", "basin fractions")
+    empty = 0
+    for call in np.unique(np.linspace(1, len(seen), 25).astype(int)):
+        calls = itertools.count(1)
+
+        def listener(update, calls=calls, call=call):
+            if next(calls) == call:
+                raise KeyboardInterrupt
+
+        try:
+            part = continuation(osc, "spring.linear", **SMALL, progress=listener)
+        except KeyboardInterrupt:
+            empty += 1
+            continue
+        (stopped,) = part.found(Code.STOPPED)
+        assert stopped.values["stage"] in stages
+        assert not part.complete
+        np.testing.assert_array_equal(part.values, whole.values[: len(part.values)])
+        assert len(part.values) == 3 or stopped.values["stage"] == "values"
+        for number in part.branches:  # joined, if only by distance; the last value may hold a part of its attractors
+            assert len(part.branch(number)) >= len(part.values) - 1
+        assert len(part.branches) == 2 or len(part.values) == 1
+    assert 0 < empty < 12
+
+
+def test_a_time_limit_is_told_from_an_interrupt(small):
+    osc, whole, _ = small
+    for share in (0.3, 0.7):
+        try:
+            part = continuation(osc, "spring.linear", **SMALL, time_limit=share * whole.seconds)
+        except OutOfTime:
+            continue
+        assert all(stopped.values["reason"] == "time limit" for stopped in part.found(Code.STOPPED))
+        assert part.complete == (not part.found(Code.STOPPED))
+
+
+def test_a_short_path_gives_the_same_record():
+    osc = vk.load_scene("duffing")
+    short, full = (continuation(osc, path, [1.2], cells=(4, 4), starts=(4, 4)) for path in ("frequency", FREQUENCY))
+    assert short.parameter == FREQUENCY
+    assert same(short, full)
 
 
 @pytest.mark.parametrize(
     ("path", "values", "words"),
     [
         ("excitations.0.frequenc", [1.0], "nearest is 'excitations.0.frequency'"),
+        ("frequenc", [1.0], "nearest is 'excitations.0.frequency'"),
         (3, [1.0], "no parameter 3"),
         (FREQUENCY, [], "one or more"),
         (FREQUENCY, 1.0, "sequence of numbers"),

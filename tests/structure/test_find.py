@@ -5,10 +5,12 @@ from scipy.optimize import fsolve
 
 import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, Basins
+from vibrokit.progress import OutOfTime
+from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
+from vibrokit.structure.basins.fractions import cell_findings
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.status import fates_of
 
 
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
@@ -163,38 +165,160 @@ def test_what_escapes_is_said_to_have_left():
     structure = vk.find_structure(osc, region=((-1.5, 1.5), (-1.5, 1.5)), cells=(30, 30), starts=(8, 8))
     assert structure.basins.fraction(LEFT) > 0.1
     assert structure.basins.fraction(0) + structure.basins.fraction(LEFT) == pytest.approx(1.0)
-    assert "left the region" in structure.status
+    (finding,) = structure.found(Code.CELLS_LEFT_REGION)
+    assert finding.values["fraction"] == structure.basins.fraction(LEFT)
     assert sorted(round(saddle.points[0, 0], 9) for saddle in structure.saddles) == [-1.0, 1.0]
 
 
-@pytest.mark.parametrize(("left", "share"), [(1000, "100%"), (123, "12%"), (7, "0.7%")])
-def test_shares_are_said_to_two_digits(left, share):
-    labels = np.where(np.arange(1000) < left, LEFT, 0).astype(np.int16)
-    basins = Basins(Region((0, 1), (0, 1)), labels.reshape(25, 40))
-    assert fates_of(basins) == [f"{share} of the cells left the region."]
+def test_cells_without_an_attractor_are_findings():
+    labels = np.array([[0, 1, LEFT, LEFT], [0, UNSETTLED, 0, 0]], dtype=np.int16)
+    found = cell_findings(Basins(Region((0, 1), (0, 1)), labels))
+    assert {finding.code: finding.values["fraction"] for finding in found} == {
+        Code.CELLS_UNSETTLED: 1 / 8, Code.CELLS_LEFT_REGION: 2 / 8,
+    }  # fmt: skip
+    assert cell_findings(Basins(Region((0, 1), (0, 1)), np.zeros((3, 2), dtype=np.int16))) == ()
 
 
-@pytest.mark.parametrize("stage", ["settle_grid", "find_saddles", "grow_manifolds"])
-def test_ctrl_c_leaves_what_was_found(monkeypatch, stage):
-    def stop(*args, **kwargs):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(f"vibrokit.structure.find.{stage}", stop)
-    structure = vk.find_structure(vk.load_scene("double-well"), cells=(20, 20), starts=(8, 8))
-    assert not structure.complete
-    assert structure.status.startswith("The work was stopped")
-    assert len(structure.attractors) == 2
-    assert (structure.basins.labels == NOT_FOLLOWED).all() == (stage == "settle_grid")
-    assert len(structure.saddles) == (1 if stage == "grow_manifolds" else 0)
+def test_what_was_found_is_in_the_findings(paper):
+    _, structure = paper
+    steady, saddles = structure.findings
+    assert (steady.code, steady.values["count"]) == (Code.STEADY_STATES, 2)
+    assert (saddles.code, saddles.values["count"]) == (Code.SADDLES, 1)
 
 
-def test_ctrl_c_before_anything_is_found_ends_the_work(monkeypatch):
-    def stop(*args, **kwargs):
-        raise KeyboardInterrupt
+# --- settings
 
-    monkeypatch.setattr("vibrokit.structure.search.run_ensemble", stop)
-    with pytest.raises(KeyboardInterrupt):
-        vk.find_structure(vk.load_scene("double-well"), cells=(20, 20), starts=(8, 8))
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"cells": (20, 20), "starts": (8, 8), "rng": 3},
+        {
+            "cells": np.array([10, 12]), "starts": (6, 6), "refine": np.int64(1), "margin": None, "settling": 0.01,
+            "budget": 300, "region": ((-2, 2), (-1.5, 1.5)), "stepper": vk.RK4(512), "manifolds": False,
+            "rng": np.random.default_rng(5),
+        },
+    ],
+)  # fmt: skip
+def test_settings_repeat_the_call(given, tmp_path):
+    osc = vk.load_scene("double-well")
+    structure = vk.find_structure(osc, **given)
+    structure.save(tmp_path / "s.nc")
+    saved = vk.load_result(tmp_path / "s.nc")
+    again = vk.find_structure(saved.oscillator, **saved.settings)
+    np.testing.assert_array_equal(again.basins.labels, structure.basins.labels)
+    assert again.basins.region == structure.basins.region
+    for one, other in zip(structure.manifolds, again.manifolds, strict=True):
+        np.testing.assert_array_equal(one.curve, other.curve)
+    assert dict(again.settings) == dict(structure.settings)
+    assert again.stepper == structure.stepper
+
+
+# --- interrupts
+
+
+WELL = {"cells": (40, 40), "starts": (8, 8)}
+STAGES = ("attractors", "basins", "saddles", "manifolds")
+
+
+class Listener:
+    """Keeps what it is told, and interrupts at a call."""
+
+    def __init__(self, last=None):
+        self.seen, self.last = [], last
+
+    def __call__(self, update):
+        self.seen.append(update)
+        if len(self.seen) == self.last:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def well():
+    """The double well, its structure, and what a listener was told meanwhile."""
+    osc, listener = vk.load_scene("double-well"), Listener()
+    vk.find_structure(osc, **WELL)  # so that everything is compiled
+    return osc, vk.find_structure(osc, **WELL, progress=listener), listener.seen
+
+
+def test_stages_count_to_their_totals(well):
+    _, structure, seen = well
+    assert tuple(dict.fromkeys(update.stage for update in seen)) == STAGES
+    for name in STAGES:
+        own = [update for update in seen if update.stage == name]
+        done = [update.done for update in own]
+        assert done == sorted(done)
+        assert [update.finished for update in own] == [False] * (len(own) - 1) + [True]
+        (total,) = {update.total for update in own}
+        assert total is None if name == "saddles" else done[-1] == total
+    units = {update.stage: (update.unit, update.total) for update in seen}
+    assert units["attractors"] == ("starts", 64)
+    assert units["manifolds"] == ("branches", 4)
+    assert units["saddles"][0] == "motions"
+    stats = structure.stats
+    assert set(stats.seconds) >= set(STAGES)
+    assert sum(stats.seconds.values()) <= structure.seconds
+    assert 0 < stats.trajectories <= stats.intervals
+    assert stats.steps > 0
+    assert stats.newton_iterations > 0
+
+
+def test_an_interrupt_at_any_moment_leaves_what_was_found(well):
+    osc, whole, seen = well
+    empty = 0
+    for call in np.unique(np.linspace(1, len(seen), 40).astype(int)):
+        try:
+            part = vk.find_structure(osc, **WELL, progress=Listener(call))
+        except KeyboardInterrupt:
+            assert not empty or call <= empty + len(seen) // 40 + 1  # only at the beginning, in one piece
+            assert seen[call - 1].stage == "attractors"
+            empty = int(call)
+            continue
+        (stopped,) = part.found(Code.STOPPED)
+        doing = stopped.values["stage"]
+        assert (doing, stopped.values["reason"]) == (seen[call - 1].stage, "interrupt")
+        assert not part.complete
+        assert part.failed
+        assert [a.label for a in part.attractors] == list(range(len(part.attractors)))
+        assert all(a.name for a in part.attractors)
+        followed = part.basins.labels != NOT_FOLLOWED
+        if doing != "attractors":
+            assert len(part.attractors) == 2
+            np.testing.assert_array_equal(part.basins.labels[followed], whole.basins.labels[followed])
+        if doing in ("saddles", "manifolds"):
+            assert followed.all()
+            assert [a.basin_fraction for a in part.attractors] == [a.basin_fraction for a in whole.attractors]
+        assert len(part.saddles) == 1 if doing == "manifolds" else len(part.saddles) <= 1
+        assert len(part.manifolds) <= 4 if doing == "manifolds" else not part.manifolds
+    assert empty
+
+
+@pytest.mark.parametrize("share", [1e-4, 0.05, 0.2, 0.5, 0.9])
+def test_a_time_limit_leaves_what_was_found(well, share):
+    osc, whole, _ = well
+    limit = share * whole.seconds
+    try:
+        part = vk.find_structure(osc, **WELL, time_limit=limit)
+    except OutOfTime:
+        assert share < 0.9
+        return
+    assert part.seconds >= min(limit, part.seconds if part.complete else limit)
+    for stopped in part.found(Code.STOPPED):
+        assert stopped.values["reason"] == "time limit"
+    assert part.complete == (not part.found(Code.STOPPED))
+
+
+def test_enough_time_changes_nothing(well):
+    osc, whole, _ = well
+    part = vk.find_structure(osc, **WELL, time_limit=1e6)
+    assert part.complete
+    np.testing.assert_array_equal(part.basins.labels, whole.basins.labels)
+
+
+@pytest.mark.parametrize("limit", [0, -1.0, float("nan"), "1", True])
+def test_bad_time_limits(limit):
+    with pytest.raises(StructureError, match="time_limit must be"):
+        vk.find_structure(vk.load_scene("double-well"), time_limit=limit)
 
 
 def test_forces_of_the_stops_along_an_orbit(paper):

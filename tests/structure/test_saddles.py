@@ -1,6 +1,6 @@
 """Saddles on basin boundaries against closed forms, SciPy's DOP853, Liouville's law and averaging."""
 
-from typing import ClassVar
+import dataclasses
 
 import numpy as np
 import pytest
@@ -8,25 +8,28 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.scenes import Coloured, double_well
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.basins import LEFT, Basins
+from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.grid import classify_grid
 from vibrokit.structure.boundaries.edges import edge_states, meeting_cells, spread
 from vibrokit.structure.boundaries.saddles import find_saddles
 from vibrokit.structure.cycles import find_cycle
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.settle import Settler, settle_grid
 from vibrokit.symbolic.flow_kind import Flow
 
 
 def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
-    """Return a settler to which a grid of basins answers, and the grid."""
+    """Return a classifier that uses a grid of basins, and the grid."""
     region = Region.of(bounds)
-    carrier = stepper or ensemble_stepper(osc, Flow.STATE)
-    settler = Settler(osc, attractors, region, 1e-3 * region.size, budget, carrier)
-    basins = settle_grid(settler, cells)
-    return settler.sharing(basins, 2), basins
+    chosen = stepper or ensemble_stepper(osc, Flow.STATE)
+    classifier = BasinClassifier(osc, attractors, region, 1e-3 * region.size, budget, chosen)
+    basins = classify_grid(classifier, cells)
+    return classifier.sharing(basins, 2), basins
 
 
 def orbits(osc, *starts, period=1):
@@ -37,16 +40,11 @@ def orbits(osc, *starts, period=1):
 
 
 def saddles_of(osc, attractors, bounds, rng=0, **options):
-    settler, basins = settled(osc, attractors, bounds, **options)
-    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    generator = np.random.default_rng(rng)
-    return find_saddles(osc, settler, basins, attractors, carrier=settler.stepper, exact=exact, rng=generator)
-
-
-def double_well(stiffening=1.0, **parts):
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(linear=-1.0, cubic=stiffening), **parts
-    )
+    classifier, basins = settled(osc, attractors, bounds, **options)
+    search = find_saddles(
+        classifier, basins, single_stepper(osc, Flow.STATE_VARIATIONAL), np.random.default_rng(rng)
+    )  # fmt: skip
+    return search.saddles, search.findings
 
 
 WELLS = ((-2, 2), (-2, 2))
@@ -59,7 +57,7 @@ def hilltop(damping, slope):
 
 def test_the_double_well_has_one_saddle_at_its_top():
     osc = double_well()
-    (saddle,), words = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS)
+    (saddle,), findings = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS)
     rates = hilltop(0.05, 1.0)
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
     np.testing.assert_allclose(saddle.exponents, rates, rtol=1e-9)
@@ -68,7 +66,7 @@ def test_the_double_well_has_one_saddle_at_its_top():
     assert saddle.leads_to == (0, 1)  # the well at −1, then that at 1
     assert saddle.residual <= 1e-10
     assert saddle.error <= 1e-8
-    assert words.startswith("1 unstable orbit found")
+    assert [(finding.code, dict(finding.values)) for finding in findings] == [(Code.SADDLES, {"count": 1})]
 
 
 def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
@@ -88,10 +86,10 @@ def test_a_saddle_that_presses_on_a_stop():
         spring=vk.CubicSpring(linear=1.0, cubic=-1.0),
         barriers=(vk.Barrier(vk.Hertz(stiffness=1.0), position=0.9, side="right"),),
     )
-    found, words = saddles_of(osc, orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
+    found, findings = saddles_of(osc, orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
     top = brentq(lambda x: x - x**3 + (x - 0.9) ** 1.5, 1.0, 1.3, xtol=1e-15)
     slope = 3 * top**2 - 1 - 1.5 * np.sqrt(top - 0.9)
-    assert len(found) == 2, words
+    assert len(found) == 2, findings
     for saddle, x, grows, ends in zip(found, (-1.0, top), (2.0, slope), ((LEFT, 0), (0, LEFT)), strict=True):
         np.testing.assert_allclose(saddle.points, [[x, 0]], atol=1e-10)
         np.testing.assert_allclose(saddle.exponents, hilltop(0.1, grows), rtol=1e-8)
@@ -108,25 +106,8 @@ def test_stops_whose_force_jumps():
     assert saddle.leads_to == (0, 1)
 
 
-class Slow(vk.NoiseModel):
-    """Coloured noise with a state of its own."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("r", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return self.rate
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y,)
-
-
 def test_a_third_state_of_the_noise():
-    osc = double_well(noise=Slow(intensity=0.01, rate=0.3))
+    osc = double_well(noise=Coloured(intensity=0.01, rate=0.3))
     (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0, 0]], atol=1e-12)
     grows, falls = hilltop(0.05, 1.0)
@@ -185,8 +166,8 @@ def check_against_scipy(osc, saddle, force, stop=None):
 
 def test_the_duffing_oscillator_has_one_boundary_saddle():
     osc = vk.load_scene("duffing")
-    found, words = saddles_of(osc, orbits(osc, (0, 0), (2, 1)), ((-3, 3), (-3, 3)))
-    assert len(found) == 1, words
+    found, findings = saddles_of(osc, orbits(osc, (0, 0), (2, 1)), ((-3, 3), (-3, 3)))
+    assert len(found) == 1, findings
     assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
     check_against_scipy(osc, found[0], lambda t, x, v: 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3)
 
@@ -204,35 +185,35 @@ def stops():
 
 
 def test_the_paper_scene_has_one_boundary_saddle(stops):
-    osc, attractors, settler, basins = stops
-    exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    osc, _, classifier, basins = stops
+    orbit_stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
     points = []
-    for seed, carrier in ((0, settler.stepper), (1, vk.RK4(512)), (2, exact)):
-        few = {"trackers": 3, "sections": 40} if carrier is exact else {}
-        found, words = find_saddles(
-            osc, settler, basins, attractors, carrier=carrier, exact=exact, rng=np.random.default_rng(seed), **few
-        )
-        assert len(found) == 1, words
+    for seed, stepper in ((0, classifier.stepper), (1, vk.RK4(512)), (2, orbit_stepper)):
+        few = {"trackers": 3, "sections": 40} if stepper is orbit_stepper else {}
+        changed = dataclasses.replace(classifier, stepper=stepper)
+        search = find_saddles(changed, basins, orbit_stepper, np.random.default_rng(seed), **few)
+        found = search.saddles
+        assert len(found) == 1, search.findings
         points.append(found[0].points[0])
         assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
-    np.testing.assert_allclose(points, points[:1] * 3, rtol=0, atol=1e-10)  # whatever carried the boundary
+    np.testing.assert_allclose(points, points[:1] * 3, rtol=0, atol=1e-10)  # whatever stepper tracks the boundary
     check_against_scipy(osc, found[0], paper_force, stop=0.5)
 
 
 def test_edge_tracks_are_trajectories_on_the_boundary(stops):
-    osc, _, settler, basins = stops
-    tracks = edge_states(settler, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
-    again = edge_states(settler, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
+    osc, _, classifier, basins = stops
+    tracks = edge_states(classifier, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
+    again = edge_states(classifier, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
     assert len(tracks) >= 2
     for track, same in zip(tracks, again, strict=True):
         assert track.labels == (0, 1)
         np.testing.assert_array_equal(track.points, same.points)
         # From point to point they follow the map, to what two sides may be apart.
-        images = osc.section_map(track.points[:-1], stepper=settler.stepper)
+        images = osc.section_map(track.points[:-1], stepper=classifier.stepper)
         assert np.linalg.norm(images - track.points[1:], axis=1).max() < 1e-7
         # Once at the saddle, the two sides part as the derivative of that map says, here by differences.
         around = track.points[-1] + 1e-6 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-        ends = osc.section_map(around, stepper=settler.stepper)
+        ends = osc.section_map(around, stepper=classifier.stepper)
         derivative = np.stack([ends[0] - ends[1], ends[2] - ends[3]], axis=1) / 2e-6
         unstable = np.abs(np.linalg.eigvals(derivative)).max()
         np.testing.assert_allclose(track.stretches[-5:], np.log(unstable), rtol=1e-3)
@@ -248,8 +229,8 @@ def test_an_unstable_limit_cycle_parts_rest_from_motion():
     exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
     cycle = find_cycle(osc, osc.section_map([[outer, 0.0]], 200)[0], exact, longest=20.0)
     attractors = (*orbits(osc, (0.0, 0.0)), describe_cycle(osc, cycle, exact))
-    (saddle,), words = saddles_of(osc, attractors, ((-2.5, 2.5), (-2.5, 2.5)), cells=(40, 40))
-    assert (saddle.kind, saddle.period, saddle.leads_to) == ("repeller", 1, (0, 1)), words
+    (saddle,), findings = saddles_of(osc, attractors, ((-2.5, 2.5), (-2.5, 2.5)), cells=(40, 40))
+    assert (saddle.kind, saddle.period, saddle.leads_to) == ("repeller", 1, (0, 1)), findings
     assert np.abs(saddle.points[0, 0]) == pytest.approx(inner, rel=1e-3)  # averaging is right to second order
     assert saddle.duration == pytest.approx(2 * np.pi, rel=1e-3)
     # d/dA of the averaged drift −A (2ζ/2 − a A²/8 + b A⁴/16) is the rate at which neighbours leave.
@@ -275,9 +256,9 @@ def test_starts_are_spread():
 
 def test_one_basin_has_no_boundary():
     osc = double_well()
-    found, words = saddles_of(osc, orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
+    found, (finding,) = saddles_of(osc, orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
     assert found == ()
-    assert "no boundary" in words
+    assert (finding.code, finding.values["count"]) == (Code.SADDLES, 0)
 
 
 @pytest.mark.parametrize(("amplitude", "wound"), [(0.05, False), (0.1, True)])
@@ -288,15 +269,17 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
     critical = 4 * delta * np.cosh(np.pi * omega / 2) / (3 * np.sqrt(2) * np.pi * omega)
     assert (amplitude > 1.3 * critical) if wound else (amplitude < critical / 1.3)
     osc = double_well(excitations=(vk.Harmonic(amplitude=amplitude, frequency=omega),))
-    found, words = saddles_of(osc, orbits(osc, (-0.95, 0), (1.05, 0)), ((-1.8, 1.8), (-1.5, 1.5)))
-    assert any(saddle.kind == "chaotic" for saddle in found) == ("chaotic" in words) == wound
+    found, findings = saddles_of(osc, orbits(osc, (-0.95, 0), (1.05, 0)), ((-1.8, 1.8), (-1.5, 1.5)))
+    chaotic = [finding for finding in findings if finding.code is Code.CHAOTIC_EDGE]
+    assert [(finding.source, finding.target) for finding in chaotic] == [(0, 1)] * wound
+    assert any(saddle.kind == "chaotic" for saddle in found) == wound
     named = [saddle for saddle in found if saddle.kind != "chaotic"]
     assert all(set(saddle.leads_to) == {0, 1} and saddle.residual <= 1e-10 for saddle in named)
     if wound:
         set_ = found[-1]
         assert (set_.period, set_.leads_to) == (0, (0, 1))
         assert len(set_.points) > 50
-        assert set_.exponents[0].real > 0.1  # it parts by e in less than one and a half periods
+        assert set_.exponents[0].real == chaotic[0].values["exponent"] > 0.1  # a factor e in less than 1.5 periods
         # The scene is its own mirror image half a period later: so are its saddles.
         np.testing.assert_allclose(named[0].multipliers, named[1].multipliers, rtol=1e-8)
     else:

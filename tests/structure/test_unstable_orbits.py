@@ -8,8 +8,8 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.region import Region
 from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.settle import Settler
 from vibrokit.structure.unstable_orbits import unstable_orbits
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -76,11 +76,11 @@ def test_flip_saddles_are_named_and_do_not_depend_on_the_starts():
         assert orbit.leads_to == ()
 
 
-def test_a_settler_says_where_the_branches_lead():
+def test_a_classifier_finds_where_the_branches_lead():
     osc = vk.load_scene("hertz-0.570")
     both = attractors(osc, (0.466551, 0.002566), (0.023582, -0.049071))
-    settler = Settler(osc, both, Region.of(STOPS), 1e-3, 1000, ensemble_stepper(osc, Flow.STATE))
-    (saddle,) = unstable_orbits(osc, 1, region=STOPS, settler=settler)
+    classifier = BasinClassifier(osc, both, Region.of(STOPS), 1e-3, 1000, ensemble_stepper(osc, Flow.STATE))
+    (saddle,) = unstable_orbits(osc, 1, region=STOPS, classifier=classifier)
     assert set(saddle.leads_to) == {0, 1}
 
 
@@ -108,13 +108,13 @@ def test_a_repeller():
 
 @pytest.mark.parametrize("period", [0, -1, 1.0, True, "1", None, 10**9])
 def test_bad_periods(period):
-    with pytest.raises(StructureError, match="period is"):
+    with pytest.raises(StructureError, match="period must be"):
         unstable_orbits(vk.load_scene("duffing"), period)
 
 
 @pytest.mark.parametrize("starts", [3, (0, 1), (1.0, 2), (10**5, 10**5), None, (1, 2, 3)])
 def test_bad_starts(starts):
-    with pytest.raises(StructureError, match="starts is"):
+    with pytest.raises(StructureError, match="starts must be"):
         unstable_orbits(vk.load_scene("duffing"), 1, starts=starts)
 
 

@@ -13,6 +13,7 @@ from mpmath import mpf
 
 import vibrokit as vk
 from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.source import scene_text
 from vibrokit.symbolic.symbols import parameter_symbols
@@ -127,8 +128,8 @@ def custom():
 
 
 # Rates of -1.7 make 1 + 0.75 rate negative: the law would pull, and the stop lets go.
-# Covariances are held against SciPy in tests/kernels/test_gramian.py.
-FLOWS = [flow for flow in Flow if flow not in (Flow.GRAMIAN, Flow.GRAMIAN_REVERSED)]
+# Covariances are held against SciPy in tests/kernels/test_covariance.py.
+FLOWS = [flow for flow in Flow if not flow.has_covariance]
 CASES = {
     "hertz": Case(
         oscillator(stop(vk.Hertz(50.0), "right"), stop(vk.Hertz(50.0), "left")),
@@ -176,11 +177,11 @@ def gradient(function, point):
     return [first(function, point, index) for index in range(len(point))]
 
 
-def by_hand(case):
-    """Drift, amplitude, Hamiltonian and action rate of a case."""
+def by_hand(case, forcing=FORCING):
+    """Drift, Hamiltonian and action rate of a case."""
 
     def drift(x, v):
-        return case.acceleration(x, v) + mpf(FORCING)
+        return case.acceleration(x, v) + mpf(forcing)
 
     def hamiltonian(x, v, p, r):
         return p * v + r * drift(x, v) + (r * case.amplitude(x, v)) ** 2 / 2
@@ -287,6 +288,39 @@ def test_located(name, tmp_path):
             errors = relative_errors(np.delete(found, 1), [*exact[:1], *exact[2:]])
             assert max(errors) <= TOLERANCE, f"at x = {x!r}, v = {v}"
             assert abs(mpf(found[1]) - exact[1]) <= TOLERANCE * max(1, abs(exact[1]))  # cos(arccos) rounds, too
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_vector_field(name):
+    """b, its Jacobian and Hamilton's equations, at many states and one time."""
+    case, time = CASES[name], 7.7
+    field, states = VectorField(case.scene), np.array(case.points)
+    momenta = np.tile(MOMENTA, (len(states), 1))
+    rates, jacobians = field.rate(states, time), field.jacobian(states, time)
+    hamiltonian_rates = field.hamiltonian_rate(states, momenta, time)
+    with mpmath.workdps(DIGITS):
+        drift, hamiltonian, _ = by_hand(case, mpf(0.18) * mpmath.cos(mpf(0.57) * mpf(time)))
+        for (x, v), rate, jacobian, found in zip(case.points, rates, jacobians, hamiltonian_rates, strict=True):
+            acceleration = drift(mpf(x), mpf(v))
+            h_x, h_v, _, h_r = gradient(hamiltonian, (mpf(x), mpf(v), *map(mpf, MOMENTA)))
+            exact = [mpf(0), mpf(1), *gradient(drift, (mpf(x), mpf(v))), mpf(v), -h_x, -h_v]
+            assert max(relative_errors([*jacobian.ravel(), found[0], *found[2:]], exact)) <= TOLERANCE
+            assert rate[0] == v
+            for value, target in ((rate[1], acceleration), (found[1], h_r)):  # the terms of a force may cancel
+                assert abs(mpf(value) - target) <= TOLERANCE * max(1, abs(target))
+    np.testing.assert_array_equal(field.rate(states[0], time), rates[0])
+    np.testing.assert_array_equal(field.jacobian(states[None], time), jacobians[None])
+
+
+def test_the_force_of_each_excitation():
+    forces = vk.Harmonic(0.18, 0.57, 0.4), vk.Constant(0.2), vk.Harmonic(0.3, 1.14)
+    field = VectorField(vk.Oscillator(natural_frequency=1.1, damping_ratio=0.03, excitations=forces))
+    with mpmath.workdps(DIGITS):
+        for t in (0.0, 0.3, 7.7):
+            first_tone = mpf(0.18) * mpmath.cos(mpf(0.57) * mpf(t) + mpf(0.4))
+            second_tone = mpf(0.3) * mpmath.cos(mpf(1.14) * mpf(t))
+            for index, exact in enumerate((first_tone, mpf(0.2), second_tone)):
+                assert abs(field.excitation(index, t) - exact) <= 4e-16
 
 
 @pytest.mark.parametrize("name", CASES)

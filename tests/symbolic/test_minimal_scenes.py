@@ -6,17 +6,14 @@ import re
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import NoSectionError, SceneError
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
 
-NOISY_FLOWS = (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL, Flow.NOISY, Flow.GRAMIAN, Flow.GRAMIAN_REVERSED)
+NOISY_FLOWS = (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL, Flow.NOISY, Flow.LINEARISED, Flow.COVARIANCE_REVERSED)
 RIGHT = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
 LEFT = vk.Barrier(vk.Hertz(40.0), -0.5, "left")
-
-
-def scene(*stops, **more):
-    return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.01, barriers=stops, **more)
 
 
 def source(scene, flow=Flow.STATE):

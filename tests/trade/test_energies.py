@@ -1,4 +1,4 @@
-"""What `vibrokit trade` measures of the stages of least action, on the double well, whose energy is known."""
+"""What `vibrokit trade` measures of the steps of least action, on the double well, whose energy is known."""
 
 import dataclasses
 import math
@@ -6,17 +6,24 @@ import math
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.exits import LeaveBasin
+from vibrokit.analyzers.graph.search import GraphSearch
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.cli import main
 from vibrokit.errors import SceneError, StructureError
-from vibrokit.trade.energies import GRAPHS, PLOTS, measure_energies
+from vibrokit.trade.energies import GRAPHS, SHOOTINGS, measure_energies
 from vibrokit.trade.table import Trade, TradeRow
+
+pytestmark = pytest.mark.slow
 
 EXACT = 4 * 0.05 * 1.0 * 0.25  # 4 ζ ω_n times the barrier
 LADDERS = {
-    "plots": (vk.ActionPlot(radius=1e-3, points=200), vk.ActionPlot(points=200, rounds=6)),
-    "graphs": (vk.ActionGraph(cells=(40, 40), fraction=8), vk.ActionGraph(cells=(80, 80), fraction=4)),
+    "shootings": (Shooting(radius=1e-3, points=200), Shooting(points=200, rounds=6)),
+    "graphs": (GraphSearch(nodes=(40, 40), steps_per_period=8), GraphSearch(nodes=(80, 80), steps_per_period=4)),
     "steppers": (vk.Order8(1e-4), vk.Order8(1e-10)),
 }
+SEARCHES = (*LADDERS["shootings"], *LADDERS["graphs"])
 
 
 @pytest.fixture(scope="module")
@@ -26,22 +33,22 @@ def well():
 
 
 @pytest.fixture(scope="module")
-def calls():
+def updates():
     return []
 
 
 @pytest.fixture(scope="module")
-def trade(well, calls):
-    return measure_energies(*well, **LADDERS, progress=lambda *call: calls.append(call))
+def trade(well, updates):
+    return measure_energies(*well, **LADDERS, progress=updates.append)
 
 
 def all_rows(trade):
-    return (*trade.plots, *trade.graphs, *trade.polishes)
+    return [row for rows in trade.steps.values() for row in rows]
 
 
 def test_the_reference_is_the_energy(trade):
     assert trade.reference == pytest.approx(EXACT, rel=1e-8)
-    assert (trade.source, trade.target) == (0, 1)
+    assert trade.exit == "left-rest → right-rest"
     assert trade.residual < 1e-9
     assert trade.reference_from == "Order8(tolerance=1e-13)"
 
@@ -51,40 +58,40 @@ def test_errors_are_distances_from_the_known_energy(trade):
         assert row.error == pytest.approx(abs(row.value - EXACT) / EXACT, rel=1e-3, abs=1e-8)
 
 
-def test_values_are_those_of_the_analyzers(trade, well):
-    """Asked through their public face, each by itself."""
-    for row, analyzer in zip(
-        (*trade.plots, *trade.graphs), (*LADDERS["plots"], *LADDERS["graphs"]), strict=True
-    ):  # fmt: skip
-        kind = type(analyzer)
-        alone = kind(**{**analyzer.__dict__, "source": 0}).run(*well)
-        least = min(alone.energies, key=lambda energy: energy.value)
+def test_values_are_those_of_the_searches(trade, well):
+    """Each by itself."""
+    osc, structure = well
+    problem = ExitProblem(osc, structure, structure.attractors[0], LeaveBasin())
+    for row, search in zip((*trade.steps["shooting"], *trade.steps["graph"]), SEARCHES, strict=True):
+        least = min(search.search(problem).estimates, key=lambda energy: energy.value)
         assert row.value == pytest.approx(least.value, rel=1e-12)
-        assert eval(row.setting, vars(vk)) == analyzer
+        assert eval(row.setting, {"Shooting": Shooting, "GraphSearch": GraphSearch}) == search
 
 
 def test_every_setting_took_time(trade):
     assert all(0 < row.seconds < math.inf for row in all_rows(trade))
 
 
-def test_a_graph_tells_of_more_error_than_it_has(trade):
-    assert all(row.told >= row.error for row in trade.graphs)
+def test_a_graph_estimates_more_error_than_it_has(trade):
+    assert all(row.estimated >= row.error for row in trade.steps["graph"])
 
 
 def test_a_finer_polish_is_nearer(trade):
-    coarse, fine = (next(row for row in trade.polishes if row.setting == repr(each)) for each in LADDERS["steppers"])
+    rows = {row.setting: row for row in trade.steps["polishing"]}
+    coarse, fine = (rows[repr(stepper)] for stepper in LADDERS["steppers"])
     assert fine.error < coarse.error
 
 
 def test_defaults_are_marked(trade):
-    assert [row.default for row in (*trade.plots, *trade.graphs)] == [False] * 4
-    assert next(row.setting for row in trade.polishes if row.default) == "Order8(tolerance=1e-10)"
-    assert "candidates" in trade.polishes[-1].setting
+    assert [row.default for row in (*trade.steps["shooting"], *trade.steps["graph"])] == [False] * 4
+    polished = trade.steps["polishing"]
+    assert next(row.setting for row in polished if row.default) == "Order8(tolerance=1e-10)"
+    assert "candidates" in polished[-1].setting
     assert str(trade).count("← default") == 2
 
 
 def test_the_ladders_of_the_command_hold_the_defaults():
-    assert PLOTS.count(vk.ActionPlot()) == GRAPHS.count(vk.ActionGraph()) == 1
+    assert SHOOTINGS.count(Shooting()) == GRAPHS.count(GraphSearch()) == 1
 
 
 def test_the_table_names_every_setting(trade):
@@ -93,18 +100,20 @@ def test_the_table_names_every_setting(trade):
     assert "from 0.05" in text
 
 
-def test_progress_reaches_its_total(trade, calls):
-    assert calls[0][0] == 0
-    assert calls[-1][0] == calls[-1][1]
-    assert all(0 <= done <= total for done, total in calls)
+def test_progress_reaches_its_total(trade, updates):
+    own = [update for update in updates if update.stage == "energies"]
+    assert (own[0].done, own[0].total, own[0].subject) == (0, 7, "left-rest")
+    assert own[-1].done == 7
+    assert own[-1].finished
 
 
 def test_a_setting_that_fails_says_so(well):
     """A graph that is not allowed its memory; the rest is measured all the same."""
-    graphs = (vk.ActionGraph(cells=(80, 80), memory=1e-6),)
-    found = measure_energies(*well, plots=LADDERS["plots"][1:], graphs=graphs, steppers=())
-    assert math.isnan(found.graphs[0].value)
-    assert "GiB" in found.graphs[0].failure
+    graphs = (GraphSearch(nodes=(80, 80), max_memory_gib=1e-6),)
+    found = measure_energies(*well, shootings=LADDERS["shootings"][1:], graphs=graphs, steppers=())
+    (graph,) = found.steps["graph"]
+    assert math.isnan(graph.value)
+    assert "GiB" in graph.failure
     assert "GiB" in str(found)
     assert found.reference == pytest.approx(EXACT, rel=1e-8)
 
@@ -116,7 +125,7 @@ def test_no_noise_is_refused_in_a_sentence():
 
 def test_one_attractor_is_refused_in_a_sentence(well):
     osc, structure = well
-    with pytest.raises(StructureError, match="one attractor only"):
+    with pytest.raises(StructureError, match="only one attractor"):
         measure_energies(osc, dataclasses.replace(structure, attractors=structure.attractors[:1]))
 
 
@@ -125,23 +134,21 @@ def one_table(monkeypatch, tmp_path):
     """The command with small tables in place of the long ones."""
     row = TradeRow("RK4", "RK4(steps=32)", 32.0, 1e-3, 1e-3, 1e-6, 1e-5, 40.0)
     steppers = Trade((row,), (), {}, {}, {}, checked=0.0, starts=1, periods=1, threads=1)
-    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc, progress: steppers)
-    monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc, progress: "basins")
+    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: steppers)
+    monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
     return ["-o", str(tmp_path / "trade.png")]
 
 
 def test_the_command_prints_the_table(one_table, trade, monkeypatch, capsys):
     asked = []
-    monkeypatch.setattr(
-        "vibrokit.trade.energies.measure_energies", lambda osc, source, progress: asked.append(source) or trade
-    )
-    assert main(["trade", "double-well", "--source", "0", *one_table]) == 0
+    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: asked.append(source) or trade)
+    assert main(["trade", "double-well", "--source", "left-rest", *one_table]) == 0
     assert str(trade) in capsys.readouterr().out
-    assert asked == [0]
+    assert asked == ["left-rest"]
 
 
 def test_the_command_says_why_there_is_no_table(one_table, tmp_path, capsys):
     scene = tmp_path / "quiet.toml"
     scene.write_text("natural_frequency = 1.0\ndamping_ratio = 0.05\n")
     assert main(["trade", str(scene), *one_table]) == 0
-    assert "energies: the scene has no noise" in capsys.readouterr().err
+    assert "vibrokit: the scene has no noise" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""What `vibrokit trade` measures: known orders come out, refusals are told, table and figure are complete."""
+"""What `vibrokit trade` measures of steppers: known orders, steppers that cannot be used, table and figure."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_table(linear):
 
 def test_figure(linear):
     artists = work_precision(linear.rows)
-    axes = artists[0].axes
+    axes = artists.ax
     assert axes.get_xscale() == axes.get_yscale() == "log"
     labels = axes.get_legend_handles_labels()[1]
     assert {"RK4, ensemble", "RK4, alone", "default: RK4(steps=256)"} <= set(labels)
@@ -70,16 +70,16 @@ def test_figure(linear):
 def test_refusal_is_told():
     trade = measure_steppers(load_scene("duffing"), ladders=LADDERS, **SETTINGS)
     assert list(trade.refused) == ["FreeFlight"]
-    assert "FreeFlight: refused. FreeFlight needs linear motion" in str(trade)
+    assert "FreeFlight: not used. FreeFlight needs linear motion" in str(trade)
     assert trade.references == {"RK4": "Order8 at 1e-14", "Order8": "DOP853 at 2.3e-14"}
 
 
 def test_progress_reaches_its_total():
-    calls = []
+    updates = []
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
-    measure_steppers(osc, ladders=((vk.RK4(64), vk.RK4(128)),), progress=lambda *c: calls.append(c), **SETTINGS)
-    assert calls[0] == (0, 3)
-    assert calls[-1] == (3, 3)
+    measure_steppers(osc, ladders=((vk.RK4(64), vk.RK4(128)),), progress=updates.append, **SETTINGS)
+    seen = [(update.done, update.total) for update in updates if update.stage == "steppers" and not update.compiling]
+    assert list(dict.fromkeys(seen)) == [(0, None), (1, 3), (2, 3), (3, 3)]
 
 
 @pytest.mark.parametrize("places", [(), (0.5,), (-0.5,), (0.0,)])
@@ -102,8 +102,9 @@ def test_reference_crosses_contacts():
 def test_command(tmp_path, monkeypatch, capsys):
     small = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
     trade = measure_steppers(small, ladders=LADDERS[:1], **SETTINGS)
-    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc, progress: trade)
-    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source, progress: "energies")
+    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: trade)
+    monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
+    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
     assert str(trade) in capsys.readouterr().out

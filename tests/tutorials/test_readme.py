@@ -14,6 +14,7 @@ import vibrokit as vk
 from vibrokit import cli
 from vibrokit.analyzers.settings import configured, setting
 from vibrokit.registry import Group, load
+from vibrokit.results.finding import Code
 
 REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"
@@ -58,7 +59,7 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert made["osc"] == vk.load_scene("hertz-0.570")
         assert [state.impacts for state in made["states"].attractors] == [0, 2]
         assert made["result"].energies[0].value == pytest.approx(7.9052e-5, rel=1e-4)  # what the README says of it
-        assert "they agree" in printed
+        assert len(made["result"].found(Code.AGREEMENT)) == 1
         assert float(made["Cubic"](stiffness=2.0).force(0.5, 1.0)) == 0.25
     elif page.stem == "contact-law":
         assert "False False 3/2" in printed
@@ -66,13 +67,13 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
     elif page.stem == "least-action":
         assert (made["r"].energies[0].source, made["r"].energies[0].target) == (0, 1)
         assert made["r"].energies[0].certificate.residual < 1e-9
-        assert "they agree" in printed
+        assert len(made["r"].found(Code.AGREEMENT)) == 1
         well = 4 * 0.05 * 0.25  # 4ζω_n times the barrier, either way
         assert made["t"].energies == pytest.approx(np.array([[0, well], [well, 0]]), rel=1e-6)
         touch = 2 * 0.01 * (0.5 - 0.2 - 0.18 / abs(1 - 0.57**2 + 0.02j * 0.57)) ** 2
         assert made["touch"].energies[0].value == pytest.approx(touch, rel=1e-8)
     elif page.stem == "steppers":
-        assert "RK4: steps is 0; give a whole number from 1 to 10000000." in printed
+        assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
         assert errors.shape == (3, 2)
         orders = np.log(errors[:-1] / errors[1:]) / np.log(4)

@@ -13,6 +13,7 @@ import vibrokit as vk
 from vibrokit.errors import SceneError, StepperError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.structure.linear_map import gaussian_map
 from vibrokit.symbolic.flow_kind import Flow
 
 OMEGA, STOP, STIFFNESS, DAMPING = 0.57, 0.5, 50.0, 0.02
@@ -27,15 +28,23 @@ def paper():
     return vk.load_scene("hertz-0.570")
 
 
-def carried(osc, flow, stepper, state, start_time=0.0, interval=None):
+def linearised(osc, stepper, state, start_time=0.0, interval=None):
+    """Where a motion ends, the derivative of that by the start, and the covariance."""
+    found = gaussian_map(osc, np.array([state]), stepper, start_time=start_time, interval=interval)
+    return found.images[0], found.derivatives[0], found.covariances[0]
+
+
+def carried(osc, stepper, state, start_time=0.0, interval=None):
     """Where a motion ends, and its covariance."""
-    size = len(state)
-    rows, columns = np.triu_indices(size)
-    start = np.concatenate([state, np.zeros(len(rows))])
-    ended = run_ensemble(osc, flow, stepper, start[None], start_time=start_time, interval=interval)
-    covariance = np.zeros((size, size))
-    covariance[rows, columns] = covariance[columns, rows] = ended.states[0, size:]
-    return ended.states[0, :size], covariance
+    end, _, covariance = linearised(osc, stepper, state, start_time, interval)
+    return end, covariance
+
+
+def carried_back(osc, stepper, state, start_time, interval):
+    """The same of the motion backwards in time."""
+    start = np.concatenate([state, np.zeros(3)])
+    ended = run_ensemble(osc, Flow.COVARIANCE_REVERSED, stepper, start[None], start_time=start_time, interval=interval)
+    return ended.states[0, :2], ended.states[0, [2, 3, 3, 4]].reshape(2, 2)
 
 
 def reference(state, start, duration, amplitude):
@@ -94,9 +103,10 @@ def off(found, true):
 @pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
 def test_through_the_stops_of_the_paper(paper, stepper):
     for start in HITTING:
-        end, _, true = reference(start, 0.4, paper.section_interval, additive)
-        found, covariance = carried(paper, Flow.GRAMIAN, stepper, start, 0.4)
+        end, moved, true = reference(start, 0.4, paper.section_interval, additive)
+        found, derivative, covariance = linearised(paper, stepper, start, 0.4)
         assert np.abs(found - end).max() < 1e-10
+        assert np.abs(derivative - moved).max() < 1e-9 * np.abs(moved).max()
         assert off(covariance, true) < 1e-9
 
 
@@ -105,7 +115,7 @@ def test_fixed_steps_converge(paper):
     true = [reference(start, 0.0, paper.section_interval, additive)[2] for start in HITTING]
     errors = []
     for steps in (512, 2048, 8192):
-        found = [carried(paper, Flow.GRAMIAN, vk.RK4(steps), start)[1] for start in HITTING]
+        found = [carried(paper, vk.RK4(steps), start)[1] for start in HITTING]
         errors.append(np.mean([off(*pair) for pair in zip(found, true, strict=True)]))
     assert errors[2] < 1e-2
     assert errors[2] < errors[0] / 16
@@ -120,7 +130,7 @@ def test_short_times_between_the_stops(paper, stepper, duration):
     """C_xx = t³/3 beside C_vv = t: each entry is right by its own size."""
     matrix = np.array([[0.0, 1.0], [-1.0, -DAMPING]])
     _, true = gathered_in(matrix, np.diag([0.0, 1.0]), duration)
-    _, found = carried(paper, Flow.GRAMIAN, stepper, CLEAR, interval=duration)
+    _, found = carried(paper, stepper, CLEAR, interval=duration)
     np.testing.assert_allclose(found, true, rtol=1e-8)
 
 
@@ -147,7 +157,7 @@ def test_states_of_the_noise_have_a_covariance_too(stepper):
     matrix = np.array([[0.0, 1.0, 0.0], [-1.0, -0.6, 1.0], [0.0, 0.2, -9.0]])
     moved, true = gathered_in(matrix, np.diag([0.0, 0.0, 4.0]), osc.section_interval)
     start = np.array([0.3, -0.2, 0.5])
-    end, found = carried(osc, Flow.GRAMIAN, stepper, start)
+    end, found = carried(osc, stepper, start)
     np.testing.assert_allclose(end, moved @ start, atol=1e-9)
     assert off(found, true) < 1e-9
 
@@ -159,7 +169,7 @@ def test_backwards_it_is_the_covariance_pulled_back_to_the_start(paper):
     stepper, duration, begin = vk.FreeFlight(1e-13), 5.0, 0.4
     for start in HITTING:
         end, moved, covariance = reference(start, begin, duration, additive)
-        found, backwards = carried(paper, Flow.GRAMIAN_REVERSED, stepper, FLIP @ end, -begin - duration, duration)
+        found, backwards = carried_back(paper, stepper, FLIP @ end, -begin - duration, duration)
         back = np.linalg.inv(moved)
         assert np.abs(FLIP @ found - start).max() < 1e-9
         assert off(FLIP @ backwards @ FLIP, back @ covariance @ back.T) < 1e-8
@@ -174,14 +184,14 @@ def test_noise_that_depends_on_the_velocity(paper):
         excitations=paper.excitations,
         noise=vk.StateDependentNoise(1e-5, "1 + v/2 + x**2"),
     )
-    stepper, duration = single_stepper(osc, Flow.GRAMIAN), 4.0
+    stepper, duration = single_stepper(osc, Flow.LINEARISED), 4.0
     assert isinstance(stepper, vk.Order8)
     with pytest.raises(StepperError, match="FreeFlight needs linear motion"):
-        carried(osc, Flow.GRAMIAN, vk.FreeFlight(), CLEAR)
+        carried(osc, vk.FreeFlight(), CLEAR)
     start = HITTING[1]
     end, moved, true = reference(start, 0.0, duration, lambda x, v: 1 + v / 2 + x**2)
-    assert off(carried(osc, Flow.GRAMIAN, stepper, start, interval=duration)[1], true) < 1e-7
-    found, backwards = carried(osc, Flow.GRAMIAN_REVERSED, stepper, FLIP @ end, -duration, duration)
+    assert off(carried(osc, stepper, start, interval=duration)[1], true) < 1e-7
+    found, backwards = carried_back(osc, stepper, FLIP @ end, -duration, duration)
     back = np.linalg.inv(moved)
     assert np.abs(FLIP @ found - start).max() < 1e-7
     assert off(FLIP @ backwards @ FLIP, back @ true @ back.T) < 1e-6
@@ -209,12 +219,14 @@ class Piecewise:
     PUSHED = np.array([[0.0, 1.0], [-1.0 - K, -0.1 - C]]), np.array([-WALL * K / (1.0 + K), 0.0])  # less its rest
 
     def __init__(self, state):
-        self.state, self.covariance, self.time = np.array(state), np.zeros((2, 2)), 0.0
+        self.state, self.time = np.array(state), 0.0
+        self.derivative, self.covariance = np.eye(2), np.zeros((2, 2))
 
     def follow(self, law, duration):
         matrix, shift = law
         moved, more = gathered_in(matrix, np.diag([0.0, 1.0]), duration)
         self.state = moved @ (self.state + shift) - shift
+        self.derivative = moved @ self.derivative
         self.covariance = moved @ self.covariance @ moved.T + more
         self.time += duration
 
@@ -230,6 +242,7 @@ class Piecewise:
     def jump(self, force):
         """The mass enters (force < 0) or leaves a force that jumps."""
         saltation = np.array([[1.0, 0.0], [force / self.state[1], 1.0]])
+        self.derivative = saltation @ self.derivative
         self.covariance = saltation @ self.covariance @ saltation.T
 
 
@@ -246,24 +259,25 @@ def test_a_damped_stop_in_closed_form(adhesive):
         true.until(true.PUSHED, lambda x, v: K * (x - WALL) + C * v, 0.1, 0.6)
         true.until(true.FREE, lambda x, v: x - WALL, 1e-9, 0.3)
     true.follow(true.FREE, duration - true.time)
-    end, covariance = carried(osc, Flow.GRAMIAN, vk.FreeFlight(1e-13), [0.1, 0.7], interval=duration)
+    end, derivative, covariance = linearised(osc, vk.FreeFlight(1e-13), [0.1, 0.7], interval=duration)
     np.testing.assert_allclose(end, true.state, atol=1e-11)
+    np.testing.assert_allclose(derivative, true.derivative, atol=1e-10)
     assert off(covariance, true.covariance) < 1e-10
 
 
 def test_fixed_steps_refuse_forces_that_jump():
     osc = damped_stop(False)
     with pytest.raises(StepperError, match="FreeFlight or Order8"):
-        carried(osc, Flow.GRAMIAN, vk.RK4(), CLEAR)
-    assert isinstance(ensemble_stepper(osc, Flow.GRAMIAN), vk.FreeFlight)
-    assert isinstance(ensemble_stepper(osc, Flow.GRAMIAN_REVERSED), vk.FreeFlight)
+        carried(osc, vk.RK4(), CLEAR)
+    assert isinstance(ensemble_stepper(osc, Flow.LINEARISED), vk.FreeFlight)
+    assert isinstance(ensemble_stepper(osc, Flow.COVARIANCE_REVERSED), vk.FreeFlight)
 
 
 # --- choice
 
 
 def test_steppers_chosen(paper):
-    for flow in (Flow.GRAMIAN, Flow.GRAMIAN_REVERSED):
+    for flow in (Flow.LINEARISED, Flow.COVARIANCE_REVERSED):
         assert ensemble_stepper(paper, flow) == vk.RK4(256)
         assert isinstance(single_stepper(paper, flow), vk.FreeFlight)
 
@@ -271,4 +285,4 @@ def test_steppers_chosen(paper):
 def test_without_noise_there_is_none():
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
     with pytest.raises(SceneError, match="no random forces"):
-        carried(osc, Flow.GRAMIAN, vk.RK4(), CLEAR)
+        carried(osc, vk.RK4(), CLEAR)

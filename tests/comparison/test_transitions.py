@@ -5,26 +5,29 @@ import mpmath
 import numpy as np
 import pytest
 
+from vibrokit.comparison.in_trees import cheapest_tree, tree_costs
+from vibrokit.comparison.transitions import Transitions
 from vibrokit.errors import StructureError
-from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.in_trees import cheapest_tree, tree_cost
-from vibrokit.results.transitions import Transitions
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.result import Result
+from vibrokit.results.section import Section
 
 INF = math.inf
+NAMES = tuple("abcdefghijkl")
 # Worked by hand. W_0 = V21 + V10 = 3.5, W_1 = V01 + V21 = 2.5, W_2 = V01 + V12 = 4.
 THREE = [[0, 1, 5], [2, 0, 3], [4, 1.5, 0]]
 # A chain 0 – 1 – 2 – 3 has one tree for each root: W = 2+4+6, 1+4+6, 1+3+6, 1+3+5.
 CHAIN = [[0, 1, INF, INF], [2, 0, 3, INF], [INF, 4, 0, 5], [INF, INF, 6, 0]]
 
 
-def exact(energies, labels=None):
+def exact(energies):
     values = np.array(energies, dtype=float)
-    return Transitions(tuple(labels or range(len(values))), values, values.copy(), values.copy())
+    return Transitions(NAMES[: len(values)], values, values.copy(), values.copy())
 
 
 def between(lower, upper):
     lower, upper = np.array(lower, dtype=float), np.array(upper, dtype=float)
-    return Transitions(tuple(range(len(lower))), (lower + upper) / 2, lower, upper)
+    return Transitions(NAMES[: len(lower)], (lower + upper) / 2, lower, upper)
 
 
 def all_tree_costs(energies, root):
@@ -59,7 +62,12 @@ def jump_generator(energies, intensity):
 
 
 def energy(source, target, value, error=0.0):
-    return ActivationEnergy(source, target, value, value - error, value + error, "test", 0.0)
+    return ActivationEnergy(source, target, value, value - error, value + error, "test", Bound.CERTIFIED)
+
+
+def result(count, *energies, scene="one"):
+    section = Section(labels=np.zeros((1, 1), dtype=np.int16), bounds=np.zeros((2, 2)), points=(), names=NAMES[:count])
+    return Result(energies=energies, section=section, scene={"name": scene})
 
 
 # Weights
@@ -91,7 +99,7 @@ def test_the_cheapest_tree_is_that_of_trying_all(seed):
     before = costs.copy()
     for root in range(count):
         least = min((c for c in all_tree_costs(costs, root) if math.isfinite(c)), default=INF)
-        assert tree_cost(costs, root) == pytest.approx(least, rel=1e-14)
+        assert tree_costs(costs)[root] == pytest.approx(least, rel=1e-14)
         tree = cheapest_tree(costs, root)
         assert (tree is None) == math.isinf(least)
         if tree is not None:
@@ -112,7 +120,7 @@ def test_in_detailed_balance_weights_are_depths(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_ways_through_others_change_no_weight(seed):
+def test_routes_through_others_change_no_weight(seed):
     """Freidlin and Wentzell, chapter 6, section 4."""
     energies = np.random.default_rng(seed).exponential(size=(7, 7)) ** 3
     np.fill_diagonal(energies, 0.0)
@@ -132,7 +140,6 @@ def test_stationary_weights_are_those_of_the_jump_process():
     found = exact(THREE).stationary_weights(intensity)
     assert found.weights.sum() == pytest.approx(1)
     np.testing.assert_allclose(-intensity * np.log(found.weights), exponents, atol=intensity * math.log(3))
-    assert "Prefactors are left out" in str(found)
 
 
 def test_tiny_noise_does_not_overflow():
@@ -179,11 +186,11 @@ def test_a_bracket_that_all_trees_share_changes_nothing():
     assert transitions.most_stable == 1
 
 
-def test_overlapping_brackets_are_undecided_in_words():
+def test_overlapping_brackets_do_not_decide():
     transitions = between([[0, 1], [1.4, 0]], [[0, 2], [1.5, 0]])
     assert transitions.most_stable is None
     assert transitions.leading == (0, 1)
-    assert "undecided between attractors 0, 1" in str(transitions)
+    assert "a, b" in transitions.verdict
 
 
 def test_equal_attractors_are_undecided():
@@ -193,15 +200,16 @@ def test_equal_attractors_are_undecided():
 # What was not found
 
 
-def test_an_attractor_that_no_exit_was_found_from_leaves_all_open():
-    transitions = exact([[0, 1, 2], [INF, 0, INF], [3, 1, 0]], labels=(4, 5, 6))
-    assert transitions.not_left == (5,)
+def test_an_attractor_without_a_known_exit_leaves_all_open():
+    transitions = exact([[0, 1, 2], [INF, 0, INF], [3, 1, 0]])
+    assert transitions.missing == (1,)
     assert transitions.most_stable is None
+    assert transitions.leading == ()
     assert np.isnan(transitions.weights).all()
     assert np.isnan(transitions.stationary_weights(1.0).weights).all()
-    assert "No exit was found from attractor 5" in str(transitions)
+    assert "No exit from b" in transitions.verdict
     assert "not known" in str(transitions.stationary_weights(1.0))
-    assert [(e.members, e.target) for e in transitions.order_of_escapes] == [((4,), 5), ((6,), 5)]
+    assert [(cycle.members, cycle.target) for cycle in transitions.cycle_hierarchy] == [((0,), 1), ((2,), 1)]
 
 
 def test_two_pairs_that_nothing_joins_leave_all_open():
@@ -209,54 +217,54 @@ def test_two_pairs_that_nothing_joins_leave_all_open():
     np.fill_diagonal(energies, 0.0)
     energies[0, 1] = energies[1, 0] = energies[2, 3] = energies[3, 2] = 1.0
     transitions = exact(energies)
-    assert transitions.most_stable is None
-    assert "reached from all others" in str(transitions)
+    assert (transitions.missing, transitions.known, transitions.most_stable) == ((), False, None)
 
 
-def test_an_attractor_that_no_way_was_found_into_has_weight_zero():
+def test_an_attractor_that_is_not_reached_has_weight_zero():
     transitions = exact([[0, 1, INF], [2, 0, INF], [1, 1, 0]])
     assert transitions.weights.tolist() == [1, 0, INF]
     assert transitions.stationary_weights(0.1).weights[2] == 0
-    assert "No way was found into attractor 2" in transitions.verdict
+    assert "No path to c" in transitions.verdict
 
 
-def test_nothing_and_one_attractor():
-    assert exact(np.zeros((0, 0))).order_of_escapes == ()
-    assert "no attractor" in str(exact(np.zeros((0, 0))))
-    alone = exact([[0]], labels=(3,))
-    assert alone.most_stable == 3
+def test_none_and_one_attractor():
+    assert exact(np.zeros((0, 0))).cycle_hierarchy == ()
+    assert not exact(np.zeros((0, 0))).known
+    alone = exact([[0]])
+    assert alone.most_stable == 0
     assert alone.stationary_weights(1.0).weights.tolist() == [1.0]
 
 
-# Order of escapes
+# Cycle hierarchy
 
 
 def seen(transitions):
-    return [(e.members, e.source, e.target, e.energy) for e in transitions.order_of_escapes]
+    return [(c.members, c.source, c.target, c.energy) for c in transitions.cycle_hierarchy]
 
 
-def test_escapes_worked_by_hand():
-    """0 and 1 go to and fro; the pair is left from 1, where it mostly is, for 2 at 3 (from 0: 1 + 5)."""
+def test_cycles_worked_by_hand():
+    """The motion cycles between 0 and 1; the pair is left from 1, where it mostly is, for 2 at 3 (from 0: 1 + 5)."""
     assert seen(exact(THREE)) == [((0,), 0, 1, 1), ((2,), 2, 1, 1.5), ((1,), 1, 0, 2), ((0, 1), 1, 2, 3)]
 
 
 def test_groups_within_groups():
     """Within the pair of 0 and 1 the weight of 0 has the exponent 1, so that it is left at min(1 + 4, 7) from 0."""
     energies = [[0, 1, 4, 9], [2, 0, 7, 9], [6, 9, 0, 9], [9, 9, 8, 0]]
-    found = seen(exact(energies, labels=(10, 11, 12, 13)))
-    assert found[:4] == [((10,), 10, 11, 1), ((11,), 11, 10, 2), ((10, 11), 10, 12, 5), ((12,), 12, 10, 6)]
+    found = seen(exact(energies))
+    assert found[:4] == [((0,), 0, 1, 1), ((1,), 1, 0, 2), ((0, 1), 0, 2, 5), ((2,), 2, 0, 6)]
     # W within {0, 1, 2}: to 0: 2 + 6, to 1: 1 + 6, to 2: 2 + 4 (0 → 2 and 1 → 0), so 2, 1, 0; left from 2 at 9.
-    assert found[4:] == [((13,), 13, 12, 8), ((10, 11, 12), 12, 13, 9)]
+    assert found[4:] == [((3,), 3, 2, 8), ((0, 1, 2), 2, 3, 9)]
 
 
-def test_the_words_name_the_groups():
-    words = str(exact(THREE))
-    assert "attractor 0 is left for 1 at 1" in words
-    assert "the group 0, 1 is left from 1 for 2 at 3" in words
+def test_the_text_names_attractors_and_groups():
+    text = str(exact(THREE))
+    assert "a → b: 1\n" in text
+    assert "b → c: 3, from the group a, b" in text
+    assert "most stable attractor under weak noise is b" in text
 
 
-def test_escapes_carry_their_bounds():
-    (first, second) = between([[0, 1], [2, 0]], [[0, 1.5], [4, 0]]).order_of_escapes
+def test_cycles_carry_their_bounds():
+    (first, second) = between([[0, 1], [2, 0]], [[0, 1.5], [4, 0]]).cycle_hierarchy
     assert (first.lower, first.upper) == (1, 1.5)
     assert (second.lower, second.upper) == (2, 4)
 
@@ -269,18 +277,18 @@ def test_groups_are_left_at_the_rate_of_the_jump_process(seed):
     np.fill_diagonal(energies, 0.0)
     intensity = 0.005
     generator = jump_generator(energies, intensity)
-    for escape in exact(energies).order_of_escapes:
-        inside = list(escape.members)
+    for cycle in exact(energies).cycle_hierarchy:
+        inside = list(cycle.members)
         own = mpmath.matrix([[-generator[i, j] for j in inside] for i in inside])
         times = mpmath.lu_solve(own, mpmath.ones(len(inside), 1))
         longest = float(intensity * mpmath.log(max(times)))
-        assert longest == pytest.approx(escape.energy, abs=intensity * math.log(16))  # of at most 16 trees each
+        assert longest == pytest.approx(cycle.energy, abs=intensity * math.log(16))  # of at most 16 trees each
 
 
-# Ways
+# Routes
 
 
-def test_ways_go_through_others_where_that_is_cheaper():
+def test_routes_lead_through_others_where_that_is_cheaper():
     transitions = exact(THREE)
     np.testing.assert_array_equal(transitions.quasi_potentials, [[0, 1, 4], [2, 0, 3], [3.5, 1.5, 0]])
     assert transitions.route(0, 2) == (0, 1, 2)
@@ -288,12 +296,13 @@ def test_ways_go_through_others_where_that_is_cheaper():
     assert transitions.route(1, 1) == (1,)
     assert exact([[0, INF], [1, 0]]).route(0, 1) == ()
     assert exact([[0, 0, INF], [0, 0, 0], [INF, 0, 0]]).route(2, 0) == (2, 1, 0)  # at no cost
-    with pytest.raises(StructureError, match="label 7"):
+    assert transitions.route("a", "c") == (0, 1, 2)
+    with pytest.raises(StructureError, match="no attractor 7"):
         transitions.route(0, 7)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_routes_cost_what_is_said(seed):
+def test_routes_cost_the_quasi_potential(seed):
     energies = np.random.default_rng(seed).exponential(size=(6, 6)) ** 3
     np.fill_diagonal(energies, 0.0)
     transitions = exact(energies)
@@ -304,26 +313,57 @@ def test_routes_cost_what_is_said(seed):
         assert cost == pytest.approx(transitions.quasi_potentials[source, target], rel=1e-14)
 
 
-# Making one
+# From results
 
 
-def test_the_least_of_each_pair_is_collected():
-    found = [energy(0, 1, 3.0, 0.5), energy(0, 1, 2.8, 0.1), energy(1, 0, 4.0), energy(0, -2, 1.0), energy(9, 0, 1.0)]
-    transitions = Transitions.of((0, 1), found)
+def test_the_least_energy_of_each_pair_is_collected():
+    first = result(2, energy(0, 1, 3.0, 0.5), energy(1, 0, 4.0), energy(0, -1, 1.0))
+    transitions = Transitions.of(first, result(2, energy(0, 1, 2.8, 0.1)))
     np.testing.assert_array_equal(transitions.energies, [[0, 2.8], [4, 0]])
-    np.testing.assert_array_equal(transitions.lower, [[0, 2.5], [4, 0]])
+    np.testing.assert_allclose(transitions.lower, [[0, 2.7], [4, 0]])
     np.testing.assert_allclose(transitions.upper, [[0, 2.9], [4, 0]])
-    nothing = Transitions.of((0, 1, 2), [])
-    assert np.isinf(nothing.energies[~np.eye(3, dtype=bool)]).all()
-    assert nothing.not_left == (0, 1, 2)
+    assert transitions.names == ("a", "b")
+
+
+def test_an_attractor_that_was_not_analyzed_is_missing():
+    transitions = Transitions.of(result(3, energy(0, 1, 1.0), energy(1, 0, 2.0)))
+    assert transitions.missing == (2,)
+    assert transitions.lower[2].tolist() == [0, 0, 0]
+    assert np.isinf(transitions.upper[2, :2]).all()
+
+
+def test_an_upper_bound_excludes_no_other_exit():
+    """With nothing excluded, the exit from 0 to 2 may cost nothing: then W_2 = 5 and W_1 = 6."""
+    upper = ActivationEnergy(0, 1, 1.0, 0.0, 1.0, "action plot", Bound.UPPER)
+    transitions = Transitions.of(result(3, upper, energy(1, 0, 5.0), energy(2, 1, 6.0)))
+    np.testing.assert_array_equal(transitions.lower, [[0, 0, 0], [5, 0, INF], [INF, 6, 0]])
+    assert transitions.weights.tolist() == [4, 0, INF]
+    assert transitions.leading == (1, 2)
+    both = Transitions.of(result(2, upper, ActivationEnergy(1, 0, 5.0, 0.0, 5.0, "action plot", Bound.UPPER)))
+    assert both.leading == (0, 1)
+    assert [array.tolist() for array in both.weight_bounds] == [[0, 0], [5, 1]]
+
+
+@pytest.mark.parametrize(
+    "results",
+    [
+        (),
+        (result(2),),
+        (result(2, energy(0, -1, 1.0)),),
+        (result(2, energy(0, 1, 1.0)), result(3, energy(0, 1, 1.0))),
+        (result(2, energy(0, 1, 1.0)), result(2, energy(0, 1, 1.0), scene="two")),
+    ],
+)
+def test_results_without_transitions_are_refused(results):
+    with pytest.raises(StructureError, match="transitions"):
+        Transitions.of(*results)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"labels": (0, 0)}, "2 labels, 1 of them different"),
-        ({"labels": tuple(range(300))}, "at most 200"),
-        ({"lower": np.zeros((2, 3))}, "lower of shape"),
+        ({"names": ("a", "a")}, "must differ"),
+        ({"lower": np.zeros((2, 3))}, "need lower of shape"),
         ({"energies": np.array([[0, np.nan], [1, 0]])}, "no NaN"),
         ({"lower": np.array([[0, 2.0], [1, 0]])}, "lower ≤ energies"),
         ({"upper": np.zeros((2, 2))}, "energies ≤ upper"),
@@ -332,10 +372,10 @@ def test_the_least_of_each_pair_is_collected():
 def test_what_is_no_transition_matrix_is_refused(change, words):
     values = np.array([[0.0, 1.0], [1.0, 0.0]])
     with pytest.raises(StructureError, match=words):
-        Transitions(**({"labels": (0, 1), "energies": values, "lower": values, "upper": values} | change))
+        Transitions(**({"names": ("a", "b"), "energies": values, "lower": values, "upper": values} | change))
 
 
 @pytest.mark.parametrize("intensity", [0, -1.0, math.nan, math.inf])
-def test_noise_that_is_none_is_refused(intensity):
+def test_a_noise_intensity_must_be_positive(intensity):
     with pytest.raises(StructureError, match="noise intensity"):
         exact(THREE).stationary_weights(intensity)

@@ -1,0 +1,89 @@
+"""What LeastAction keeps when it is stopped, and attractors that have left already."""
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.exits import LeaveRegion
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Code
+
+OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
+EXACT = 4 * 0.3 * 0.25
+SMALL = {"graph": vk.GraphSearch(nodes=(40, 40), steps_per_period=8), "shooting": vk.Shooting(points=200, rounds=3)}
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return vk.find_structure(OSC, cells=(20, 20), starts=(8, 8), manifolds=False)
+
+
+def stopped_at(structure, stage, done):
+    """Run until something is done in a stage, and stop there."""
+
+    def interrupt(update):
+        if update.stage == stage and update.done >= done and not update.finished:
+            raise KeyboardInterrupt
+
+    return vk.LeastAction(**SMALL).run(OSC, structure, progress=interrupt)
+
+
+@pytest.mark.parametrize(
+    ("stage", "done", "methods", "branches"),
+    [
+        ("graph", 0, [], 0),
+        ("action plot", 0, ["graph"], 0),
+        ("polishing", 0, ["graph"], 0),
+        ("polishing", 1, ["least action"], 1),
+        ("certifying", 0, ["graph"], 0),
+        ("certifying", 1, ["least action"], 1),
+    ],
+)
+def test_what_was_found_before_a_stop_is_kept(structure, stage, done, methods, branches):
+    result = stopped_at(structure, stage, done)
+    assert not result.complete
+    (finding,) = result.found(Code.STOPPED)
+    assert finding.source == 0
+    assert finding.values == {"stage": stage, "reason": "interrupt"}
+    assert [energy.method for energy in result.energies] == methods
+    assert len(result.branches) == branches
+    for energy in result.energies:
+        assert energy.lower <= EXACT <= energy.upper
+    assert not result.found(Code.NO_EXIT_FOUND)
+
+
+def test_the_time_limit_stops_likewise(structure):
+    result = vk.LeastAction(**SMALL).run(OSC, structure, time_limit=1e-9)
+    assert not result.complete
+    (finding,) = result.found(Code.STOPPED)
+    assert finding.values["reason"] == "time limit"
+
+
+def test_the_result_has_the_graph_s_potential_and_the_work_done(structure):
+    result = vk.LeastAction(**SMALL).run(OSC, structure)
+    assert result.complete
+    assert [(energy.source, energy.target) for energy in result.energies] == [(0, 1), (1, 0)]
+    for energy in result.energies:
+        assert energy.value == pytest.approx(EXACT, rel=1e-6)
+        assert energy.lower <= EXACT <= energy.upper
+    assert "quasi_potential" in result.data
+    assert result.stats.newton_iterations > 10
+    assert {"graph", "action plot", "polishing", "certifying"} <= set(result.stats.seconds)
+
+
+class LeaveLeft(LeaveRegion):
+    """Being to the right of x = −0.5; the left well is to the left of it."""
+
+    def bounds(self, osc):
+        return np.array([[-0.5, np.inf], [-np.inf, np.inf]])
+
+
+def test_an_attractor_that_has_left_already_costs_nothing(structure):
+    result = vk.LeastAction(source="left-rest", exit=LeaveLeft(), **SMALL).run(OSC, structure)
+    (energy,) = result.energies
+    assert (energy.source, energy.target) == (0, -1)
+    assert (energy.value, energy.lower, energy.upper, energy.numerical_error) == (0, 0, 0, 0)
+    assert energy.bound is Bound.CERTIFIED
+    (finding,) = result.found(Code.AT_EXIT)
+    assert finding.source == 0
+    assert result.complete

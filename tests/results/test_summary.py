@@ -1,0 +1,72 @@
+"""How records show themselves in a console and in a notebook."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tests.builders import (
+    attractor,
+    empty_result,
+    empty_structure,
+    full_continuation,
+    full_result,
+    full_structure,
+    spiral,
+)  # fmt: skip
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.trajectory import Trajectory
+
+
+@pytest.mark.parametrize(
+    "make",
+    [full_structure, full_result, full_continuation, empty_structure, empty_result],
+    ids=lambda make: make.__name__,
+)
+def test_five_lines_are_enough(make):
+    assert 1 <= len(repr(make()).splitlines()) <= 5
+    assert max(map(len, repr(make()).splitlines())) <= 180
+
+
+def test_a_result_shows_three_energies_and_the_first_warning():
+    result = full_result()
+    title, first, second, third, warning = repr(result).splitlines()
+    assert title == "LeastActionResult: 3 energies"
+    assert first.startswith("  clear → hammering-period-4: ΔU = 9e-05 m² s⁻³, ")
+    assert "… and" not in third
+    assert warning == "  error: No exit path from hammering-period-4 was found."
+    info = Finding.of(Code.SADDLES, count=3)
+    more = dataclasses.replace(result, energies=result.energies + result.energies[:2], findings=(info,))
+    assert repr(more).splitlines()[:3] == ["LeastActionResult: 5 energies", first, second]
+    assert repr(more).endswith(" … and 2 more")
+
+
+def test_long_sentences_are_cut_and_stay_on_one_line():
+    finding = Finding.of(Code.SOURCE_FAILED, 0, reason="first line\nsecond line " + "and so on " * 100)
+    lines = repr(dataclasses.replace(full_result(), findings=(finding,))).splitlines()
+    assert len(lines) == 5
+    assert lines[-1].endswith("…")
+
+
+def test_notebooks_show_a_table_and_all_findings():
+    text = full_structure()._repr_html_()
+    assert text.count("<tr>") == 6
+    assert text.count("<li>") == 3
+    assert "«limit cycle»-4" in text
+
+
+def test_names_are_no_markup():
+    odd = dataclasses.replace(empty_structure(), attractors=(attractor(0, "periodic", 1, name="<b>&"),))
+    assert "&lt;b&gt;&amp;" in odd._repr_html_()
+    assert "<b>&" not in odd._repr_html_()
+
+
+def test_what_carries_arrays_shows_none_of_them():
+    structure, result = full_structure(), full_result()
+    t = np.linspace(0, 1, 1000)
+    for shown in (
+        *structure.attractors, *structure.saddles, *structure.manifolds, structure.basins, result.section,
+        result.energies[0], spiral(), Trajectory(t, np.stack([t, t], axis=1)),
+    ):  # fmt: skip
+        assert "array(" not in repr(shown)
+        assert len(repr(shown)) < 500

@@ -1,0 +1,35 @@
+"""Scenes and parts that several tests use."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import vibrokit as vk
+
+
+def scene(*stops, **more):
+    """ω_n = 1, ζ = 0.01, with some stops; anything can be changed by name."""
+    return vk.Oscillator(**{"natural_frequency": 1.0, "damping_ratio": 0.01, "barriers": stops} | more)
+
+
+def double_well(stiffening=1.0, **more):
+    """x″ + 0.1 x′ − x + x³ = 0."""
+    spring = vk.CubicSpring(linear=-1.0, cubic=stiffening)
+    return scene(damping_ratio=0.05, spring=spring, **more)
+
+
+class Coloured(vk.NoiseModel):
+    """Ornstein–Uhlenbeck noise: white noise through a low pass, with a state of its own."""
+
+    extra_states: ClassVar = ("y",)
+
+    rate: float = vk.parameter("r", "s^-1", above=0)
+
+    def amplitude(self, x, v):
+        return self.rate
+
+    def force(self, y):
+        return y
+
+    def drift(self, x, v, y):
+        return (-self.rate * y,)

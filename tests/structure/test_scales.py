@@ -1,0 +1,102 @@
+"""The size of the motions of a scene follows from the formulas of its excitations."""
+
+import math
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.parts.functions import cos, sin, tanh
+from vibrokit.structure.scales import length_of
+
+
+class Square(vk.Excitation):
+    """A smoothed square wave."""
+
+    strength: float = vk.parameter("s", "m s^-2")
+    duration: float = vk.parameter("d", "s", above=0)
+    sharpness: ClassVar = 20
+
+    def force(self, t):
+        return self.strength * tanh(self.sharpness * cos(2 * math.pi * t / self.duration))
+
+    @property
+    def period(self):
+        return self.duration
+
+
+class TwoTones(vk.Excitation):
+    """Two tones that are never at their largest together."""
+
+    strength: float = vk.parameter("s", "m s^-2")
+    rate: float = vk.parameter("r", "s^-1", above=0)
+
+    def force(self, t):
+        return self.strength * (cos(self.rate * t + 1) + cos(2 * self.rate * t))
+
+    @property
+    def period(self):
+        return 2 * math.pi / self.rate
+
+
+class Push(vk.Excitation):
+    """A constant under another name."""
+
+    strength: float = vk.parameter("s", "m s^-2")
+
+    def force(self, t):
+        return self.strength
+
+    @property
+    def period(self):
+        return None
+
+
+class Incommensurate(vk.Excitation):
+    """Two tones without a common period."""
+
+    strength: float = vk.parameter("s", "m s^-2")
+
+    def force(self, t):
+        return self.strength * (sin(t) + sin(math.sqrt(2) * t))
+
+    @property
+    def period(self):
+        return math.inf
+
+
+STOPS = (vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.5, "left"))
+
+
+def scene(*excitations, stops=(), frequency=1.0):
+    return vk.Oscillator(natural_frequency=frequency, damping_ratio=0.1, barriers=stops, excitations=excitations)
+
+
+def test_harmonic_and_constant_forces_count_by_amplitude_and_force():
+    forces = vk.Harmonic(-0.7, 0.57), vk.Constant(-0.4)
+    assert length_of(scene(*forces, frequency=2.0)) == (5 * 0.7 + 0.4) / 4
+    assert length_of(scene(*forces, stops=STOPS[:1])) == 5 * 0.7 + 0.4
+    assert length_of(scene(*forces, stops=STOPS)) == 0.7 + 0.4
+    assert length_of(scene(vk.Harmonic(0.1, 0.57), stops=STOPS)) == 1.0
+    assert length_of(scene(vk.Harmonic(0.3, 0.57, phase=1.0))) == pytest.approx(1.5, rel=1e-15)
+    assert length_of(scene()) == 1.0
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e6])
+def test_any_excitation_counts_by_its_largest_force(scale):
+    times = np.linspace(0.0, 2 * math.pi, 2_000_001)
+    two = np.abs(np.cos(times + 1) + np.cos(2 * times)).max()
+    assert length_of(scene(Square(0.7 * scale, 3.0))) == pytest.approx(3.5 * scale, rel=1e-12)
+    assert length_of(scene(TwoTones(0.7 * scale, 3.0))) == pytest.approx(3.5 * two * scale, rel=1e-11)
+    assert length_of(scene(Push(-0.7 * scale))) == 0.7 * scale
+
+
+def test_the_units_of_time_change_nothing():
+    fast = length_of(scene(TwoTones(0.7 * 300.0**2, 900.0), frequency=300.0))
+    assert fast == pytest.approx(length_of(scene(TwoTones(0.7, 3.0))), rel=1e-12)
+
+
+def test_a_force_that_never_repeats_counts_too():
+    osc = scene(Incommensurate(0.7), stops=STOPS[:1])
+    assert 5 * 1.39 < length_of(osc) <= 5 * 1.4

@@ -1,0 +1,131 @@
+"""Stages, counts, time limits and interrupts of long work."""
+
+import pytest
+
+from vibrokit import progress
+from vibrokit.display import Display
+from vibrokit.errors import StructureError
+from vibrokit.progress import OutOfTime, Work, advance, compiling, count, current, report, stage, working
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that tests set."""
+
+    class Clock:
+        now = 100.0
+
+        def perf_counter(self):
+            return self.now
+
+    clock = Clock()
+    monkeypatch.setattr(progress, "time", clock)
+    return clock
+
+
+def test_updates_tell_stage_subject_and_counts():
+    updates = []
+    with working(updates.append), stage("graph", subject="clear", unit="sweeps", total=4):
+        advance()
+        advance(2, "trajectories")  # of another unit
+        report(3)
+    seen = [(u.stage, u.subject, u.done, u.total, u.unit, u.finished) for u in updates]
+    assert seen == [("graph", "clear", done, 4, "sweeps", done == 3 and last) for done, last in
+                    [(0, False), (1, False), (1, False), (3, False), (3, True)]]  # fmt: skip
+
+
+def test_the_time_left_never_grows(clock):
+    updates = []
+    with working(updates.append), stage("basins", total=10):
+        for seconds in (2, 5, 1, 1, 30):
+            clock.now += seconds
+            advance()
+    left = [u.remaining for u in updates if u.remaining is not None]
+    assert left == [18.0, 18.0, 18.0, 13.5, 13.5, 13.5]
+
+
+def test_the_time_left_is_unknown_at_first_and_without_a_total(clock):
+    updates = []
+    with working(updates.append):
+        with stage("basins", total=10):
+            clock.now += 0.5
+            advance()
+        with stage("saddles"):
+            clock.now += 50
+            advance()
+    assert {u.remaining for u in updates} == {None}
+
+
+def test_stages_inside_take_their_subject_and_their_time(clock):
+    with working() as work:
+        with stage("graph", subject="clear"):
+            clock.now += 1
+            with working() as inner, stage("basins"):
+                assert inner.stages[-1].subject == "clear"
+                clock.now += 10
+                count(newton_iterations=3)
+                with compiling():
+                    clock.now += 100
+        assert inner.stats.seconds == {"basins": 10, "compiling": 100}
+    assert work.stats.seconds == {"graph": 1, "basins": 10, "compiling": 100}
+    assert work.stats.newton_iterations == inner.stats.newton_iterations == 3
+
+
+def test_inner_work_counts_for_itself():
+    with working() as outer:
+        count(trajectories=5)
+        with working() as inner:
+            count(trajectories=7)
+        assert inner.stats.trajectories == 7
+    assert outer.stats.trajectories == 12
+    assert current() is not outer
+
+
+def test_a_time_limit_is_raised_once_also_in_inner_work(clock):
+    with working(time_limit=10), working(), stage("graph"):
+        advance()
+        clock.now += 11
+        with pytest.raises(OutOfTime):
+            advance()
+        advance()
+
+
+def test_an_interrupt_is_raised_once_at_the_next_report():
+    with working() as work, working(), stage("graph"):
+        work.interrupt()
+        with pytest.raises(KeyboardInterrupt) as raised:
+            advance()
+        assert type(raised.value) is KeyboardInterrupt
+        advance()
+
+
+def test_a_stage_that_is_interrupted_at_its_beginning_is_closed():
+    with working() as work:
+        work.interrupt()
+        with pytest.raises(KeyboardInterrupt), stage("graph"):
+            pytest.fail("the stage began")
+        assert work.stages == []
+
+
+def test_what_nobody_listens_to_costs_nothing():
+    with stage("graph", total=3):
+        advance()
+        report(2)
+        count(steps=1)
+    assert current().stats == Work().stats
+
+
+@pytest.mark.parametrize("limit", [0, -1, True, float("nan"), float("inf"), "10"])
+def test_time_limits_are_positive_numbers(limit):
+    with pytest.raises(StructureError, match="time_limit"), working(time_limit=limit):
+        pass
+
+
+def test_progress_is_true_none_or_a_function():
+    with pytest.raises(StructureError, match="progress"), working(3):
+        pass
+
+
+def test_progress_true_is_the_display():
+    with working(True) as work:
+        assert type(work.listener) is Display
