@@ -1,5 +1,6 @@
 # make demo   the main job on a bundled scene, in a virtual environment of its own
-# make test   style, types, layers and tests
+# make test   style, types, layers and the tests of seconds
+# make test-slow   the tests that take longer; CI runs them too
 # make docs   the manual, in docs/_build/html
 # make clean  remove what these made
 
@@ -9,7 +10,7 @@ PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test docs clean
+.PHONY: demo test test-slow docs clean
 
 demo: .venv/demo.stamp
 	$(BIN)/vibrokit run hertz-0.570
@@ -19,13 +20,16 @@ test: .venv/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not slow'
+
+test-slow: .venv/test.stamp
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m slow
 
 docs: .venv/docs.stamp
 	$(BIN)/python -m sphinx -b html docs docs/_build/html
 
 clean:
-	rm -rf .venv build dist docs/_build docs/tutorials .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist docs/_build docs/tutorials docs/findings.rst .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A stamp says that what its target needs is installed; it ages when a pyproject.toml changes.
