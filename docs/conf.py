@@ -4,6 +4,7 @@ import ast
 from pathlib import Path
 
 from vibrokit import __version__
+from vibrokit.results.finding import Code
 
 project = "vibrokit"
 author = "The vibrokit developers"
@@ -40,4 +41,19 @@ def write_tutorial_pages(docs: Path) -> None:
         pages.joinpath(f"{script.stem}.rst").write_text(page, encoding="utf-8")
 
 
+def write_findings_page(docs: Path) -> None:
+    """List the codes of findings with their severity, sentence and advice."""
+    lines = [
+        "Findings", "========", "",
+        "``result.findings`` is a tuple of findings. A finding has a code, a severity, attractors and values;",
+        "``str`` of it is its sentence. Words in braces are values; ``{state}`` and ``{goal}`` are attractors.", "",
+    ]  # fmt: skip
+    for code in Code:
+        sentence = " ".join(code.sentence.split()).replace("{", "*{").replace("}", "}*")
+        lines += [f"``{code.value}`` ({code.severity.value})", f"   {sentence}", ""]
+        lines += [f"   *What to do:* {code.advice}", ""] if code.advice else []
+    docs.joinpath("findings.rst").write_text("\n".join(lines), encoding="utf-8")
+
+
 write_tutorial_pages(Path(__file__).parent)
+write_findings_page(Path(__file__).parent)

@@ -1,11 +1,11 @@
 """A scene, its equations, a trajectory
 
-A mass on a spring hangs between two stops. A constant force pushes it towards the right one, a harmonic force shakes
-it, and the stops push back by Hertz's law. For one and the same forcing it can settle into either of two motions: one
-that runs clear of the stops and one that hammers the right stop. This tutorial composes that scene from parts, reads
-the equations that are derived from it, follows trajectories, and finds both motions on the stroboscopic section.
+A mass on a spring moves between two stops. A constant force pushes it towards the right stop, a harmonic force drives
+it, and the stops push back by Hertz's law. At the same forcing the mass can settle into either of two motions: one runs
+clear of the stops, the other hammers the right stop. This tutorial composes the scene from parts, reads the derived
+equations, integrates trajectories, and finds both motions on the stroboscopic section.
 
-Run it with ``python tutorials/01_a_scene.py``; it prints what it finds and saves two pictures.
+Run it with ``python tutorials/01_a_scene.py``. It prints its results and saves two pictures.
 """
 
 from pathlib import Path
@@ -17,9 +17,9 @@ import vibrokit as vk
 # ---------------------------------------------------------------------------------------------------------------------
 # 1. The scene
 #
-# A scene is a sum of parts: x″ + 2ζω_n x′ + ω_n² x = stops + excitations + noise, everything per unit mass. The
-# numbers are those of a published example and have no dimension. A stop is a contact law put somewhere: the law says
-# how hard it pushes at which depth, the barrier says where it is and on which side of the mass.
+# A scene is a sum of parts: x″ + 2ζω_n x′ + ω_n² x = stops + excitations + noise, all per unit mass. The values are
+# those of a published example and are dimensionless. A stop is a contact law at a position: the law gives the force as
+# a function of depth, the barrier the position and the side of the mass.
 
 osc = vk.Oscillator(
     natural_frequency=1.0,
@@ -32,28 +32,31 @@ osc = vk.Oscillator(
     noise=vk.WhiteNoise(intensity=2e-5),
 )
 
-# The same scene comes with the toolkit, as a file that can be read and changed.
+# The toolkit contains the same scene as a file.
 
 assert osc == vk.load_scene("hertz-0.570")
 
-# Every number has a path. To change one, name it; what comes back is a new oscillator, and the old one is as it was.
+# Every parameter has a path. `replace` returns a new oscillator with some of them changed. The end of a path is enough
+# if only one path ends so, and fields of the scene can be given by name.
 
 for path, value in osc.parameters.items():
     print(f"{path:<28} {value:g}")
 
-gentler = osc.replace({"excitations.0.amplitude": 0.1})
+gentler = osc.replace({"amplitude": 0.1})
+assert gentler == osc.replace({"excitations.0.amplitude": 0.1})
+damped = osc.replace(damping_ratio=0.02, noise=vk.WhiteNoise(intensity=1e-4))
 
 # ---------------------------------------------------------------------------------------------------------------------
 # 2. The equations
 #
-# They are derived, not typed in. With noise in the scene these are Hamilton's equations for the most probable paths:
-# p_1 and p_2 are momenta, S the action. With p_1 = p_2 = 0 they are the plain equations of motion. Both stops push the
-# mass back: the right one to the left, with a minus sign, the left one to the right.
+# The equations are derived from the parts. For a scene with noise they are Hamilton's equations of the most probable
+# paths: p_1 and p_2 are momenta, S is the action. With p_1 = p_2 = 0 they are the equations of motion. Both stops push
+# the mass back: the right stop to the left, with a minus sign, the left stop to the right.
 
 print(osc.model)
 
-# The pieces are SymPy expressions (in a notebook, `osc.model` alone shows them typeset). A stop that conserves energy
-# does not change how fast areas of the phase plane shrink: the divergence of the drift is −2ζω_n everywhere.
+# The terms are SymPy expressions; a notebook shows `osc.model` typeset. Stops that conserve energy do not change how
+# fast areas of the phase plane contract: the divergence of the drift is −2ζω_n everywhere.
 
 divergence = osc.model.jacobian.trace()
 print("divergence of the drift:", divergence)
@@ -61,9 +64,9 @@ print("divergence of the drift:", divergence)
 # ---------------------------------------------------------------------------------------------------------------------
 # 3. A trajectory
 #
-# From rest, over 40 periods of the forcing. Time counts from t = 0, where the forcing is at its crest. `RK4` takes a
-# fixed number of steps a period and compiles in a second or two; `Order8` and `FreeFlight`, which find every contact to
-# ten digits, take longer to compile when they first meet a scene of a new kind.
+# The mass starts at rest and is followed for 40 forcing periods. At t = 0 the harmonic force has its maximum. `RK4`
+# takes a fixed number of steps per period and compiles in one or two seconds. `Order8` and `FreeFlight` locate every
+# contact to ten digits and take longer to compile for a new kind of scene.
 
 start = osc.trajectory((0.0, 0.0), periods=40, stepper=vk.RK4(steps=256))
 print(f"from rest, x goes from {start.x.min():.3f} to {start.x.max():.3f}; the stops are at -0.5 and 0.5")
@@ -71,10 +74,10 @@ print(f"from rest, x goes from {start.x.min():.3f} to {start.x.max():.3f}; the s
 # ---------------------------------------------------------------------------------------------------------------------
 # 4. The section map, and two steady states
 #
-# Looked at once per forcing period, at t = 0, T, 2T, …, a periodic motion is a fixed point. `section_map` carries many
-# states at once. Slow damping makes slow transients: deviations shrink by exp(−ζω_n T) ≈ 0.9 a period, so 400 periods
-# are ample. Two thousand steps per period are more than pictures need, and make the fixed points good to six digits
-# and better: `error_estimate` compares with the next finer setting.
+# Sampled once per forcing period, at t = 0, T, 2T, …, a periodic motion is a fixed point. `section_map` maps many
+# states at once. With weak damping transients are long: deviations decrease by exp(−ζω_n T) ≈ 0.9 per period, so 400
+# periods are sufficient. With 2048 steps per period the fixed points have at least six digits. `error_estimate`
+# compares with the next finer setting.
 
 fine = vk.RK4(steps=2048)
 starts = np.array([[0.45, 0.0], [0.0, 0.0]])
@@ -83,8 +86,8 @@ errors = osc.error_estimate([clear, hammering], stepper=fine)
 print("running clear: (x, v) =", clear, " error about", errors[0])
 print("hammering:     (x, v) =", hammering, " error about", errors[1])
 
-# The motion that touches nothing is that of a linear oscillator, known by heart: it swings about the static offset
-# f₁/ω_n² = 0.2 with the amplitude f₀/√((ω_n² − ω²)² + (2ζω_nω)²) = 0.266589, and so comes within 0.0335 of the stop.
+# The motion without contact is that of a linear oscillator: it oscillates about the static offset f₁/ω_n² = 0.2 with
+# the amplitude f₀/√((ω_n² − ω²)² + (2ζω_nω)²) = 0.266589, so its distance from the right stop is 0.0335.
 
 clear_orbit = osc.trajectory(clear, periods=1, samples=2048, stepper=fine)
 hammering_orbit = osc.trajectory(hammering, periods=1, samples=2048, stepper=fine)
@@ -96,8 +99,8 @@ print(f"running clear: amplitude {amplitude:.6f} about {offset:.6f}")
 # ---------------------------------------------------------------------------------------------------------------------
 # 5. Stop hits
 #
-# A hit is an entry into contact. The hammering state touches the right stop twice in each period, and the left one
-# never: it does not get that far to the left.
+# A hit is an entry into contact. The hammering state hits the right stop twice per period and never reaches the left
+# stop.
 
 
 def hits(orbit):
@@ -109,14 +112,13 @@ def hits(orbit):
 print("hits of the right and left stop, running clear:", hits(clear_orbit), " hammering:", hits(hammering_orbit))
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 6. Two checks that know nothing of the code
+# 6. Two independent checks
 #
-# Energy: over a period of a steady state, what the forcing puts in is what the damping takes out. The stops give back
-# all they take.
+# Energy: over one period of a steady state the work of the forcing equals the dissipation. The stops are conservative.
 
 
 def power_balance(orbit):
-    """Return the work of the forcing over one period, and what the damping takes."""
+    """Return the work of the forcing and the dissipation over one period."""
     numbers = osc.parameters
     push = numbers["excitations.0.amplitude"] * np.cos(numbers["excitations.0.frequency"] * orbit.t)
     damping = 2 * numbers["damping_ratio"] * numbers["natural_frequency"] * orbit.v
@@ -125,11 +127,11 @@ def power_balance(orbit):
 
 for name, orbit in (("running clear", clear_orbit), ("hammering", hammering_orbit)):
     work, loss = power_balance(orbit)
-    print(f"{name}: the forcing puts in {work:.6f} a period, the damping takes {loss:.6f}")
+    print(f"{name}: work of the forcing {work:.6f} per period, dissipation {loss:.6f}")
 
-# Areas: the divergence above says that a small area of the section shrinks by exp(−2ζω_n T) a period, at either state.
-# The derivative of the section map, by central differences, has that determinant. Its eigenvalues, the multipliers,
-# are inside the unit circle: both states are stable.
+# Areas: because of the divergence above, a small area of the section contracts by exp(−2ζω_n T) per period. The
+# derivative of the section map, here by central differences, must have this determinant. Its eigenvalues, the
+# multipliers, lie inside the unit circle: both states are stable.
 
 
 def map_derivative(point, step=1e-5):
@@ -142,31 +144,29 @@ def map_derivative(point, step=1e-5):
 clear_derivative, hammering_derivative = map_derivative(clear), map_derivative(hammering)
 for name, derivative in (("running clear", clear_derivative), ("hammering", hammering_derivative)):
     multipliers = np.linalg.eigvals(derivative)
-    print(f"{name}: areas shrink by {np.linalg.det(derivative):.6f} a period; multipliers {multipliers.round(4)}")
+    print(f"{name}: areas contract by {np.linalg.det(derivative):.6f} per period; multipliers {multipliers.round(4)}")
 print(f"exp(-2 zeta omega_n T) = {np.exp(-2 * 0.01 * osc.period):.6f}")
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 7. Shaken at random
+# 7. Noise
 #
-# With a seed (`rng=`) the same call shakes the mass with the intensity D of the scene's noise. It starts on the motion
-# that runs clear of the stops, and stays near it for a while; then a run of unlucky pushes carries it over, and it
-# hammers. Another seed leaves at another time. Far to the left of where the clear motion turns (x = -0.067) only the
-# hammering one goes, so that tells when it jumped.
+# With a seed (`rng=`) the same call adds noise of the scene's intensity D. The mass starts on the clear-running motion
+# and stays near it for some time. Then the noise drives it out, and it hammers. Another seed gives another exit time.
+# Only the hammering motion reaches x < -0.3, which shows when the transition happened.
 
 shaken = osc.trajectory(clear, periods=80, rng=10, stepper=vk.RK4(steps=256))
 far_left = shaken.x < -0.3
 jump = shaken.t[np.argmax(far_left)] / osc.period if far_left.any() else np.inf
-print(f"shaken at random, it leaves the clear motion within {jump:.1f} periods")
+print(f"with noise, it leaves the clear-running motion within {jump:.1f} periods")
 
-# How long it stays on average is the question that the toolkit answers: it grows like exp(ΔU/D) as D falls, with one
-# number ΔU, the activation energy, for each state. `vk.find_structure(osc)` finds the steady states of a scene and
-# their basins without a guess to start from, and `vibrokit run hertz-0.570` goes on to ΔU.
+# The mean exit time grows like exp(ΔU/D) as D decreases. ΔU is the activation energy, one number for each state.
+# `vk.find_structure(osc)` finds the steady states and their basins, and `vibrokit run hertz-0.570` also computes ΔU.
 
 
 # ---------------------------------------------------------------------------------------------------------------------
 # 8. Pictures
 #
-# Every picture is a function that draws into axes of yours.
+# Every plotting function draws into the axes that it is given.
 
 
 def draw_states(axes):
@@ -174,14 +174,14 @@ def draw_states(axes):
     from vibrokit.plots.portraits import phase_portrait
 
     for label, (name, orbit) in enumerate((("runs clear", clear_orbit), ("hammers", hammering_orbit))):
-        *_, line = phase_portrait(orbit.x, orbit.v, stops=orbit.stops, label=label, ax=axes)
+        line = phase_portrait(orbit.x, orbit.v, stops=orbit.stops, label=label, ax=axes).line
         line.set_label(name)
         axes.plot(orbit.x[0], orbit.v[0], "o", color=line.get_color(), markeredgecolor="white")
     axes.legend(loc="lower left", fontsize=8)
 
 
 def draw_jump(axes):
-    """Draw displacement against time: near the clear motion first, hammering later."""
+    """Draw displacement against time: first near the clear-running motion, later hammering."""
     axes.plot(shaken.t / osc.period, shaken.x, linewidth=0.8)
     for stop in shaken.stops:
         axes.axhline(stop, color="0.55", linewidth=1.0, linestyle="--")

@@ -1,15 +1,15 @@
 """Your own contact law
 
-Real stops do not give back all they take. Hunt and Crossley's law adds to Hertz's a loss that grows with the rate at
-which the mass goes deeper, :math:`F = k\\,\\delta^{3/2} (1 + \\tfrac32 c\\,\\dot\\delta)`. A slow mass that meets such
-a stop with speed :math:`v` comes back with :math:`(1 - c v)\\,v`, whatever the stiffness.
+Real stops dissipate energy. Hunt and Crossley's law adds a rate-dependent term to Hertz's law,
+:math:`F = k\\,\\delta^{3/2} (1 + \\tfrac32 c\\,\\dot\\delta)`. A slow mass that hits such a stop with speed :math:`v`
+rebounds with :math:`(1 - c v)\\,v`, for any stiffness.
 
-This tutorial writes that law in three ways: as a formula, as a class, and as a plug-in that scene files can name. It
-shows that all three are one and the same motion, measures what a bounce costs, has the law examined by the
-conformance kit, and looks at what is said when something is wrong.
+This tutorial writes the law in three ways: as a formula, as a class, and as a plug-in that scene files can name. It
+shows that all three give the same motion, measures the energy loss of an impact, tests the law with the conformance
+kit, and shows the error messages for wrong input.
 
-Run it with ``python tutorials/02_your_own_contact_law.py``; it prints what it finds and saves a picture. What computes
-stands in functions, for the kit starts a second Python, which imports this file to get at the class.
+Run it with ``python tutorials/02_your_own_contact_law.py``. It prints its results and saves a picture. The computations
+are in functions because the conformance kit starts a second Python process that imports this file.
 """
 
 import math
@@ -27,19 +27,19 @@ from vibrokit.testing import ConformanceError, check_contact_law
 # ---------------------------------------------------------------------------------------------------------------------
 # 1. As a formula
 #
-# The quickest way, in a notebook or a scene file: text in `depth` and `rate`, with constants that you name. The depth
-# is how far the mass has gone past the stop, the rate is positive while it goes deeper, and the force is the push on
-# the mass. Everything else is the barrier's affair: place, side, sign, no force when apart, and no pull at release.
-# The text is read as data and never run, so a scene file from a stranger can do no harm.
+# The quickest way, for a notebook or a scene file, is text in `depth` and `rate` with named constants. The depth is the
+# distance past the stop, the rate is positive while the mass moves deeper, and the result is the contact force. The
+# barrier takes care of the rest: position, side, sign, zero force without contact, and no tensile force at release. The
+# text is read as data and never executed, so scene files from unknown sources are safe.
 
 BY_FORMULA = vk.CustomLaw("k*depth**1.5*(1 + 1.5*c*rate)", k=50.0, c=0.2)
 
 # ---------------------------------------------------------------------------------------------------------------------
 # 2. As a class
 #
-# The same formula as a method, and each parameter declared once: its symbol in the equations, its unit, its range. The
-# class becomes a frozen dataclass by itself. The method is called with symbols in place of numbers, so that derivatives
-# and compiled code follow from it; write 3/2 as a Rational, or as 1.5, and no `if` on values.
+# The formula becomes a method. Each parameter is declared once, with its symbol in the equations, its unit and its
+# range. The class becomes a frozen dataclass automatically. The method is called with symbols, from which derivatives
+# and compiled code are derived. Write 3/2 as a Rational or as 1.5, and do not use `if` on values.
 
 
 class HuntCrossley(vk.ContactLaw):
@@ -49,7 +49,7 @@ class HuntCrossley(vk.ContactLaw):
     dissipation: float = vk.parameter("c", "s m^-1", minimum=0)
 
     def force(self, depth, rate):
-        """Push on the mass."""
+        """Contact force."""
         return self.stiffness * depth ** Rational(3, 2) * (1 + Rational(3, 2) * self.dissipation * rate)
 
 
@@ -58,8 +58,8 @@ BY_CLASS = HuntCrossley(stiffness=50.0, dissipation=0.2)
 # ---------------------------------------------------------------------------------------------------------------------
 # 3. As a plug-in
 #
-# To use the class by name, in scene files and on the command line, put it into a distribution that declares an entry
-# point. Nothing in vibrokit changes. These lines of its pyproject.toml do it:
+# To use the class by name in scene files and on the command line, put it into a distribution that declares an entry
+# point. No change in vibrokit is needed. These lines of its pyproject.toml are sufficient:
 
 PYPROJECT = """
 [project]
@@ -71,8 +71,8 @@ dependencies = ["vibrokit>=0.1"]
 hunt-crossley = "vibrokit_hunt_crossley.law:HuntCrossley"
 """
 
-# That distribution exists, in plugins/vibrokit-hunt-crossley; its law has the exponent as a third parameter, 3/2 unless
-# given. Once it is installed, the law has a name like any other:
+# This distribution exists in plugins/vibrokit-hunt-crossley; its law has the exponent as a third parameter, by default
+# 3/2. After installation, scene files can use its name:
 
 SCENE_FILE = """
 natural_frequency = 1.0
@@ -112,10 +112,10 @@ def scene_by_plugin():
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 4. One motion
+# 4. The same motion
 #
-# The three scenes differ in how the law was written and in nothing else. From some starts that hit both stops, over
-# one period of the forcing, the states must agree to rounding.
+# The three scenes differ only in how the law is written. From starts that hit both stops, the states after one forcing
+# period must agree to rounding.
 
 
 def scene_with(law):
@@ -129,7 +129,7 @@ def scene_with(law):
 
 
 def compare_ways():
-    """Return the states after one period, for each way that is at hand."""
+    """Return the states after one period, for each way that is available."""
     scenes = {"formula": scene_with(BY_FORMULA), "class": scene_with(BY_CLASS), "plug-in": scene_by_plugin()}
     starts = np.array([[0.0, -1.5], [0.2, 0.0], [0.3, 0.5], [-0.4, 0.8]])
     ends = {way: scene.section_map(starts) for way, scene in scenes.items() if scene is not None}
@@ -139,14 +139,14 @@ def compare_ways():
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 5. What a bounce costs
+# 5. Energy loss of an impact
 #
-# A free mass (no spring, no damping, no forcing) meets a stop at x = 0 and leaves it. The loss shows as a loop in the
-# plane of depth and force, whose area is the energy that the bounce has cost.
+# A free mass (no spring, no damping, no forcing) hits a stop at x = 0 and rebounds. In the plane of depth and force the
+# impact is a loop. Its area is the energy loss.
 
 
 def free_mass(law):
-    """Return a mass that nothing acts on but a stop at x = 0."""
+    """Return a mass on which only a stop at x = 0 acts."""
     return vk.Oscillator(
         natural_frequency=1.0,  # sets the unit of time only: 2π
         damping_ratio=0.0,
@@ -156,14 +156,14 @@ def free_mass(law):
 
 
 def restitution(dissipation, speed):
-    """Return speed after over speed before, of a mass that starts at the stop."""
+    """Return the ratio of the speeds after and before an impact."""
     mass = free_mass(HuntCrossley(stiffness=50.0, dissipation=dissipation))
     ((_, after),) = mass.section_map([[0.0, speed]], stepper=vk.RK4(steps=8192))
     return -after / speed
 
 
 def bounce(dissipation, speed):
-    """Return depth and push while in contact. The method of a law takes numbers as well as symbols."""
+    """Return depth and force during contact. The method of a law accepts numbers as well as symbols."""
     law = HuntCrossley(stiffness=50.0, dissipation=dissipation)
     path = free_mass(law).trajectory((0.0, speed), duration=2.0, samples=4096, stepper=vk.RK4(steps=8192))
     depth, rate = path.x[path.x >= 0], path.v[path.x >= 0]
@@ -171,7 +171,7 @@ def bounce(dissipation, speed):
 
 
 def measure_bounces():
-    """Return the restitution at some speeds, and the energy that a bounce costs by speeds and by the loop's area."""
+    """Return the restitution for some dissipations, and the energy loss from the speeds and from the loop's area."""
     print("c v      1 - c v    restitution")
     table = {}
     for product in (0.01, 0.1, 0.4):
@@ -180,52 +180,52 @@ def measure_bounces():
     depth, force = bounce(dissipation=0.2, speed=1.0)
     area = np.trapezoid(force, depth)
     cost = (1 - restitution(dissipation=0.2, speed=1.0) ** 2) / 2
-    print(f"a bounce at c v = 0.2 costs {cost:.6f} of 0.5; the loop has the area {area:.6f}")
+    print(f"an impact at c v = 0.2 dissipates {cost:.6f} of 0.5; the area of the loop is {area:.6f}")
     return SimpleNamespace(restitution=table, cost=cost, area=area)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 6. Examined
+# 6. Conformance
 #
-# The conformance kit draws parameters from the declared ranges and looks at all that a law must keep to: no force at
-# rest, never a pull, derivatives and compiled code against differences at 60 digits, and more. In a test of yours one
-# line does it. The registered ones are examined by name: `vibrokit check hunt-crossley`.
+# The conformance kit draws parameters from the declared ranges and tests all properties that a law must have: no force
+# at rest, no tensile force, derivatives and compiled code against differences at 60 digits, and more. One line in a
+# test runs it. Registered laws are tested by name: `vibrokit check hunt-crossley`.
 
 
 def examine():
-    """Return what the kit says of the class."""
+    """Return the conformance report of the class."""
     report = check_contact_law(HuntCrossley)
     print(report)
     return report
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 7. When something is wrong
+# 7. Errors
 #
-# What is refused is refused at once, with the name, the value, and what would be right.
+# Wrong input raises an error at once. It states the name, the value and what is allowed.
 
 
 class Pressed(vk.ContactLaw):
-    """Wrong on purpose: it pushes before anything touches."""
+    """Wrong on purpose: its force is positive before contact."""
 
     stiffness: float = vk.parameter("k", "s^-2", minimum=0)
 
     def force(self, depth, rate):
-        """Push on the mass, as if the stop stood 0.01 nearer than its barrier says."""
+        """Contact force, as if the stop were 0.01 nearer than its barrier states."""
         return self.stiffness * (depth + 0.01)
 
 
 MISTAKES = {
     "a negative stiffness": lambda: HuntCrossley(stiffness=-50.0, dissipation=0.2),
-    "a dissipation that is no number": lambda: HuntCrossley(stiffness=50.0, dissipation=math.nan),
-    "a slip of the pen": lambda: vk.CustomLaw("k*depth**1.5*(1 + 1.5*c*rat)", k=50.0, c=0.2),
+    "a dissipation that is not a number": lambda: HuntCrossley(stiffness=50.0, dissipation=math.nan),
+    "a misspelt name": lambda: vk.CustomLaw("k*depth**1.5*(1 + 1.5*c*rat)", k=50.0, c=0.2),
     "a formula that tries to run code": lambda: vk.CustomLaw("__import__('os').system('echo got in')"),
-    "a law that pushes at rest": lambda: check_contact_law(Pressed),
+    "a law with a force at rest": lambda: check_contact_law(Pressed),
 }
 
 
 def make_mistakes():
-    """Return what is said of each mistake."""
+    """Return the error message of each mistake."""
     said = {}
     for what, mistake in MISTAKES.items():
         try:
@@ -241,12 +241,12 @@ def make_mistakes():
 
 
 def draw_loops(axes):
-    """Draw force against depth through a bounce, for three dissipations; the enclosed area is the energy lost."""
+    """Draw force against depth during an impact, for three dissipations; the enclosed area is the energy loss."""
     for dissipation in (0.0, 0.2, 0.4):
         depth, force = bounce(dissipation, speed=1.0)
         axes.plot(depth, force, linewidth=1.2, label=f"$c$ = {dissipation:g} s/m")
     axes.set_xlabel(r"depth $\delta$ (m)")
-    axes.set_ylabel(r"push on the mass (m s$^{-2}$)")
+    axes.set_ylabel(r"contact force (m s$^{-2}$)")
     axes.legend(fontsize=8)
 
 
@@ -262,7 +262,7 @@ def save_picture(folder):
 
 
 def main():
-    """Run every section and return what was found."""
+    """Run every section and return the results."""
     return SimpleNamespace(ends=compare_ways(), bounces=measure_bounces(), report=examine(), said=make_mistakes())
 
 

@@ -1,11 +1,11 @@
 """What the system does without noise
 
-Before asking how stable a steady state is against noise, one has to know the states: how many there are, where each
-start leads, and what lies between them. This tutorial lets `find_structure` find all of that for the scene of the first
-tutorial, without telling it where to look; reads the numbers; checks them against what can be known otherwise; and sees
-how hard a single kick must be, and what becomes of the states as the forcing frequency changes.
+The stability of a steady state against noise depends on the motion without noise: how many steady states there are,
+which starts lead to each of them, and what separates them. This tutorial finds all of this with `find_structure` for
+the scene of the first tutorial, checks the numbers independently, computes the smallest kick that leaves each state,
+and follows the states as the forcing frequency changes.
 
-Run it with ``python tutorials/03_without_noise.py``; it prints what it finds and saves four pictures.
+Run it with ``python tutorials/03_without_noise.py``. It prints its results and saves four pictures.
 """
 
 from pathlib import Path
@@ -15,11 +15,11 @@ import numpy as np
 import vibrokit as vk
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 1. Everything at once
+# 1. The structure of a scene
 #
-# The search starts from a grid of states, follows each until it recurs on the stroboscopic section, and refines what it
-# finds by Newton's method. Then it asks of every cell of a grid where it leads (the basins), follows the boundary
-# between basins to the saddles on it, and grows the saddles' manifolds. The status says, in words, what was found.
+# The search integrates a grid of starts until each recurs on the stroboscopic section, and refines the orbits by
+# Newton's method. It then computes the attractor of every cell of a grid (the basins), follows the basin boundaries to
+# the saddles on them, and grows the manifolds of the saddles. The status lists what was found.
 
 osc = vk.load_scene("hertz-0.570")
 structure = vk.find_structure(osc, rng=0)
@@ -28,18 +28,18 @@ print(structure.status)
 # ---------------------------------------------------------------------------------------------------------------------
 # 2. The attractors
 #
-# `period` counts forcing periods, `hits` the entries into contact with each stop in one orbit. The largest multiplier
-# says by how much a small deviation shrinks per period; `residual` how far the orbit is from closing, and `error` by
-# how much it moves if the integration is made a hundred times tighter.
+# `name` describes what the attractor does. `period` is in forcing periods, `hits` counts the entries into contact with
+# each stop per orbit. The largest multiplier is the factor by which a small deviation decreases per period. `residual`
+# is the closing error, and `error` the change when the integration tolerance is reduced by a factor of 100.
 
 for a in structure.attractors:
     share = f"{100 * a.basin_fraction:.1f} ± {100 * a.basin_fraction_error:.1f} %"
-    print(f"attractor {a.label}: {a.kind}, period {a.period}, hits {dict(a.hits)}, basin {share}")
+    print(f"{a.name}: {a.kind}, period {a.period}, hits {dict(a.hits)}, basin {share}")
     print(f"    at {a.points[0]}, largest multiplier {np.abs(a.multipliers).max():.4f}")
-    print(f"    deepest {max(a.peak_depth.values()):.4f}, hardest push {max(a.peak_force.values()):.3f}")
-    print(f"    residual {a.residual:.1e}, moves by {a.error:.1e} when tightened")
+    print(f"    largest depth {max(a.peak_depth.values()):.4f}, largest force {max(a.peak_force.values()):.3f}")
+    print(f"    residual {a.residual:.1e}, error {a.error:.1e}")
 
-# The clear-running state touches nothing, so that it is the forced motion of a linear oscillator, known in closed form.
+# The clear-running state has no contact. It is the forced motion of a linear oscillator, known in closed form.
 
 clear, hammering = structure.attractors
 numbers = osc.parameters
@@ -51,60 +51,60 @@ print("clear-running, from the formula:", formula, " difference:", np.abs(clear.
 # ---------------------------------------------------------------------------------------------------------------------
 # 3. The saddle
 #
-# Every path from one state to the other crosses the boundary of their basins, and does so most cheaply at a saddle. It
-# is an orbit too, of which one multiplier is outside the unit circle: a small deviation along that direction about
-# doubles in a period, and `leads_to` says to which attractors it goes on either side.
+# Every path from one state to the other crosses the boundary of their basins. The cheapest path crosses it at a saddle,
+# an orbit with one multiplier outside the unit circle: a small deviation in that direction about doubles per period.
+# `leads_to` contains the attractors on either side.
 
 (saddle,) = structure.saddles
 print(f"saddle of period {saddle.period} at {saddle.points[0]}, between {saddle.leads_to}")
 print("    multipliers", saddle.multipliers.real, " residual", saddle.residual)
 
-# Elastic stops take no energy, so that areas shrink by exp(−2ζω_n T) a period everywhere: at the attractors and at the
-# saddle alike, the product of the multipliers must be that number.
+# Elastic stops dissipate no energy, so areas contract by exp(−2ζω_n T) per period everywhere. The product of the
+# multipliers must equal this number at the attractors and at the saddle.
 
 shrinking = float(np.exp(-damping * osc.period))
 products = [float(np.prod(orbit.multipliers).real) for orbit in (clear, hammering, saddle)]
-print(f"areas shrink by {shrinking:.8f} a period; products of multipliers:", np.round(products, 8))
+print(f"areas contract by {shrinking:.8f} per period; products of multipliers:", np.round(products, 8))
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 4. How hard a kick?
+# 4. The smallest kick
 #
-# A state with a large basin can still be close to its edge somewhere. The smallest kick that throws it out, at the
-# worst moment of its period and in the worst direction, says how close. It is not the activation energy: a single blow
-# knows nothing of the many small pushes, each at the right moment, by which noise does it.
+# A state with a large basin can still be close to the basin boundary. The smallest kick that leaves the basin, at the
+# least favourable time and direction, measures this distance. It differs from the activation energy: noise leaves the
+# basin by many small pushes, each at the right time.
 
 stability = vk.shape_stability(osc, structure)
 for s in stability:
     print(
-        f"attractor {s.label}: basin {100 * s.basin_fraction:.1f} %, smallest fatal kick {s.any_kick.size:.4f} at "
+        f"{structure.names[s.label]}: basin {100 * s.basin_fraction:.1f} %, smallest kick {s.any_kick.size:.4f} at "
         f"t = {s.any_kick.time / osc.period:.2f} T; in velocity alone {s.velocity_kick.size:.4f}"
     )
 
 # ---------------------------------------------------------------------------------------------------------------------
-# 5. As the frequency changes
+# 5. Continuation in the frequency
 #
-# `continuation` finds the steady states at each value of a parameter, joins them into branches, and locates where a
-# branch changes in kind. Nearer to the resonance the clear-running state swings wider, until it grazes the right stop.
+# `continuation` finds the steady states at each value of a parameter, joins them into branches, and locates
+# bifurcations. Towards the resonance the amplitude of the clear-running state grows until it grazes the right stop.
 
 sweep = vk.continuation(osc, "excitations.0.frequency", np.linspace(0.57, 0.65, 9), cells=(40, 40), starts=(12, 12))
 print(sweep.status)
 for bifurcation in sweep.bifurcations:
     print("   ", bifurcation)
 
-# The swing is f₀/√((ω_n² − ω²)² + (2ζω_nω)²) about the offset 0.2; it meets the stop at 0.5 where that is 0.3.
+# Its amplitude f₀/√((ω_n² − ω²)² + (2ζω_nω)²) about the offset 0.2 reaches the stop at 0.5 when it equals 0.3.
 
 gap = 0.5 - numbers["excitations.1.force"]
 square = np.roots([1, damping**2 - 2, 1 - (numbers["excitations.0.amplitude"] / gap) ** 2])
 touching = float(np.sqrt(square.min()))
-print(f"the formula has it graze at {touching:.10f}")
+print(f"grazing frequency by the formula: {touching:.10f}")
 
 
 # ---------------------------------------------------------------------------------------------------------------------
 # 6. Pictures
 #
-# The section: basins in pale colours, attractors and saddle as marks, the saddle's stable manifold (which is the
-# boundary between the basins) and its unstable one (which leads to the attractors). Then the motions in the phase
-# plane; the branches against the frequency; and how the basins share the region.
+# The first picture shows the section: basins in pale colours, attractors and saddle as markers, the stable manifold of
+# the saddle (the basin boundary) and its unstable manifold, which leads to the attractors. The others show the motions
+# in the phase plane, the branches against the frequency, and the basin fractions.
 
 PICTURES = {
     "03-section.png": structure.plot,

@@ -19,8 +19,8 @@ portraits, basins, way_out = figure.subplots(1, 3)
 
 for attractor, name in zip(structure.attractors, ("runs clear", "hammers"), strict=True):
     orbit = osc.trajectory(attractor.points[0], periods=attractor.period, samples=2048)
-    *_, line = phase_portrait(orbit.x, orbit.v, stops=orbit.stops, label=attractor.label, ax=portraits)
-    line.set_label(name)
+    drawn = phase_portrait(orbit.x, orbit.v, stops=orbit.stops, label=attractor.label, ax=portraits)
+    drawn.line.set_label(name)
 portraits.legend(loc="lower left", fontsize=8)
 portraits.set_title("two steady states (stops dashed)", fontsize=10)
 
