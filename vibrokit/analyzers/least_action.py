@@ -151,7 +151,8 @@ class _Work:
         branches = tuple(self.branches) if self.problem.attractor.is_fixed else _once(self.branches)
         estimates = () if self.graph is None else self.graph.estimates
         energies, compared = combined(self.problem.attractor, branches, estimates)
-        findings = [*self.findings, *compared]
+        own = (finding for finding in self.findings if finding.code is not Code.NO_EXIT_FOUND)  # of one search alone
+        findings = [*own, *compared]
         if not energies and not self.stopped:
             findings.append(Finding.of(Code.NO_EXIT_FOUND, self.problem.source))
         return Analysis(
