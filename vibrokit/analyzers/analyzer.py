@@ -170,10 +170,13 @@ class Analyzer(ABC):
     def _analyzed(self, problem: ExitProblem) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""
         try:
-            return self.analyze(problem)
+            found = self.analyze(problem)
         except (StructureError, StepperError) as error:
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
+        if not isinstance(found, Analysis):
+            raise TypeError(f"{type(self).__name__}.analyze must return an Analysis, got {shown(found)}.")
+        return found
 
 
 def _strength(osc: Oscillator, analyses: dict[int, Analysis]) -> list[Finding]:
