@@ -164,7 +164,7 @@ def test_energy_lost_in_a_bounce(found):
 
 def test_the_kit_passes_the_law(found):
     assert found.report.passed
-    assert len(found.report.findings) > 10
+    assert len(found.report.outcomes) > 10
 
 
 @pytest.mark.parametrize(
