@@ -11,7 +11,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from vibrokit.kernels import templates
-from vibrokit.kernels.stopping import LEFT_REGION, NOT_FINITE, RAN_OUT, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
 
 MARKER = "# --- scene above, stepper below ---\n"
 NOT_HERE = re.compile(r"^.*  # (breaking|bending)\n", re.MULTILINE)  # no force of the sample scene jumps
@@ -19,7 +19,7 @@ IMPORTS = """
 import numpy as np
 from vibrokit.kernels.cubic import crossing, summit
 from vibrokit.kernels.error_blocks import error_blocks
-from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED, section_status
+from vibrokit.kernels.stopping import DIVERGED, COMPLETED, STALLED, section_status
 from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
 """
 DAMPING, STIFFNESS, AMPLITUDE, FREQUENCY, FORCE, HERTZ, STOP = 0.02, 1.0, 0.18, 0.57, 0.2, 50.0, 0.5
@@ -165,7 +165,7 @@ def errors(found, true):
 def test_flows_agree_with_scipy(module, solutions):
     states, true = solutions
     out, done, status = advance(module, states, 1e-14, intervals=2)
-    assert (status == RAN_OUT).all()
+    assert (status == COMPLETED).all()
     assert (done == 2).all()
     for error in errors(out, true):
         assert np.median(error) < 1e-11
@@ -242,7 +242,7 @@ def test_energy_at_any_stiffness_and_without_gap(module):
             (z[:, 1] ** 2 + z[:, 0] ** 2) / 2 + 0.4 * stiffness * np.maximum(np.abs(z[:, 0]) - stop, 0) ** 2.5
             for z in (states, out)
         ]
-        assert (status == RAN_OUT).all()
+        assert (status == COMPLETED).all()
         assert np.allclose(*energy, rtol=drift, atol=0)
 
 
@@ -291,7 +291,7 @@ def test_stops_are_reported(module):
     assert (out == states).all()
     states[1, 2:4] = 1e300
     out, done, status = advance(module, states, 1e-6, 3, values=theta(damping=60.0))
-    assert status[1] == NOT_FINITE
+    assert status[1] == DIVERGED
     assert np.isfinite(out).all()
     samples = np.empty((9, 5))
     assert module.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0]), samples) < 9

@@ -15,7 +15,7 @@ from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.single import record
-from vibrokit.kernels.stopping import GRAZED, RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.symbolic.flow_kind import Flow
 
 WALL, K, C, DAMPING = 0.3, 40.0, 0.6, 0.1
@@ -208,7 +208,7 @@ def test_a_touch_too_slow_ends_the_path(damping, preload, beyond, momentum, graz
     else:
         assert len(path) == 31
         assert np.isfinite(path).all()
-        assert (ended.status[0], ended.intervals[0]) == (RAN_OUT, 1)
+        assert (ended.status[0], ended.intervals[0]) == (COMPLETED, 1)
 
 
 def test_derivatives_of_momenta_are_refused_at_grazing_too():

@@ -21,7 +21,7 @@ from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.request import check_belongs, check_means
+from vibrokit.structure.validation import check_belongs, check_means
 
 _WEAK = 3.0  # ΔU/D: below, exp(ΔU/D) varies no faster than the prefactor, and escape is no rare event
 

@@ -22,7 +22,7 @@ from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.result import Result
 from vibrokit.structure.attractors.orbits_inside import orbits_inside
 from vibrokit.structure.orbits import Orbit
-from vibrokit.structure.request import whole
+from vibrokit.structure.validation import whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000

@@ -1,4 +1,4 @@
-"""Which stepper a scene is given when the user names none."""
+"""Default steppers of a scene."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from vibrokit.symbolic.flow_kind import Flow
 _STEPS = 256
 _MOST_STEPS, _MOST_NOISY_STEPS = 4096, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
-_TOO_FEW = 8  # steps in one contact, below which RK4 was seen to invent steady states
+_TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
 _TOLERANCE = 1e-10
 _PACKAGE = str(Path(__file__).parents[1])
 
 
 class CoarseStepsWarning(UserWarning):
-    """RK4 was given too few steps for a contact."""
+    """RK4 has too few steps in a contact."""
 
 
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
-    """Choose the stepper for many trajectories: RK4 where its steps resolve every contact, else as for single ones.
+    """Choose the stepper for many trajectories: RK4 if its steps resolve every contact, otherwise as for single ones.
 
     Measured on ``hertz-0.570``, two periods, two threads, as ``vibrokit trade hertz-0.570`` prints it: RK4(256) has a
     median error of 9e-5 at 1.2 µs per trajectory and period; twice the steps, 2e-5 at 1.8 µs. The cheapest located
-    setting, FreeFlight(1e-4), has 1e-4 at 18 µs. So RK4 is given as long as it needs no more steps than that ratio.
+    setting, FreeFlight(1e-4), has 1e-4 at 18 µs. So RK4 is the default unless it needs more steps than that ratio.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     if flow is Flow.HAMILTONIAN_VARIATIONAL and scene.barriers and kernel_for(scene, flow, RK4()).module.BENDS:
         return single_stepper(scene, flow)  # fixed steps have its derivatives where p = 0 only
     turns = max(1.0, _turns(scene))
-    if flow is Flow.NOISY:  # where these are too few, running it warns
+    if flow is Flow.NOISY:  # if these are too few, integration warns
         return RK4(min(steps, int(_MOST_NOISY_STEPS * turns)))
     return RK4(steps) if steps <= _MOST_STEPS * turns else single_stepper(scene, flow)
 
 
 def single_stepper(scene: Scene, flow: Flow) -> Stepper:
-    """Choose the stepper for one trajectory: FreeFlight where it applies, else Order8; RK4 under noise.
+    """Choose the stepper for one trajectory: FreeFlight where it applies, otherwise Order8; RK4 with noise.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _turns(scene: Scene) -> float:
 
 
 def _steps_per_contact(exponent: float) -> int:
-    """The sharper the touch, the lower the order of steps across it, and the more of them."""
+    """Steps per contact: the lower the exponent, the lower the order of steps across the touch."""
     if exponent > 1.25:
         return 16
     return 32 if exponent > 0.75 else 64
@@ -124,7 +124,7 @@ def _power_of_two(needed: float) -> int:
 
 
 def _flies(scene: Scene, flow: Flow) -> bool:
-    """Whether all parts are of those built in that FreeFlight is known to take; asks no formula, for speed."""
+    """Whether all parts are built-in ones that FreeFlight accepts; decided without their formulas, for speed."""
     linear = scene.spring is None or type(scene.spring) is LinearSpring
     sinusoids = all(type(part) in (Harmonic, Constant) for part in scene.excitations)
     if scene.noise is None or type(scene.noise) is WhiteNoise:
@@ -134,7 +134,7 @@ def _flies(scene: Scene, flow: Flow) -> bool:
 
 
 def _frames_inside(frame: FrameType | None) -> int:
-    """How many frames up the first is that is not of this package; 1 is the frame given."""
+    """Number of frames up to the first one outside this package; 1 is the given frame."""
     count = 1
     while frame is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         frame, count = frame.f_back, count + 1

@@ -1,4 +1,4 @@
-"""How long contacts last, so that fixed steps can be chosen short enough for them."""
+"""Durations of contacts, from which the number of fixed steps is chosen."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring.linear import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
-_LOOKS = 128  # at the forcing, over one interval
+_SAMPLES = 128  # of the forcing, over one interval
 _DEPTHS = np.geomspace(1e-14, 10.0, 451)  # as parts of the reach of the motion
-_DECADE = 30  # places in a decade of them
+_DECADE = 30  # of them in a decade
 _LONGEST_REACH = 10.0  # stops limit a resonance to about this many times their distance
 
 
@@ -40,7 +40,7 @@ class ContactTime(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
-    """Estimate the contact with each stop at a typical impact speed; stops that hardly push are left out.
+    """Estimate the contact with each stop at a typical impact speed; very soft stops are left out.
 
     The greatest depth follows from the energy, ½v² = ∫ F dδ, and the duration is close to π·depth/v for every power.
     The law is that of the kernel for lanes, which an ensemble needs anyway.
@@ -71,7 +71,7 @@ def _contact(
         per_fold = force * depths  # dδ = δ d(ln δ) on this grid
         work = np.cumsum(0.5 * (per_fold[1:] + per_fold[:-1]) * np.diff(np.log(depths)))
         deepest = max(_DECADE, int(np.searchsorted(work, 0.5 * speed**2)))
-        if deepest == len(work):  # never stopped: too soft to be a contact
+        if deepest == len(work):  # too soft to end the motion
             continue
         before = deepest - _DECADE
         exponent = 0.0
@@ -83,7 +83,7 @@ def _contact(
 
 
 def _typical_motion(scene: Scene, module: types.ModuleType, theta: NDArray[np.float64]) -> tuple[float, float]:
-    """How far the mass goes and how fast: as the linear response to the forcing, or as needed to reach a stop."""
+    """Largest displacement and speed: of the linear response to the forcing, or those needed to reach a stop."""
     own = scene.natural_frequency
     stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else own**2
     rates, sizes = _harmonics(scene, module, theta)
@@ -108,8 +108,8 @@ def _harmonics(
     if not module.FORCED:
         return np.zeros(0), np.zeros(0)
     unit = scene.time_unit
-    values = np.array([module.forcing(unit * look / _LOOKS, theta) for look in range(_LOOKS)])
-    sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / _LOOKS), dtype=np.float64)
+    values = np.array([module.forcing(unit * sample / _SAMPLES, theta) for sample in range(_SAMPLES)])
+    sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / _SAMPLES), dtype=np.float64)
     sizes[0] /= 2.0
-    sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would make much of
+    sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would amplify
     return 2.0 * math.pi / unit * np.arange(len(sizes), dtype=np.float64), sizes

@@ -1,4 +1,4 @@
-"""The cubic that joins two points with given slopes: where a step crosses a stop, and how far it may have swung."""
+"""The cubic through two points with given slopes: where a step crosses a stop, and its largest value."""
 
 import numpy as np
 from numba import njit

@@ -170,7 +170,7 @@ def _advance_block(
 
 
 def _plain(array: Array, kind: type) -> Array:
-    """The same numbers as Numba sees them always: a read-only or strided array would be compiled for anew."""
+    """The same numbers, contiguous and writable: Numba would compile again for other arrays."""
     return np.require(array, kind, ("C", "W"))
 
 

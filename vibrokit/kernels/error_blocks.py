@@ -1,4 +1,4 @@
-"""Which components of a flow share one scale when errors are judged."""
+"""Blocks of components of a flow that share one scale in error estimates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 def error_blocks(states: int, momenta: int, equations: int) -> NDArray[np.int64]:
     """Return the block of each component.
 
-    States have a scale each. Momenta share one, the action has its own, and so has each block of derivatives: final
-    states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 beside states of
-    size 1, and their error must be small against themselves. So must that of each entry of a covariance, whose powers
-    of a short time differ.
+    Each state has its own scale. Momenta share one, the action has its own, and so does each block of derivatives:
+    final states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 where states are
+    1, and their error must be small relative to them. The same holds for each entry of a covariance, because the
+    entries grow with different powers of a short time.
 
     Parameters
     ----------

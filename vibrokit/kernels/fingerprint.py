@@ -1,6 +1,6 @@
-"""What decides whether a compiled kernel fits a scene: the code of its parts, not their numbers.
+"""Fingerprint of a scene: the code of its parts, without parameter values. It decides which compiled kernel fits.
 
-Computed from bytecode, so that it works for classes typed at a prompt and needs no SymPy.
+It is computed from bytecode, so that it works for classes typed at a prompt and needs no SymPy.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def scene_fingerprint(scene: Scene) -> str:
 
 @functools.cache
 def _environment() -> str:
-    """Versions of everything that writes or compiles code, and the text of our own part of it."""
+    """Versions of everything that writes or compiles code, and the source of this package's part of it."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     for folder in _EMITTERS:
@@ -52,13 +52,13 @@ def _part(part: Any) -> str:
 
 
 class _Walk:
-    """One walk over all that a formula may depend on: followed into code, by value for data, each thing once.
+    """One walk over everything that a formula may depend on, each thing once: into code, and by value for data.
 
-    What it cannot describe gets a description that no other process makes, so that no stale kernel is ever taken.
+    A thing that it cannot describe has another description in every process, so that no stale kernel is used.
     """
 
     def __init__(self) -> None:
-        self._met: dict[int, tuple[int, Any]] = {}  # holds what was met, so that no id is given again
+        self._met: dict[int, tuple[int, Any]] = {}  # keeps what was met alive, so that no id is reused
 
     def describe(self, value: Any, names: tuple[str, ...] = ()) -> str:
         """Describe a value; of a module, only those members whose names are used."""
@@ -123,7 +123,7 @@ class _Walk:
 
 
 def _is_versioned(module: str) -> bool:
-    """Whether a module's code is told by the versions in `_environment`."""
+    """Whether the versions in `_environment` determine a module's code."""
     root = module.partition(".")[0]
     if root in sys.stdlib_module_names:  # a user's file may have such a name too
         place = getattr(sys.modules.get(root), "__file__", None)

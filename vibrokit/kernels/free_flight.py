@@ -13,14 +13,14 @@ from vibrokit.symbolic.scene_text import SceneText
 class FreeFlight(LocatedStepper):
     """Exact flight between the stops, for linear springs and sinusoidal forces, one trajectory at a time.
 
-    The flight is its Taylor series to rounding error, at any damping and at resonance; the first touch is found by a
-    bound that can miss none. Contacts are stepped as `Order8` does, to the same order. Choose it for orbits,
+    The flight is its Taylor series to rounding error, at any damping and at resonance; the first touch is found by
+    bounds that cannot miss one. Contacts are stepped as `Order8` does, to the same order. Choose it for orbits,
     certificates, grazing, stiff stops and long flights; a scene with a nonlinear spring is refused.
 
     Parameters
     ----------
     tolerance : float
-        Error that one step in contact may make, relative to the size of what is integrated.
+        Largest error of one step in contact, relative to the size of what is integrated.
     """
 
     name: ClassVar[str] = "free_flight"

@@ -1,4 +1,4 @@
-"""Steppers by name, as the command line has them."""
+"""Steppers by name and number, as on the command line and in settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _KINDS: Mapping[str, tuple[Callable[..., Stepper], Callable[[str], float]]] = {
 
 
 def name_of(stepper: Stepper) -> str:
-    """Return what `named_stepper` reads a stepper of this setting from."""
+    """Return the text from which `named_stepper` makes the same stepper."""
     (setting,) = (getattr(stepper, field.name) for field in dataclasses.fields(stepper))
     return f"{stepper.name.replace('_', '-')}:{setting!r}"
 
@@ -32,7 +32,7 @@ def named_stepper(text: str) -> Stepper:
     """
     name, colon, number = text.partition(":")
     if name not in _KINDS:
-        raise StepperError(f"stepper {text!r}: there is no {name!r}{nearest(name, _KINDS)}")
+        raise StepperError(f"there is no stepper {name!r}{nearest(name, _KINDS)}")
     kind, read = _KINDS[name]
     try:
         return kind(read(number)) if colon else kind()

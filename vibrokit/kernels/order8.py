@@ -14,7 +14,7 @@ from vibrokit.symbolic.scene_text import SceneText
 
 FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0
-# What carries over an event, where more is integrated than runs through it unbroken.
+# Templates that map derivatives, covariances and momenta across an event.
 _CROSSING: Mapping[Flow, tuple[str, ...]] = {
     Flow.STATE_VARIATIONAL: ("crossing_linear",),
     Flow.LINEARISED: ("crossing_linear",),
@@ -26,12 +26,12 @@ _CROSSING: Mapping[Flow, tuple[str, ...]] = {
 
 @dataclasses.dataclass(frozen=True)
 class LocatedStepper(Stepper):
-    """What the steppers that locate every contact have in common. Abstract.
+    """A stepper that locates every contact. Abstract.
 
     Parameters
     ----------
     tolerance : float
-        Error that one step may make, relative to the size of what is integrated.
+        Largest error of one step, relative to the size of what is integrated.
     """
 
     tolerance: float = 1e-10
@@ -40,15 +40,15 @@ class LocatedStepper(Stepper):
         number = self.tolerance
         if isinstance(number, bool) or not isinstance(number, int | float) or not FINEST <= number <= COARSEST:
             raise StepperError(
-                f"{type(self).__name__}: tolerance is {number!r}; give a number from {FINEST:g} to {COARSEST:g}."
+                f"{type(self).__name__}: tolerance must be a number from {FINEST:g} to {COARSEST:g}, got {number!r}."
             )
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, most steps in an interval, whether the forcing repeats with it, and a time of the motion's own."""
+        """Tolerance, largest number of steps in an interval, whether the forcing repeats with it, and 1/ω_n."""
         return float(self.tolerance), _MOST_STEPS, float(scene.repeats_after(interval)), 1.0 / scene.natural_frequency
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """The templates, with those for what jumps at events before those that meet events."""
+        """The templates, with those for jumps at events before those that locate events."""
         if not text.breaks:
             return self.templates
         place = self.templates.index("located")
@@ -65,7 +65,7 @@ class LocatedStepper(Stepper):
     def check(self, scene: Scene, flow: Flow) -> None:
         """Refuse noise: a random force has no order 8."""
         if flow is Flow.NOISY:
-            raise StepperError(f"{type(self).__name__} integrates smooth motion only; for noisy trajectories take RK4.")
+            raise StepperError(f"{type(self).__name__} integrates smooth motion only; use RK4 for noisy trajectories.")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,14 +73,14 @@ class Order8(LocatedStepper):
     """Dormand–Prince 8(5,3) with adaptive steps, one trajectory at a time; contacts are located and stepped through.
 
     Order 8 for linear and Hertz stops and every law that is smooth in the depth or in its square root, whose contact
-    is stepped in √time and √depth; other laws lose order at first touch, and the error control answers with shorter
+    is stepped in √time and √depth; other laws lose order at first touch, and the error control takes shorter
     steps. Choose it for orbits and certificates of any scene, and for stiff stops; choose `FreeFlight` where the spring
     is linear, `RK4` for large ensembles.
 
     Parameters
     ----------
     tolerance : float
-        Error that one step may make, relative to the size of what is integrated.
+        Largest error of one step, relative to the size of what is integrated.
     """
 
     name: ClassVar[str] = "order8"

@@ -19,8 +19,8 @@ class RK4(Stepper):
     """Classical Runge–Kutta, fixed steps, trajectories packed in vector lanes: the fastest for large ensembles.
 
     Order 4 while nothing touches; a contact that is crossed inside a step costs order: 2.5 for Hertz, 2 for linear
-    stops, 1 where the force jumps at first touch. Choose it for basins, action plots and noise, where many
-    trajectories at 1e-6 are worth more than one at 1e-12; choose `FreeFlight` or `Order8` for orbits and
+    stops, 1 where the force jumps at first touch. Choose it for basins, action plots and noise, which need many
+    trajectories at moderate accuracy; choose `FreeFlight` or `Order8` for orbits and
     certificates, and wherever a contact is shorter than a few steps.
 
     Derivatives of momenta jump where those of a contact force do: at linear stops, and where a law that would pull is
@@ -62,12 +62,12 @@ class RK4(Stepper):
         if text.jumps and text.breaks:
             what = "momenta" if text.flow.has_momenta else "derivatives of the motion"
             raise StepperError(
-                f"RK4 steps across contacts, and where a contact force jumps at first touch, the {what} jump too; take "
-                "FreeFlight or Order8 for them, which locate contacts."
+                f"RK4 steps across contacts, and where a contact force jumps at first touch, the {what} jump too; use "
+                "FreeFlight or Order8, which locate contacts."
             )
         noise = [text.amplitude, text.slope]
         pieces = [text.constants, text.forcing, tabulation(text), text.derivative, *noise, lane_step(text)]
-        return [*pieces, text.stops]  # the laws by themselves, compiled only where contact times are asked for
+        return [*pieces, text.stops]  # the laws, compiled only if contact times are needed
 
     def refined(self) -> Self:
         """Twice the steps."""

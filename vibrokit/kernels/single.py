@@ -1,4 +1,4 @@
-"""Runs one trajectory and keeps all of it."""
+"""Runs one trajectory and keeps all its samples."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def record(
     Returns
     -------
     array (≤ count + 1, equations)
-        Shorter if the numbers ran out of range, if steps ran out, or if a stop whose force jumps was grazed.
+        Shorter if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
     module = kernel_for(scene, flow, stepper).module
     warn_of_coarse_steps(scene, flow, stepper)

@@ -1,19 +1,16 @@
-"""When a trajectory has come far enough: the tests made at each section.
-
-Compiled into every stepper, so that an ensemble stops trajectory by trajectory and nothing is integrated in vain.
-"""
+"""Stop tests at each section, compiled into every stepper, so that each trajectory of an ensemble ends by itself."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-RAN_OUT = 0  # nothing stopped it: the budget of intervals is spent
+COMPLETED = 0  # all intervals of the budget, without a stop
 LEFT_REGION = 1
 LEFT_BASIN = 2  # in a cell of the basin grid that belongs to another attractor
 REACHED = 3  # within the tolerance of a known point
-NOT_FINITE = 4
-STALLED = 5  # the step limit of one interval was not enough
-GRAZED = 6  # it touched a stop whose force jumps too slowly to tell by how much the momenta jump
+DIVERGED = 4  # not finite
+STALLED = 5  # more steps in one interval than allowed
+GRAZED = 6  # the contact with a stop whose force jumps was too slow to determine the jump of the momenta
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -49,10 +46,10 @@ def section_status(
     Returns
     -------
     status, label : int
-        `RAN_OUT` and −1 if nothing stops it.
+        `COMPLETED` and −1 if nothing stops it.
     """
     if not (np.isfinite(x) and np.isfinite(v)):
-        return NOT_FINITE, -1
+        return DIVERGED, -1
     if x < region[0, 0] or x > region[0, 1] or v < region[1, 0] or v > region[1, 1]:
         return LEFT_REGION, -1
     nearest, least = -1, tolerance
@@ -69,7 +66,7 @@ def section_status(
         ]
         if label >= 0 and label != home:
             return LEFT_BASIN, int(label)
-    return RAN_OUT, -1
+    return COMPLETED, -1
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

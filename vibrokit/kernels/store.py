@@ -1,4 +1,4 @@
-"""Keeps generated modules on disk, beside what Numba compiled from them."""
+"""Keeps generated modules on disk, next to what Numba compiled from them."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def cache_directory() -> Path:
     except OSError as error:
         other = Path(tempfile.mkdtemp(prefix="vibrokit-"))
         warnings.warn(
-            f"cannot write compiled kernels to {chosen} ({error}); they go to {other} and will be compiled anew by "
-            f"the next process. Set {CACHE_VARIABLE} to a folder that can be written.",
+            f"cannot write compiled kernels to {chosen} ({error}); they go to {other}, and the next process compiles "
+            f"them again. Set {CACHE_VARIABLE} to a folder that can be written.",
             stacklevel=2,
         )
         return other
@@ -58,7 +58,7 @@ def store(name: str, text: str) -> None:
 
 def load(name: str, text: str) -> types.ModuleType:
     """Import a generated module, writing it first if this machine does not have it."""
-    with _LOADING:  # else threads that start together import it twice, and compile it twice
+    with _LOADING:  # otherwise threads that start together import it twice, and compile it twice
         return _load(name, text)
 
 

@@ -31,9 +31,9 @@ from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.fractions import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.regions import frame_of
-from vibrokit.structure.request import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.structure.tracing.branches import Tracing, without_fraction
 from vibrokit.structure.tracing.outcome import bifurcations_of, branch_findings, branch_names, thinned
+from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _FEW = (2, 2)  # cells where only the attractors are wanted

@@ -32,8 +32,8 @@ from vibrokit.structure.basins.grid import BasinGrid
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, grow_manifolds
 from vibrokit.structure.regions import frame_of, lies_in, search_region, states_at
-from vibrokit.structure.request import Request, check_means, seed_of, stepper_of
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
+from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _FOLDS = 30  # e-foldings of the linear damping that a transient is given

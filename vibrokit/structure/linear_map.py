@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -176,7 +176,7 @@ def _ends(
     osc: Oscillator, flow: Flow, stepper: Stepper, start: list[Array], intervals: int, over: dict[str, Any]
 ) -> Array:
     ended = run_ensemble(osc, flow, stepper, np.hstack(start), intervals, **over)
-    return np.where((ended.status == RAN_OUT)[:, None], ended.states, np.nan)
+    return np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
 
 
 def _identities(count: int, size: int) -> Array:

@@ -32,7 +32,7 @@ from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import carry, compiled_kernel, run_ensemble
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
@@ -93,7 +93,7 @@ def preimages(
     ended = run_ensemble(
         osc, Flow.STATE_REVERSED, chosen, states * flip, periods, interval=interval, executor=executor
     )  # fmt: skip
-    return np.where((ended.status == RAN_OUT)[:, None], ended.states * flip, np.nan)
+    return np.where((ended.status == COMPLETED)[:, None], ended.states * flip, np.nan)
 
 
 def branch_count(saddle: Saddle) -> int:
@@ -206,7 +206,7 @@ class _Map:
         if self.backwards:
             return preimages(self.osc, states, count, stepper=self.stepper, interval=self.interval)
         ended = run_ensemble(self.osc, Flow.STATE, self.stepper, states, count, interval=self.interval)
-        return np.where((ended.status == RAN_OUT)[:, None], ended.states, np.nan)
+        return np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
 
 
 def _branch(

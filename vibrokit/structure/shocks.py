@@ -20,7 +20,7 @@ from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.shock import ShapeStability, Shock
 from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.request import check_belongs, check_means, whole
+from vibrokit.structure.validation import check_belongs, check_means, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _RADII = 64  # sizes along each direction, of which the first fatal one and the one before are a bracket

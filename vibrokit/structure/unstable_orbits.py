@@ -24,8 +24,8 @@ from vibrokit.structure.equilibria import equilibrium_equations
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, section_equations, visited
 from vibrokit.structure.regions import search_region, states_at
-from vibrokit.structure.request import check_means, pair, whole
 from vibrokit.structure.scales import size_of
+from vibrokit.structure.validation import check_means, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 8  # times as many cells on a side as starts, in which turning points of the map are searched for

@@ -15,7 +15,7 @@ from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.request import pair, whole
+from vibrokit.structure.validation import pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predecessor, uphill start, flags

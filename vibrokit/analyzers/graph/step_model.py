@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map
 from vibrokit.symbolic.flow_kind import Flow
@@ -94,7 +94,7 @@ class StepModel:
         centres = ended.states[:, :2] * _MIRROR
         roots = _root_of_inverse(ended.states[:, 2:] * np.array([1.0, -1.0, 1.0]))
         uphill = self._uphill(states, start, step, box)
-        good = (ended.status == RAN_OUT) & np.isfinite(centres).all(axis=1) & np.isfinite(roots).all(axis=1)
+        good = (ended.status == COMPLETED) & np.isfinite(centres).all(axis=1) & np.isfinite(roots).all(axis=1)
         out = ~good | np.any((centres < box[:, 0]) | (centres > box[:, 1]), axis=1)
         if out.any():
             centres[out], roots[out] = self._linearized_from(uphill[out], states[out], start, step)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION, NOT_FINITE, RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.symbolic.flow_kind import Flow
@@ -125,8 +125,8 @@ class Shooter:
         outcomes.targets[which[exits]] = reached[exits]
         outcomes.confirmed[which[exits]] = True
         outcomes.status[which[exits]] = LEFT_BASIN
-        outcomes.status[which[reached == UNSETTLED]] = RAN_OUT
-        outcomes.status[which[reached == LEFT]] = NOT_FINITE
+        outcomes.status[which[reached == UNSETTLED]] = COMPLETED
+        outcomes.status[which[reached == LEFT]] = DIVERGED
         again = which[returned]
         left = self.budget * self.problem.checks - outcomes.checks[again]
         more = self._integrated(states[returned], np.maximum(left, 0))

@@ -20,7 +20,7 @@ from vibrokit.analyzers.shooting.starts import Ring, Starts
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import TRAJECTORIES, stage
-from vibrokit.structure.request import whole
+from vibrokit.structure.validation import whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_PERIODS = 10**8

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.shooting.boxes import Boxes
 from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.starts import Starts
-from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION, NOT_FINITE, RAN_OUT, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION, STALLED
 
 _PART = 4  # a round adds the points of the first grid divided by this
 _CERTAIN = 1.5  # times the least action of a target, up to which all exits are confirmed
 
-_STATUS = (RAN_OUT, LEFT_REGION, LEFT_BASIN, NOT_FINITE, STALLED)
+_STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED)
 _MEANINGS = "remaining left_region left_basin diverged stalled"
 _ATTRIBUTES: dict[str, dict[str, object]] = {
     "angle": {"units": "rad", "long_name": "angle of the start"},
@@ -112,8 +112,8 @@ class Shots:
             "paths": len(status),
             "escaped": int(np.sum(escaped)),
             "left_region": int(np.sum((status == LEFT_REGION) & ~escaped)),
-            "remaining": int(np.sum(status == RAN_OUT)),
-            "diverged": int(np.sum(np.isin(status, (NOT_FINITE, STALLED)))),
+            "remaining": int(np.sum(status == COMPLETED)),
+            "diverged": int(np.sum(np.isin(status, (DIVERGED, STALLED)))),
         }
 
     def dataset(self) -> xarray.Dataset:

@@ -1,4 +1,4 @@
-"""Over an event with momenta and derivatives of both: the saltation matrix of Hamilton's equations.
+"""Momenta and derivatives across an event: the saltation matrix of Hamilton's equations.
 
 At the touch of a stop p₁ jumps by −p₂ ΔF(v)/v (see `crossing_momenta`), a map g of the phase z = (q, p). A path that
 is ahead by δx has been under the new equations for δx/v longer, so that δz becomes Dg (δz − f⁻ δx/v) + f⁺ δx/v, with
@@ -7,7 +7,7 @@ f⁻ before and f⁺ after the jump. A force that does not jump, but whose slope
 
 from numba import njit
 
-from vibrokit.kernels.stopping import GRAZED, RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
 from vibrokit.kernels.templates.scene import STATES, rhs
 from vibrokit.kernels.templates.settling import settle
@@ -20,16 +20,16 @@ MATRIX = PHASE + 1
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, desk):
-    """Settle at an event, and carry the momenta and all derivatives over it."""
-    before, after = desk[0], desk[1]  # the slopes of the last step are spent
+def cross(i, y, memory, pushing, theta, settings, workspace):
+    """Settle at an event, and map the momenta and all derivatives across it."""
+    before, after = workspace[0], workspace[1]  # the slopes of the last step are no longer needed
     pushed = pushing[i]
     rhs(y[CLOCK], y, pushing, theta, before)
     if (memory[TOUCHED] < 0.0 or pushed) and grazes(i, y, before[1], theta, settings):
         return GRAZED
-    settle(y, memory, pushing, theta, desk[SPARE])
+    settle(y, memory, pushing, theta, workspace[SPARE])
     if pushing[i] == pushed:
-        return RAN_OUT
+        return COMPLETED
     rhs(y[CLOCK], y, pushing, theta, after)
     v = y[1]
     leap = (after[1] - before[1]) / v
@@ -44,16 +44,16 @@ def cross(i, y, memory, pushing, theta, settings, desk):
         for row in range(PHASE):
             y[column + row * PHASE] += lapse * (after[row] - before[row])
         y[column + STATES * PHASE] += in_v * of_v - leap * of_p
-    return RAN_OUT
+    return COMPLETED
 
 
 @njit(**INNER)
-def turn_law(i, y, pushing, theta, desk):
+def turn_law(i, y, pushing, theta, workspace):
     """Switch a law on or off where it passes zero: there the rates of the momenta jump, by j = −p₂ ∂F/∂q.
 
     The event is at F(q) = 0, whose normal is along j, so that δp jumps by j (j·δq)/(j·q′).
     """
-    before, after = desk[0], desk[1]
+    before, after = workspace[0], workspace[1]
     rhs(y[CLOCK], y, pushing, theta, before)
     pushing[i] = not pushing[i]
     rhs(y[CLOCK], y, pushing, theta, after)

@@ -1,4 +1,4 @@
-"""Over an event with momenta: where the force jumps, so does p₁.
+"""Momenta across an event: where the force jumps, so does p₁.
 
 An extremal path is refracted at a stop as a ray is where the index jumps (the corner conditions of Weierstrass and
 Erdmann): q, p₂ and H = p₁ v + p₂ b₂ + ½ a p₂² are continuous, so p₁ v + p₂ F is, and p₁ jumps by −p₂ ΔF/v.
@@ -6,7 +6,7 @@ Erdmann): q, p₂ and H = p₁ v + p₂ b₂ + ½ a p₂² are continuous, so p�
 
 from numba import njit
 
-from vibrokit.kernels.stopping import GRAZED, RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
 from vibrokit.kernels.templates.scene import STATES, rhs
 from vibrokit.kernels.templates.settling import settle
@@ -16,16 +16,16 @@ from vibrokit.kernels.templates.steps import CLOCK, INNER, SPARE, TOUCHED
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, desk):
-    """Settle at an event, and carry the momenta over it."""
+def cross(i, y, memory, pushing, theta, settings, workspace):
+    """Settle at an event, and map the momenta across it."""
     involved = memory[TOUCHED] < 0.0 or pushing[i]
-    rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
-    before = desk[SPARE, 1]
+    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
+    before = workspace[SPARE, 1]
     if involved and grazes(i, y, before, theta, settings):
         return GRAZED
-    settle(y, memory, pushing, theta, desk[SPARE])
-    rhs(y[CLOCK], y, pushing, theta, desk[SPARE])
-    leap = y[STATES + 1] * (desk[SPARE, 1] - before)
+    settle(y, memory, pushing, theta, workspace[SPARE])
+    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
+    leap = y[STATES + 1] * (workspace[SPARE, 1] - before)
     if leap != 0.0:
         y[STATES] -= leap / y[1]
-    return RAN_OUT
+    return COMPLETED

@@ -1,13 +1,13 @@
 """Free flight in closed form: between the stops of a linear scene the Taylor series of the motion is exact.
 
-A touch is the first zero of a polynomial. The search for it never passes one: from each point it goes only as far as
-bounds on the second and third derivative prove free.
+A touch is the first zero of a polynomial. The search for it cannot miss one: from each point it advances only as far
+as bounds on the second and third derivative exclude a zero.
 """
 
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import RAN_OUT, STALLED
+from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.crossing_extremals import cross
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
@@ -25,16 +25,16 @@ from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER, SPARE
 
 
 @njit(**INNER)
-def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
-    """Follow the free motion until a stop is touched or the time is up."""
+def fly(y, end, memory, pushing, theta, settings, workspace, coefficients):
+    """Follow the free motion until a stop is touched, or to the end time."""
     reach = 1.5 / flight_rate(theta)
     while y[CLOCK] < end:
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
-        left = end - y[CLOCK]
-        last = left <= 1.01 * reach
-        length, touched = left if last else reach, -1
+        remaining = end - y[CLOCK]
+        last = remaining <= 1.01 * reach
+        length, touched = remaining if last else reach, -1
         taylor(y[CLOCK], y, theta, coefficients)
         if BARRIERS > 0:
             touched, length = first_touch(length, theta, coefficients)
@@ -47,15 +47,15 @@ def fly(y, end, memory, pushing, theta, settings, desk, coefficients):
         if BARRIERS > 0:
             if touched >= 0:
                 y[0] = stop(touched, theta)
-                settle(y, memory, pushing, theta, desk[SPARE])  # unbroken
-                return RAN_OUT  # unbroken
-                return cross(touched, y, memory, pushing, theta, settings, desk)  # breaking
-    return RAN_OUT
+                settle(y, memory, pushing, theta, workspace[SPARE])  # unbroken
+                return COMPLETED  # unbroken
+                return cross(touched, y, memory, pushing, theta, settings, workspace)  # breaking
+    return COMPLETED
 
 
 @njit(**INNER)
 def first_touch(length, theta, c):
-    """Which stop is touched first within `length` (−1: none), and when."""
+    """Stop that is touched first within `length` (−1: none), and the moment."""
     size, second, third = abs(c[0, 0]) + abs(c[0, 1]) * length, 0.0, 0.0
     power = 1.0  # length^(k − 2)
     for k in range(2, ORDER + 1):
@@ -76,7 +76,7 @@ def first_touch(length, theta, c):
 def touch_of(i, length, size, second, third, theta, c):
     """First moment before `length` at which a stop is touched, or `length`.
 
-    `size`, `second` and `third` bound x and its derivatives. A visit too shallow for x to represent is none.
+    `size`, `second` and `third` bound x and its derivatives. A contact too shallow for x to represent does not count.
     """
     wall, side, s = stop(i, theta), SIDES[i], 0.0
     rounding = EPSILON * (4.0 * abs(wall) + 2.0 * size)
@@ -88,7 +88,7 @@ def touch_of(i, length, size, second, third, theta, c):
             x = x * s + c[0, k]
         gap, closing, pull = side * (wall - x), side * v, 2.0 * side * a
         if s == 0.0 and gap == 0.0:
-            closing = min(closing, 0.0)  # it starts here, and is free: it leaves
+            closing = min(closing, 0.0)  # it starts here and is free, so it leaves
         elif closing > 0.0 and gap <= max(rounding, 4.0 * EPSILON * closing * length):
             if pull >= 0.0 or closing * closing > -2.0 * pull * rounding:
                 return min(max(s + gap / closing, 0.0), length)
@@ -104,7 +104,7 @@ def touch_of(i, length, size, second, third, theta, c):
 
 @njit(**INNER)
 def clear_ahead(gap, closing, pull, second, third):
-    """For how long the gap surely stays open."""
+    """A time during which the gap certainly stays open."""
     root = np.sqrt(closing * closing + 2.0 * second * gap)
     if closing > 0.0:
         ahead = 2.0 * gap / (closing + root)

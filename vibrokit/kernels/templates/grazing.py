@@ -1,4 +1,4 @@
-"""Touches too slow for a jump of the momenta to mean anything."""
+"""Contacts too slow to determine the jump of the momenta."""
 
 from numba import njit
 

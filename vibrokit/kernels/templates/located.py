@@ -1,4 +1,4 @@
-"""The stops: how a step is shortened to end on an event, how a contact is followed to its end.
+"""The stops: a step is shortened to end on an event, a contact is followed to its end.
 
 Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; it changes only between steps. At
 most one stop is touched at a time. Lines marked "breaking" or "unbroken" are kept only for scenes and flows in which
@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import crossing, summit
-from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, STALLED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
 from vibrokit.kernels.templates.scene import CLAMPED, SIDES, law, rhs, stop
 from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_at, settle
@@ -54,13 +54,13 @@ def goal_at(goal, i, y, theta):
 
 
 @njit(**INNER)
-def land(goal, course, sigma, h, y, i, pushing, theta, desk):
+def land(goal, course, sigma, h, y, i, pushing, theta, workspace):
     """Shorten a step, after which a goal has changed its sign, to end on its zero; leave that end in TRIAL.
 
     Newton's method for the depth, whose derivative in time is the rate, secants for the others; bisection where they
     leave the bracket.
     """
-    trial = desk[TRIAL]
+    trial = workspace[TRIAL]
     start, value = goal_at(goal, i, y, theta), goal_at(goal, i, trial, theta)
     rising = value > 0.0
     low, high, length, before, last = 0.0, h, h, 0.0, start
@@ -76,7 +76,7 @@ def land(goal, course, sigma, h, y, i, pushing, theta, desk):
             new = 0.5 * (low + high)
         before, last = length, value
         length = new
-        attempt(course, sigma, length, y, i, pushing, theta, desk)
+        attempt(course, sigma, length, y, i, pushing, theta, workspace)
         value = goal_at(goal, i, trial, theta)
         if (value > 0.0) == rising:
             high = length
@@ -87,33 +87,33 @@ def land(goal, course, sigma, h, y, i, pushing, theta, desk):
         if abs(length - before) <= 4.0 * EPSILON * abs(h):
             break
         if goal == DEPTH_GOAL and course == TIME and abs(value) < 1e-9 * abs(h * trial[1]):
-            # So near that one more Newton step is exact to rounding and needs no new attempt.
+            # One more Newton step is exact to rounding here and needs no new attempt.
             move = -value / (SIDES[i] * trial[1])
-            rhs(trial[CLOCK], trial, pushing, theta, desk[SPARE])
+            rhs(trial[CLOCK], trial, pushing, theta, workspace[SPARE])
             for e in range(CLOCK):
-                trial[e] += move * desk[SPARE, e]
+                trial[e] += move * workspace[SPARE, e]
             trial[CLOCK] += move
             return length + move
     return length
 
 
 @njit(**INNER)
-def press(y, end, memory, pushing, theta, settings, desk):
-    """Follow the contact with the touched stop until it ends or the time is up."""
+def press(y, end, memory, pushing, theta, settings, workspace):
+    """Follow the contact with the touched stop until it ends, or to the end time."""
     touched = memory[TOUCHED]
     while y[CLOCK] < end and memory[TOUCHED] == touched:
-        status = press_step(int(touched), y, end, memory, pushing, theta, settings, desk)
-        if status != RAN_OUT:
+        status = press_step(int(touched), y, end, memory, pushing, theta, settings, workspace)
+        if status != COMPLETED:
             return status
-    return RAN_OUT
+    return COMPLETED
 
 
 @njit(**INNER)
-def course_of(i, y, memory, theta, desk):
+def course_of(i, y, memory, theta, workspace):
     """Choose the course of the next step in contact, and where on it y lies."""
     depth, rate = SIDES[i] * (y[0] - stop(i, theta)), SIDES[i] * y[1]
     if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
-        acceleration = SIDES[i] * desk[0, 1]
+        acceleration = SIDES[i] * workspace[0, 1]
         if rate * rate > (4.0 if acceleration > 0.0 else -1.0) * acceleration * depth:
             return ROOT_DEPTH, np.sqrt(depth)
     if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
@@ -127,22 +127,22 @@ def length_of(course, sigma, lapse, i, y, theta):
     if course == ROOT_TIME:
         return lapse / (np.sqrt(sigma * sigma + lapse) + sigma)
     if course == ROOT_DEPTH:
-        left = sigma * sigma + SIDES[i] * y[1] * lapse
-        return np.sqrt(left) - sigma if left > 0.02 * sigma * sigma else -sigma
+        square = sigma * sigma + SIDES[i] * y[1] * lapse
+        return np.sqrt(square) - sigma if square > 0.02 * sigma * sigma else -sigma
     return lapse
 
 
 @njit(**INNER)
-def press_step(i, y, end, memory, pushing, theta, settings, desk):
-    """One step in contact, on the course that suits it."""
-    trial = desk[TRIAL]
-    rhs(y[CLOCK], y, pushing, theta, desk[0])
-    course, sigma = course_of(i, y, memory, theta, desk)
-    left = end - y[CLOCK]
-    last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * left
-    h = length_of(course, sigma, left if last else memory[CONTACT_STEP], i, y, theta)
-    copy(y, desk[STAGE])
-    slope(course, sigma, h, i, pushing, theta, desk, 0)
+def press_step(i, y, end, memory, pushing, theta, settings, workspace):
+    """One step in contact, on the course that is chosen for it."""
+    trial = workspace[TRIAL]
+    rhs(y[CLOCK], y, pushing, theta, workspace[0])
+    course, sigma = course_of(i, y, memory, theta, workspace)
+    remaining = end - y[CLOCK]
+    last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
+    h = length_of(course, sigma, remaining if last else memory[CONTACT_STEP], i, y, theta)
+    copy(y, workspace[STAGE])
+    slope(course, sigma, h, i, pushing, theta, workspace, 0)
     depth = max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30)
     grain = grain_of(i, depth, y, theta)
     first, before, misses = h, np.inf, 0
@@ -150,9 +150,9 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
-        attempt(course, sigma, h, y, i, pushing, theta, desk)
+        attempt(course, sigma, h, y, i, pushing, theta, workspace)
         haze = 4.0 * EPSILON * abs(y[0]) / max(depth, SIDES[i] * (trial[0] - stop(i, theta)))
-        error = misfit(h, y, memory[SPAN], settings[0], grain, haze, desk)
+        error = misfit(h, y, memory[SPAN], settings[0], grain, haze, workspace)
         lapse = trial[CLOCK] - y[CLOCK]
         tiny = abs(lapse) <= EPSILON * (abs(y[CLOCK]) + memory[SPAN]) or abs(h) < 1e-12 * abs(first)
         if error > 1.0 and not tiny and misses < 2:
@@ -161,21 +161,22 @@ def press_step(i, y, end, memory, pushing, theta, settings, desk):
             h *= min(0.7, stretch(error))
             continue
         if not np.isfinite(error):
-            return NOT_FINITE
+            return DIVERGED
         if course == ROOT_DEPTH:
             if trial[CLOCK] > end or SIDES[i] * trial[1] >= 0.0:
                 memory[TIMED] = 2.0 if trial[CLOCK] > end else 1.0
-                return RAN_OUT
+                return COMPLETED
         elif memory[PULLED] == 0.0 and not tiny and leaves(i, y, lapse, theta, trial):
             h *= 0.5
             continue
         break
-    return conclude(i, course, sigma, h, last and h == first, error, y, end, memory, pushing, theta, settings, desk)
+    whole = last and h == first
+    return conclude(i, course, sigma, h, whole, error, y, end, memory, pushing, theta, settings, workspace)
 
 
 @njit(**INNER)
 def grain_of(i, depth, y, theta):
-    """How uncertain the law is because x is rounded."""
+    """Uncertainty of the law due to the rounding of x."""
     more = 0.5 * depth + 64.0 * EPSILON * abs(y[0])
     rate = SIDES[i] * y[1]
     return 3.0 * EPSILON * abs(y[0]) * abs(law(i, depth + more, rate, theta) - law(i, depth, rate, theta)) / more
@@ -196,13 +197,13 @@ def leaves(i, y, lapse, theta, trial):
 
 
 @njit(**INNER)
-def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, settings, desk):
+def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, settings, workspace):
     """Accept the step in TRIAL, or the part of it before the law changes its sign or the mass leaves."""
-    trial = desk[TRIAL]
+    trial = workspace[TRIAL]
     wall, length, turned = stop(i, theta), h, False
     if SOME_CLAMPED:
         if CLAMPED[i]:
-            length, turned = turn(i, course, sigma, h, y, memory, pushing, theta, desk)
+            length, turned = turn(i, course, sigma, h, y, memory, pushing, theta, workspace)
     lapse = trial[CLOCK] - y[CLOCK]
     copy(trial, y)
     if last and length == h:
@@ -212,29 +213,29 @@ def conclude(i, course, sigma, h, last, error, y, end, memory, pushing, theta, s
         memory[PULLED] = 1.0 - memory[PULLED]
         memory[SINCE] = np.nan
         pushing[i] = not pushing[i]  # unbent
-        turn_law(i, y, pushing, theta, desk)  # bending
+        turn_law(i, y, pushing, theta, workspace)  # bending
     elif (course == ROOT_DEPTH and sigma + length == 0.0) or SIDES[i] * (y[0] - wall) <= 0.0:
         y[0] = wall
-        settle(y, memory, pushing, theta, desk[SPARE])  # unbroken
-        return cross(i, y, memory, pushing, theta, settings, desk)  # breaking
-    return RAN_OUT
+        settle(y, memory, pushing, theta, workspace[SPARE])  # unbroken
+        return cross(i, y, memory, pushing, theta, settings, workspace)  # breaking
+    return COMPLETED
 
 
 @njit(**INNER)
-def turn(i, course, sigma, h, y, memory, pushing, theta, desk):
+def turn(i, course, sigma, h, y, memory, pushing, theta, workspace):
     """End the step in TRIAL where the law changes its sign, or where a mass that is not pushed leaves the stop."""
-    trial, wall = desk[TRIAL], stop(i, theta)
+    trial, wall = workspace[TRIAL], stop(i, theta)
     before, after = push_at(i, y, theta), push_at(i, trial, theta)
     pulled, length = memory[PULLED] != 0.0, h
     turned = after > 0.0 if pulled else after < 0.0
     if turned and (before < 0.0 if pulled else before > 0.0):
-        length = land(LAW_GOAL, course, sigma, h, y, i, pushing, theta, desk)
+        length = land(LAW_GOAL, course, sigma, h, y, i, pushing, theta, workspace)
     elif turned:
         copy(y, trial)
         length = 0.0
     if pulled and SIDES[i] * (trial[0] - wall) < 0.0:
         turned = False
-        length = land(DEPTH_GOAL, course, sigma, length, y, i, pushing, theta, desk)
+        length = land(DEPTH_GOAL, course, sigma, length, y, i, pushing, theta, workspace)
         trial[0] = wall
     return length, turned
 

@@ -15,7 +15,7 @@ Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and f
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, section_status
 from vibrokit.kernels.streams import normal_pairs, seed_lane
 from vibrokit.kernels.templates.scene import (
     EQUATIONS,
@@ -81,7 +81,7 @@ def advance(
                     else:
                         out_states[waiting] = states[waiting]
                         out_intervals[waiting] = 0
-                        out_status[waiting] = RAN_OUT
+                        out_status[waiting] = COMPLETED
                         out_label[waiting] = -1
                     waiting += 1
             if active == 0:
@@ -112,13 +112,13 @@ def advance(
                 finite = finite and np.isfinite(z[e, lane])
             label = -1
             if not finite:
-                status = NOT_FINITE
+                status = DIVERGED
             else:
                 done[lane] += 1
                 status, label = section_status(
                     z[0, lane], z[1, lane], region, labels, home, points, point_labels, tolerance
                 )
-                if status == RAN_OUT and done[lane] < budget[index]:
+                if status == COMPLETED and done[lane] < budget[index]:
                     continue
             for e in range(EQUATIONS):
                 out_states[index, e] = z[e, lane] if finite else before[e, lane]
@@ -142,7 +142,7 @@ def record(
     given,  # noisy
     out,
 ):
-    # One trajectory in lane 0, by the very code of the ensembles. `given` normals, if any, replace drawn ones.
+    # One trajectory in lane 0, by the code of the ensembles. `given` normals, if any, replace drawn ones.
     steps = max(1, int(np.ceil(spacing / settings[2] - 1e-9)))
     h = spacing / steps
     z = np.zeros((EQUATIONS, LANES))

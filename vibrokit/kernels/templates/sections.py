@@ -1,9 +1,9 @@
-"""From section to section: what every stepper that locates its events offers."""
+"""From section to section, for steppers that locate their events."""
 
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import NOT_FINITE, RAN_OUT, section_status
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, section_status
 from vibrokit.kernels.templates.located import press
 from vibrokit.kernels.templates.order8 import fly
 from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
@@ -33,31 +33,31 @@ def copy_state(source, target):
 
 
 @njit(**INNER)
-def begin(y, interval, memory, pushing, theta, desk):
-    """Forget the past: what follows depends on y alone."""
+def begin(y, interval, memory, pushing, theta, workspace):
+    """Reset the memory, so that the motion depends on y alone."""
     memory[SPAN] = abs(interval)
     memory[FREE_STEP] = interval / 16.0
     memory[FIRST_STEP] = interval / 128.0
     memory[CONTACT_STEP] = memory[FIRST_STEP]
     if BARRIERS > 0:
-        settle(y, memory, pushing, theta, desk[SPARE])
+        settle(y, memory, pushing, theta, workspace[SPARE])
     else:
         memory[TOUCHED] = -1.0
 
 
 @njit(**INNER)
-def travel(y, end, memory, pushing, theta, settings, desk, coefficients):
-    """Carry y to the time `end`, from contact to contact."""
+def travel(y, end, memory, pushing, theta, settings, workspace, coefficients):
+    """Integrate y to the time `end`, from contact to contact."""
     memory[COUNT], memory[TIMED] = 0.0, 0.0
-    status = RAN_OUT
-    while y[CLOCK] < end and status == RAN_OUT:
+    status = COMPLETED
+    while y[CLOCK] < end and status == COMPLETED:
         if BARRIERS > 0 and memory[TOUCHED] >= 0.0:
-            status = press(y, end, memory, pushing, theta, settings, desk)
+            status = press(y, end, memory, pushing, theta, settings, workspace)
         else:
-            status = fly(y, end, memory, pushing, theta, settings, desk, coefficients)
+            status = fly(y, end, memory, pushing, theta, settings, workspace, coefficients)
     for e in range(EQUATIONS):
         if not np.isfinite(y[e]):
-            return NOT_FINITE
+            return DIVERGED
     return status
 
 
@@ -81,19 +81,19 @@ def advance(
     out_label,
 ):
     memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
-    desk, coefficients, y = desk_and_more()
+    workspace, coefficients, y = workspaces()
     repeats = settings[2] != 0.0
     for index in range(states.shape[0]):
-        status, label, done = RAN_OUT, -1, 0
+        status, label, done = COMPLETED, -1, 0
         copy_state(states[index], out_states[index])
-        while status == RAN_OUT and done < budget[index]:
+        while status == COMPLETED and done < budget[index]:
             # Where the forcing repeats, each interval starts at the same time: the phase cannot drift.
             start = start_time if repeats else start_time + done * interval
             copy_state(out_states[index], y)
             y[CLOCK] = start
-            begin(y, interval, memory, pushing, theta, desk)
-            status = travel(y, start + interval, memory, pushing, theta, settings, desk, coefficients)
-            if status == RAN_OUT:
+            begin(y, interval, memory, pushing, theta, workspace)
+            status = travel(y, start + interval, memory, pushing, theta, settings, workspace, coefficients)
+            if status == COMPLETED:
                 done += 1
                 copy_state(y, out_states[index])
                 status, label = section_status(y[0], y[1], region, labels, home, points, point_labels, tolerance)
@@ -101,21 +101,21 @@ def advance(
 
 
 @njit(**INNER)
-def desk_and_more():
+def workspaces():
     return np.zeros((ROWS, CLOCK + 1)), np.zeros((EQUATIONS, 32)), np.zeros(CLOCK + 1)
 
 
 @njit(**OPTIONS)
 def record(state, theta, start_time, spacing, settings, out):
     memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
-    desk, coefficients, y = desk_and_more()
+    workspace, coefficients, y = workspaces()
     copy_state(state, out[0])
     copy_state(state, y)
     y[CLOCK] = start_time
-    begin(y, spacing * (out.shape[0] - 1), memory, pushing, theta, desk)
+    begin(y, spacing * (out.shape[0] - 1), memory, pushing, theta, workspace)
     for sample in range(1, out.shape[0]):
-        status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, desk, coefficients)
-        if status != RAN_OUT:
+        status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, workspace, coefficients)
+        if status != COMPLETED:
             return sample
         copy_state(y, out[sample])
     return out.shape[0]

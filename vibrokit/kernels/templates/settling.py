@@ -1,4 +1,4 @@
-"""Which stop is touched, and whether it pushes."""
+"""Finds which stop is touched, and whether it pushes."""
 
 import numpy as np
 from numba import njit
@@ -23,7 +23,7 @@ SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
 
 @njit(**INNER)
 def settle(y, memory, pushing, theta, spare):
-    """Find out what is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
+    """Find the stop that is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
     memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
     switch_off(pushing)
     for i in range(BARRIERS):
@@ -34,7 +34,7 @@ def settle(y, memory, pushing, theta, spare):
             switch_off(pushing)
             rhs(y[CLOCK], y, pushing, theta, spare)
             acceleration = SIDES[i] * spare[1]
-            # A visit too shallow for x to represent is none.
+            # A contact too shallow for x to represent does not count.
             seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
             touched = rate > 0.0 if seen else acceleration > 0.0
             if touched and ROOTED[i]:

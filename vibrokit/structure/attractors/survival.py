@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT, REACHED
+from vibrokit.kernels.stopping import COMPLETED, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import LEFT, UNSETTLED
 from vibrokit.results.survival import Survival
@@ -50,7 +50,7 @@ def follow(
     """
     stop = arrival_at(dict(enumerate(orbits)), tolerance)
     ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
-    return ended, np.where(ended.status == REACHED, ended.label, np.where(ended.status == RAN_OUT, UNSETTLED, LEFT))
+    return ended, np.where(ended.status == REACHED, ended.label, np.where(ended.status == COMPLETED, UNSETTLED, LEFT))
 
 
 def watch(

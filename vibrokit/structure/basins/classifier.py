@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION, NOT_FINITE, REACHED, STALLED
+from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, LEFT_REGION, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
@@ -162,7 +162,7 @@ class _Trajectories:
                 executor=self.classifier.executor,
             )  # fmt: skip
             self.states = ended.states
-            self.found[ended.status == NOT_FINITE] = LEFT
+            self.found[ended.status == DIVERGED] = LEFT
 
     def integrate(self, which: Whole, most: int | Whole, stop: Stop) -> Ensemble:
         """Integrate some trajectories by at most so many sections, and note what they reach for certain."""
@@ -175,7 +175,7 @@ class _Trajectories:
         self.states[which] = ended.states
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
-        self.found[which[ended.status == NOT_FINITE]] = LEFT
+        self.found[which[ended.status == DIVERGED]] = LEFT
         in_core = (ended.status == LEFT_BASIN) & (ended.label < len(classifier.attractors))
         certain = (ended.status == REACHED) | (in_core & (stop is classifier.entering))
         self.found[which[certain]] = ended.label[certain]

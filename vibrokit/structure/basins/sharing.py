@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import RAN_OUT
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
@@ -79,7 +79,7 @@ def _images(
     ended = run_ensemble(osc, Flow.STATE, stepper, centres(osc, basins.region, shape, cells), executor=executor)
     low, high = basins.region.bounds.T
     shares = (ended.states[:, :2] - low) / (high - low)
-    inside = np.all((shares >= 0) & (shares < 1), axis=1) & (ended.status == RAN_OUT)
+    inside = np.all((shares >= 0) & (shares < 1), axis=1) & (ended.status == COMPLETED)
     places = np.where(inside[:, None], shares * shape, 0).astype(np.int64)
     targets = np.ravel_multi_index((places[:, 0], places[:, 1]), shape)
     return inside & (labels[targets] == labels[cells]), targets
