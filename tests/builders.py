@@ -24,9 +24,8 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.bifurcation import Bifurcation
-from vibrokit.results.certificate import Certificate
 from vibrokit.results.continuation import Continuation
-from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
+from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.manifold import Manifold, ManifoldEnd

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.builders import full_result, rewritten, say
+from vibrokit.cli import main
 from vibrokit.progress import Stats
 from vibrokit.report.data import plain, run_data
 from vibrokit.report.text import energy_table, findings_text, record_text, stats_text
@@ -102,6 +104,17 @@ def test_transitions_that_do_not_follow_are_one_sentence():
 def test_without_an_exit_to_another_attractor_nothing_is_said_of_transitions():
     assert "to another attractor" not in record_text("first contact", result(TOUCH))
     assert "No activation energy was found." in record_text("least-action", result())
+
+
+def test_a_result_of_an_unknown_kind_has_its_energies(tmp_path, capsys):
+    full_result().save(tmp_path / "r.nc")
+    (tmp_path / "r.nc").write_bytes(rewritten((tmp_path / "r.nc").read_bytes(), say("kind", "unheard-of")))
+    assert main(["report", str(tmp_path / "r.nc")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[0] for line in lines if "→" in line] == [
+        "clear → hammering-period-4", "hammering-period-4 → clear", "chaotic → exit",
+    ]  # fmt: skip
+    assert any(line.startswith("warning: ") and "unheard-of" in line for line in lines)
 
 
 def test_what_was_stopped_is_marked():

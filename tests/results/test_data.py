@@ -7,9 +7,10 @@ import pytest
 import xarray
 
 import vibrokit as vk
-from tests.builders import assert_same, full_result
+from tests.builders import assert_same, full_result, full_structure
 from vibrokit.results.data import joined
 from vibrokit.results.files import ResultFileError
+from vibrokit.results.result import Result
 
 NAMES = ("clear", "hammering", "chaotic")
 
@@ -75,10 +76,27 @@ def with_data(data):
     ],
     ids=["array", "prefix", "dimension", "axis", "axis as array", "other grid", "points", "coordinate"],
 )
-def test_names_that_results_use_are_refused(data, tmp_path):
-    with pytest.raises(ResultFileError, match=r"its data uses the name '.*'.*give it another name"):
-        with_data(data).save(tmp_path / "r.nc")
-    assert not list(tmp_path.iterdir())
+def test_names_that_results_use_are_refused(data):
+    with pytest.raises(ResultFileError, match=r"its data uses the name '.*'.*give it another name") as refused:
+        with_data(data)
+    for name in ("basin", "region_x", "source_name", "chaotic_saddle", "path"):
+        assert name in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        xarray.Dataset({"b": ("source", [1.0])}),
+        xarray.Dataset({"source": ("n", [1.0])}),
+        xarray.Dataset(coords={"source_name": ("n", ["a"])}),
+        xarray.Dataset({"path": ("n", [1.0])}),
+        xarray.Dataset({"mine": ("saddle_point", [1.0])}),
+    ],
+    ids=["dimension source", "array source", "names", "array", "dimension"],
+)
+def test_names_that_are_taken_are_refused_when_a_result_is_assembled(data):
+    with pytest.raises(ResultFileError, match="Names that are taken: basin, "):
+        Result.assembled(full_structure(), estimates={}, branches={}, data={0: data}, scene={})
 
 
 @pytest.mark.parametrize("name", ["title", "vibrokit", "history"])
@@ -143,8 +161,8 @@ def test_all_kinds_of_data_come_back(tmp_path):
     ("other", "words"),
     [
         (xarray.Dataset({"a": (("n", "m"), [[1.0]])}), "the arrays 'a' of the attractors have the dimensions"),
-        (xarray.Dataset({"b": ("source", [1.0])}), "cannot be joined along 'source'"),
-        (xarray.Dataset({"source": ("n", [1.0])}), "cannot be joined along 'source'"),
+        (xarray.Dataset({"b": ("source", [1.0])}), "uses the name 'source'"),
+        (xarray.Dataset({"source": ("n", [1.0])}), "uses the name 'source'"),
     ],
 )
 def test_arrays_that_cannot_be_joined_are_refused_in_a_sentence(other, words):

@@ -91,12 +91,21 @@ def test_a_file_of_an_unknown_kind_opens_as_plain_data(toy, tmp_path):
 def test_plain_data_saved_again_is_what_it_was(toy, tmp_path):
     toy.save(tmp_path / "toy.nc")
     vk.load_result(tmp_path / "toy.nc").save(tmp_path / "again.nc")
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "toy.nc").read_bytes()
     assert len(vk.load_result(tmp_path / "again.nc").found(Code.UNKNOWN_KIND)) == 1
     with plug_in():
         again = vk.load_result(tmp_path / "again.nc")
     assert type(again) is ShadeResult
     assert_same(toy.energies, again.energies)
     assert_same(toy.data, again.data)
+
+
+def test_plain_data_has_its_energies(toy, tmp_path):
+    toy.save(tmp_path / "toy.nc")
+    full_structure().save(tmp_path / "s.nc")
+    (tmp_path / "s.nc").write_bytes(rewritten((tmp_path / "s.nc").read_bytes(), say("kind", "other")))
+    assert_same(toy.energies, vk.load_result(tmp_path / "toy.nc").energies)
+    assert vk.load_result(tmp_path / "s.nc").energies == ()
 
 
 def test_a_misspelt_kind_opens_as_plain_data(tmp_path):
@@ -234,10 +243,26 @@ def test_findings_that_are_none_are_refused(findings, sound, tmp_path):
         opened(sound, say("findings", findings), tmp_path)
 
 
-def test_a_finding_whose_values_do_not_fit_is_not_saved(tmp_path):
-    bad = dataclasses.replace(full_structure(), findings=(Finding.of(Code.STEADY_STATES, count=3),))
-    with pytest.raises(ResultFileError, match="'steady-states' has values that do not fit"):
-        bad.save(tmp_path / "s.nc")
+@pytest.mark.parametrize(
+    ("code", "values", "words"),
+    [
+        (Code.REMARK, {}, "'remark' has values that do not fit its sentence .KeyError: 'text'"),
+        (Code.STEADY_STATES, {"count": 3}, "'steady-states' .*KeyError: 'starts'.*{count}, from {starts} starts"),
+        (Code.CELLS_UNSETTLED, {"fraction": "half"}, "'cells-unsettled' .*ValueError"),
+        (Code.CELLS_UNSETTLED, {"fraction": None}, "'cells-unsettled' .*TypeError"),
+        ("steady-states", {"count": 3, "starts": 9}, "needs a Code, such as Code.REMARK, got 'steady-states'"),
+    ],
+)
+def test_a_finding_whose_values_do_not_fit_is_not_made(code, values, words):
+    with pytest.raises(TypeError, match=words):
+        Finding.of(code, **values)
+
+
+@pytest.mark.parametrize("findings", ["a text", ("a text",), ["a text"], (Finding.of(Code.SADDLES, count=3), None), 3])
+def test_what_is_no_finding_is_refused(findings):
+    for make in (vk.Analysis, lambda findings: dataclasses.replace(full_result(), findings=findings)):
+        with pytest.raises(TypeError, match=r"findings must be a tuple of Finding, got .*Code\.REMARK"):
+            make(findings=findings)
 
 
 # Files

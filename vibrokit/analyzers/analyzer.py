@@ -17,7 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Code, Finding, check_findings
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
@@ -37,6 +37,7 @@ class Analysis:
     data : xarray.Dataset
         Arrays behind the numbers, without a dimension ``source``: those of all attractors are joined along one.
     findings : tuple of Finding
+        A text of your own is ``Finding.of(Code.REMARK, source, text=...)``.
     branches : tuple of ActivationEnergy
         All exit paths that were found, also those that are not the best; the cheapest first.
     complete : bool
@@ -48,6 +49,9 @@ class Analysis:
     findings: tuple[Finding, ...] = ()
     branches: tuple[ActivationEnergy, ...] = ()
     complete: bool = True
+
+    def __post_init__(self) -> None:
+        check_findings(self.findings)
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,))

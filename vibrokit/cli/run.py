@@ -194,7 +194,7 @@ def _print(outcome: Outcome, options: argparse.Namespace) -> None:
     """Print what was found, as one JSON object or as text; what was not run goes to standard error too."""
     from vibrokit.report.data import findings_data, run_data
     from vibrokit.report.text import record_text
-    from vibrokit.results.versions import versions
+    from vibrokit.results.record import versions
 
     for finding in outcome.findings:
         print(f"vibrokit: {finding}", file=sys.stderr)

@@ -44,10 +44,7 @@ def cycle_hierarchy(energies: Array, lower: Array, upper: Array) -> tuple[Cycle,
     group. The group is left, from member i to an outsider j, at E_i + V_ij, where E_i is the exponent of the weight of
     i within the group (Freidlin and Wentzell, chapter 6, section 6: the hierarchy of cycles).
 
-    Parameters
-    ----------
-    energies, lower, upper : array (count, count)
-        As in `vibrokit.comparison.transitions.Transitions`.
+    The matrices are those of `vibrokit.comparison.transitions.Transitions`.
     """
     groups: list[tuple[int, ...]] = [(label,) for label in range(len(energies))]
     found: dict[tuple[int, ...], Cycle] = {}

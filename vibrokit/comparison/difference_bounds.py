@@ -22,15 +22,7 @@ def difference_bounds(lower: Array, upper: Array, both: Callable[[Array], tuple[
     extremes lie at corners of the box. Of a few attractors, the ends of the widest entries are combined exactly. The
     other entries are set to opposite ends in the two functions, which gives a bound that need not be attained.
 
-    Parameters
-    ----------
-    lower, upper : array (count, count)
-    both : callable
-        From a matrix to the values of the two functions, arrays of one shape.
-
-    Returns
-    -------
-    (array, array)
+    `both` makes of a matrix the values of the two functions, arrays of one shape.
     """
     width = np.subtract(upper, lower, where=lower != upper, out=np.zeros_like(upper))
     order = np.argsort(width, axis=None)[::-1][: _CORNERS if len(lower) <= _FEW else 0]

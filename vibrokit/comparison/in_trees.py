@@ -13,10 +13,8 @@ Array = NDArray[np.float64]
 def tree_costs(cost: Array) -> Array:
     """Return the cost of the cheapest in-tree of each root; infinite where some node has no path to the root.
 
-    Parameters
-    ----------
-    cost : array (count, count)
-        Cost of the arc from row to column, not negative, infinite where there is no arc. The diagonal is ignored.
+    `cost` (count, count) has the cost of the arc from row to column, not negative, infinite where there is no arc. The
+    diagonal is ignored.
     """
     trees = (cheapest_tree(cost, root) for root in range(len(cost)))
     return np.array([math.inf if tree is None else math.fsum(cost[arc] for arc in tree.items()) for tree in trees])

@@ -14,13 +14,42 @@ from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
-from vibrokit.comparison.stationary import StationaryWeights
 from vibrokit.errors import StructureError
 from vibrokit.results.labels import label_of
 from vibrokit.results.result import Result
 from vibrokit.text_table import text_table
 
 Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StationaryWeights:
+    """Shares of time spent at each attractor in the long run, from their exponents alone.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the attractors, in the order of their labels.
+    intensity : float
+        Noise intensity D (m² s⁻³).
+    weights : array (count,)
+        Sum 1; NaN where they are not known.
+    lower, upper : array (count,)
+        Bounds of each, from those of the energies. They do not include the unknown prefactors.
+    """
+
+    names: tuple[str, ...]
+    intensity: float
+    weights: Array
+    lower: Array
+    upper: Array
+
+    def __str__(self) -> str:
+        if np.isnan(self.weights).any():
+            return f"Stationary weights at D = {self.intensity:g} are not known."
+        rows = zip(self.names, self.weights, self.lower, self.upper, strict=True)
+        shares = ", ".join(f"{name} {_share(*numbers)}" for name, *numbers in rows)
+        return f"Stationary weights at D = {self.intensity:g}, without prefactors: {shares}."
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -250,3 +279,7 @@ def _shown(value: float, lower: float, upper: float) -> str:
     if math.isinf(value):
         return "no exit" if math.isinf(lower) else "not found"
     return f"{value:.5g}" if upper - lower <= 1e-4 * abs(value) else f"{value:.4g} ({lower:.3g} to {upper:.3g})"
+
+
+def _share(value: float, low: float, high: float) -> str:
+    return f"{value:.3g}" if np.isclose(low, high, rtol=1e-3, atol=0) else f"{value:.3g} ({low:.2g} to {high:.2g})"

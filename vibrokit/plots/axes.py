@@ -9,14 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 COLOURS = (
     "#3b6ea8", "#c8553d", "#588b5b", "#8e6bb0", "#c9a227", "#7a4b2a", "#d679a8", "#4aa3a2", "#1f3a5f", "#e08e45",
     "#9bbf3b", "#5b2a6e", "#6fb1e0", "#8c1c2f", "#0f6b4f", "#b58bd6", "#d9c56b", "#a66a52", "#e8a0a0", "#2b8fb3",
 )  # fmt: skip
-WALL = "0.45"
 _LEAST_SAMPLE = 4.0  # points
 _ROUNDING = 1e-9
 
@@ -25,8 +23,7 @@ def axes_or_new(ax: Axes | None, width: float = 6.0, height: float = 4.2) -> Axe
     """Return `ax`, or the axes of a new figure that belongs to no window."""
     if ax is not None:
         return ax
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure.add_subplot()
+    return Figure(figsize=(width, height), layout="constrained").add_subplot()
 
 
 def colour(label: int) -> str:
@@ -34,42 +31,17 @@ def colour(label: int) -> str:
     return COLOURS[label % len(COLOURS)]
 
 
-def draw_stops(ax: Axes, stops: Iterable[float]) -> tuple[Line2D, ...]:
-    """Draw the stops as vertical lines."""
-    return tuple(ax.axvline(place, color="0.55", linewidth=1.0, linestyle=(0, (4, 2)), zorder=0) for place in stops)
-
-
-def draw_walls(
-    ax: Axes, stops: Iterable[tuple[float, str]], reach: tuple[float, float]
-) -> tuple[tuple[Line2D, ...], tuple[Rectangle, ...]]:
-    """Draw the stops as hatched walls.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    stops : iterable of (float, str)
-        Place of each (m) and its side, ``"left"`` or ``"right"``.
-    reach : (float, float)
-        Least and largest x up to which the walls are drawn (m).
-
-    Returns
-    -------
-    faces : tuple of Line2D
-    walls : tuple of Rectangle
-    """
-    faces: list[Line2D] = []
-    walls: list[Rectangle] = []
-    for place, side in stops:
-        ends = (place, max(place, reach[1])) if side == "right" else (min(place, reach[0]), place)
-        faces.append(ax.axvline(place, color=WALL, linewidth=1.2, zorder=0.6))
-        walls.append(ax.axvspan(*ends, facecolor="0.96", edgecolor="0.78", hatch="////", linewidth=0, zorder=0.5))
-    return tuple(faces), tuple(walls)
-
-
 def rows(points: ArrayLike) -> NDArray[np.float64]:
     """Return points as an array (count, n), with two columns if there are none."""
     array = np.asarray(points, dtype=float)
     return array.reshape(len(array), -1) if array.size else np.empty((0, 2))
+
+
+def draw(ax: Axes, points: ArrayLike, **style: Any) -> Line2D:
+    """Draw points or a curve, x and v first; return the line."""
+    place = rows(points)
+    (line,) = ax.plot(place[:, 0], place[:, 1], **style)
+    return line
 
 
 def phase_plane(ax: Axes) -> None:

@@ -15,10 +15,10 @@ from matplotlib.patches import Patch, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, named, phase_plane, rows
+from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, phase_plane, rows
 from vibrokit.plots.clipping import clipped
 
-Style = Mapping[str, Any]
+Style = dict[str, Any]
 
 # Labels of cells that lead to no attractor, as `vibrokit.results.basins` has them, and how they look.
 UNSETTLED, LEFT, NOT_FOLLOWED = -1, -2, -3
@@ -29,6 +29,7 @@ _DENSE = 20_000  # points of a curve above which it is drawn as pixels
 _FEW = 4  # points of an orbit that are drawn large
 
 STABLE, UNSTABLE = "#101010", "#c4007a"
+_EDGED: Style = {"linestyle": "none", "markeredgecolor": "white"}
 _DOTS: Style = {"marker": "o", "markersize": 2.2, "markeredgewidth": 0}
 _MARKERS: Mapping[str, Style] = {
     "periodic": {"marker": "o", "markersize": 6},
@@ -140,12 +141,9 @@ def basin_map(
         axes.add_patch(hatching)
     attractors: list[Line2D] = []
     for label, visits in enumerate(points):
-        place = rows(visits)
         name = attractor_name(label, names) + (f", {kinds[label]}" if kinds else "")
-        style: Style = {"markeredgecolor": "white", **_style_of(_MARKERS, kinds, label)}
-        attractors += axes.plot(
-            place[:, 0], place[:, 1], linestyle="none", color=colour(label), label=name, zorder=7, **style
-        )  # fmt: skip
+        style = _EDGED | _style_of(_MARKERS, kinds, label)
+        attractors.append(draw(axes, visits, color=colour(label), label=name, zorder=7, **style))
     phase_plane(axes)
     return BasinArtists(axes, image, hatching, tuple(attractors))
 
@@ -191,44 +189,37 @@ def section_portrait(
     basins = basin_map(labels, box, points, names=names, kinds=kinds, ax=axes)
     inwards = _draw_curves(axes, [clipped(curve, box) for curve in stable], STABLE, "stable manifold")
     outwards = _draw_curves(axes, [clipped(curve, box) for curve in unstable], UNSTABLE, "unstable manifold")
-    loops: list[Line2D] = []
-    for label, curve in (cycles or {}).items():
-        x, v = np.asarray(curve, dtype=float)[:, :2].T
-        loops += axes.plot(x, v, color=colour(label), linewidth=1.4, zorder=4, label="_cycle")
+    loops = tuple(
+        draw(axes, curve, color=colour(label), linewidth=1.4, zorder=4, label="_cycle")
+        for label, curve in (cycles or {}).items()
+    )
     marks = _draw_saddles(axes, saddles, saddle_kinds)
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
     add_legend(axes, ax, [*named((*basins.attractors, *inwards, *outwards, *marks)), *cell_samples(labels)])
     return SectionArtists(
-        axes, basins.image, basins.hatching, basins.attractors, inwards, outwards, tuple(loops), marks
+        axes, basins.image, basins.hatching, basins.attractors, inwards, outwards, loops, marks
     )  # fmt: skip
 
 
 def _draw_curves(axes: Axes, curves: Sequence[NDArray[np.float64]], ink: str, name: str) -> tuple[Line2D, ...]:
     lines: list[Line2D] = []
     for curve in curves:
-        lines += axes.plot(
-            curve[:, 0], curve[:, 1], color=ink, linewidth=0.8, zorder=3, rasterized=len(curve) > _DENSE,
-            label="_more" if lines else name,
-        )  # fmt: skip
+        label, dense = "_more" if lines else name, len(curve) > _DENSE
+        lines.append(draw(axes, curve, color=ink, linewidth=0.8, zorder=3, rasterized=dense, label=label))
     return tuple(lines)
 
 
 def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]) -> tuple[Line2D, ...]:
     marks: list[Line2D] = []
-    seen: set[str] = set()
     for index, visits in enumerate(saddles):
         kind = kinds[index] if kinds else "saddle"
-        place = rows(visits)
         name = "chaotic saddle" if kind == "chaotic" else kind
-        style = {"markeredgecolor": "white", **_style_of(_SADDLE_MARKERS, kinds, index)}
-        if len(place) > _FEW and kind != "chaotic":  # so that many points do not hide what they lie on
+        style = _EDGED | _style_of(_SADDLE_MARKERS, kinds, index)
+        if len(rows(visits)) > _FEW and kind != "chaotic":  # so that many points do not hide what they lie on
             style |= {"markersize": 4, "markeredgewidth": 0.4}
-        marks += axes.plot(
-            place[:, 0], place[:, 1], linestyle="none", color="black", zorder=6,
-            label="_more" if kind in seen else name, **style,
-        )  # fmt: skip
-        seen.add(kind)
+        label = "_more" if kind in kinds[:index] or (index and not kinds) else name
+        marks.append(draw(axes, visits, color="black", zorder=6, label=label, **style))
     return tuple(marks)
 
 

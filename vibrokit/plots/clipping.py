@@ -13,16 +13,6 @@ def clipped(curve: ArrayLike, bounds: ArrayLike) -> Array:
 
     Each segment p + s·d, 0 ≤ s ≤ 1, is cut to the s at which it is between all four edges (Liang and Barsky, ACM Trans.
     Graph. 3, 1, 1984). Segments with an end that is NaN or infinite are left out.
-
-    Parameters
-    ----------
-    curve : array_like (count, 2)
-    bounds : array_like (2, 2)
-        Bounds of x, bounds of v.
-
-    Returns
-    -------
-    array (m, 2)
     """
     points, box = np.asarray(curve, dtype=float).reshape(-1, 2), np.asarray(bounds, dtype=float)
     if len(points) == 0 or np.all((box[:, 0] <= points) & (points <= box[:, 1])):

@@ -14,14 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, named, rows, span
+from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, rows, span
 from vibrokit.plots.basins import SectionArtists, cell_samples, section_portrait
 
 _BEGUN = 1e-4  # of the whole action: before, p₂ and S cannot be told from 0 in a picture
 _MOST_STRANDS = 32  # points of an attractor above which it is no orbit, and points of a path are not joined
 _DOTS: Mapping[str, Any] = {"markersize": 2.2, "markeredgewidth": 0}
-_LONE_DOTS: Mapping[str, Any] = {"markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black"}
-_ENDS = ("start of a path", "end of a path")
+_LONE_DOTS: Mapping[str, Any] = {
+    "linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black",
+}  # fmt: skip
 _DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 
 
@@ -150,21 +151,16 @@ def _draw_path(
     axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, dashes: Any, title: str
 ) -> tuple[tuple[Line2D, ...], Line2D, Line2D]:
     joined = strands <= _MOST_STRANDS
-    style = _DOTS if joined else _LONE_DOTS
+    style = {**_DOTS, "linestyle": dashes} if joined else _LONE_DOTS
     lines: list[Line2D] = []
     for first in range(strands if joined else 1):
-        some = place[first::strands] if joined else place
-        lines += axes.plot(
-            some[:, 0], some[:, 1], linestyle=dashes if joined else "none", linewidth=0.9, color=ink, marker="o",
-            zorder=5, label="_strand" if first else title, **style,
-        )  # fmt: skip
-    (start,), (end,) = (
-        axes.plot(
-            some[:, 0], some[:, 1], marker, markersize=9.5 + 3 * index, markerfacecolor="none", markeredgecolor=ink,
-            markeredgewidth=1.1, zorder=8, label="_more" if index else word,
-        )
-        for some, marker, word in ((place[:1], "o", _ENDS[0]), (place[-1:], "s", _ENDS[1]))
-    )  # fmt: skip
+        some, label = place[first::strands] if joined else place, "_strand" if first else title
+        lines.append(draw(axes, some, color=ink, marker="o", linewidth=0.9, zorder=5, label=label, **style))
+    ring = {"linestyle": "none", "markersize": 9.5 + 3 * index, "markerfacecolor": "none", "markeredgewidth": 1.1}
+    start, end = (
+        draw(axes, some, marker=marker, label="_more" if index else word, markeredgecolor=ink, zorder=8, **ring)
+        for some, marker, word in ((place[:1], "o", "start of a path"), (place[-1:], "s", "end of a path"))
+    )
     return tuple(lines), start, end
 
 

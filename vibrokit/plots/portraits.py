@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw_stops, draw_walls, named, phase_plane, rows, span
+from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, phase_plane, rows, span
 
 _SAMPLE = 32  # points above which they are a sample of motion that never repeats, or as crowded as one
 _DENSE = 20_000  # samples of a line above which it is drawn thin, as pixels
@@ -73,7 +73,8 @@ def phase_portrait(
     PortraitArtists
     """
     axes = axes_or_new(ax)
-    faces = draw_stops(axes, stops)
+    dashes = (0, (4, 2))
+    faces = tuple(axes.axvline(stop, color="0.55", linewidth=1.0, linestyle=dashes, zorder=0) for stop in stops)
     (line,) = axes.plot(x, v, color=colour(label), linewidth=1.0)
     phase_plane(axes)
     return PortraitArtists(axes, line, faces)
@@ -111,17 +112,22 @@ def steady_motions(
     marks: list[Line2D] = []
     paths = [rows(orbit) for orbit in orbits]
     for label, (path, visits) in enumerate(zip(paths, points, strict=True)):
-        many = len(path) > _DENSE
-        lines += axes.plot(
-            path[:, 0], path[:, 1], color=colour(label), linewidth=0.3 if many else 1.2, alpha=0.6 if many else 1.0,
-            label=attractor_name(label, names), rasterized=many, zorder=2,
-        )  # fmt: skip
-        place = rows(visits)
+        many, ink, name = len(path) > _DENSE, colour(label), attractor_name(label, names)
+        look = {"linewidth": 0.3, "alpha": 0.6} if many else {"linewidth": 1.2, "alpha": 1.0}
+        lines.append(draw(axes, path, color=ink, label=name, rasterized=many, zorder=2, **look))
         dots = {"markersize": 2.2, "markeredgewidth": 0}
-        edge = dots if len(place) > _SAMPLE else {"markersize": 6, "markeredgecolor": "white"}
-        marks += axes.plot(place[:, 0], place[:, 1], "o", color=colour(label), label="_section", zorder=3, **edge)
+        edge = dots if len(rows(visits)) > _SAMPLE else {"markersize": 6, "markeredgecolor": "white"}
+        mark = {"linestyle": "none", "marker": "o", **edge}
+        marks.append(draw(axes, visits, color=ink, label="_section", zorder=3, **mark))
     reach = span([*(path[:, 0] for path in paths), [place for place, _ in stops]])
-    faces, walls = draw_walls(axes, stops, reach)
+    faces = tuple(axes.axvline(place, color="0.45", linewidth=1.2, zorder=0.6) for place, _ in stops)
+    walls = tuple(
+        axes.axvspan(
+            *((place, max(place, reach[1])) if side == "right" else (min(place, reach[0]), place)),
+            facecolor="0.96", edgecolor="0.78", hatch="////", linewidth=0, zorder=0.5,
+        )
+        for place, side in stops
+    )  # fmt: skip
     axes.set_xlim(*reach)
     axes.set_ylim(*span([path[:, 1] for path in paths]))
     phase_plane(axes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +15,15 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import axes_or_new, colour, named, phase_plane, rows
+from vibrokit.plots.axes import axes_or_new, colour, draw, named, phase_plane
 
 _LEVELS = 14
-_PATH = "#c4007a"
+_POINTS = {"linestyle": "none", "zorder": 6, "markeredgecolor": "white"}
+_ATTRACTOR: dict[str, Any] = {**_POINTS, "marker": "o", "markersize": 6}
+_SADDLE: dict[str, Any] = {**_POINTS, "marker": "X", "markersize": 7, "color": "black"}
+_PATH: dict[str, Any] = {
+    "linestyle": "none", "zorder": 5, "marker": "o", "markersize": 2.4, "markeredgewidth": 0, "color": "#c4007a",
+}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -94,23 +100,11 @@ def quasi_potential_map(
         x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
         levels = np.linspace(0.0, highest, _LEVELS)[1:-1]
         contours = axes.contour(x, v, psi.T, levels=levels, colors="0.25", linewidths=0.4)
-    place = rows(points)
-    (attractor,) = axes.plot(
-        place[:, 0], place[:, 1], "o", color=colour(label), markeredgecolor="white", markersize=6, zorder=6,
-        label=attractor_name(label, names),
-    )  # fmt: skip
-    crosses: list[Line2D] = []
-    for place in map(rows, saddles):
-        crosses += axes.plot(
-            place[:, 0], place[:, 1], "X", color="black", markeredgecolor="white", markersize=7, zorder=6,
-            label="_more" if crosses else "saddle",
-        )  # fmt: skip
-    dots: list[Line2D] = []
-    for place in map(rows, paths):
-        dots += axes.plot(
-            place[:, 0], place[:, 1], "o", color=_PATH, markersize=2.4, markeredgewidth=0, zorder=5,
-            label="_more" if dots else "exit path",
-        )  # fmt: skip
+    attractor = draw(axes, points, color=colour(label), label=attractor_name(label, names), **_ATTRACTOR)
+    crosses, dots = (
+        tuple(draw(axes, place, label="_more" if k else name, **style) for k, place in enumerate(places))
+        for places, name, style in ((saddles, "saddle", _SADDLE), (paths, "exit path", _PATH))
+    )
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
     phase_plane(axes)
@@ -122,4 +116,4 @@ def quasi_potential_map(
         handles=named((attractor, *crosses, *dots)), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=8,
         frameon=False,
     )  # fmt: skip
-    return QuasiPotentialArtists(axes, image, contours, attractor, tuple(crosses), tuple(dots), bar)
+    return QuasiPotentialArtists(axes, image, contours, attractor, crosses, dots, bar)

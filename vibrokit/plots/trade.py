@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -13,26 +13,10 @@ from matplotlib.lines import Line2D
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour
 
+if TYPE_CHECKING:
+    from vibrokit.trade.table import TradeRow
+
 _FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axis
-
-
-class WorkPrecision(Protocol):
-    """What is drawn of one setting of a stepper."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def stepper(self) -> str: ...
-    @property
-    def error_median(self) -> float: ...
-    @property
-    def error_90(self) -> float: ...
-    @property
-    def seconds(self) -> float: ...
-    @property
-    def seconds_alone(self) -> float: ...
-    @property
-    def default(self) -> bool: ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,13 +38,13 @@ class TradeArtists(Artists):
     defaults: tuple[Line2D, ...]
 
 
-def work_precision(rows: Sequence[WorkPrecision], *, ax: Axes | None = None) -> TradeArtists:
+def work_precision(rows: Sequence[TradeRow], *, ax: Axes | None = None) -> TradeArtists:
     """Draw error against time, one line per stepper: solid in an ensemble, dotted one trajectory at a time.
 
     Parameters
     ----------
-    rows : sequence
-        With the attributes of `vibrokit.trade.table.TradeRow`, coarse to fine.
+    rows : sequence of TradeRow
+        From coarse to fine; any objects with the attributes of `vibrokit.trade.table.TradeRow` will do.
     ax : matplotlib Axes, optional
 
     Returns

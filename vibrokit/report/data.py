@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -24,14 +23,7 @@ _ENERGY = ("source", "target", "method", "value", "lower", "upper", "bound", "nu
 
 
 def run_data(structure: Structure | None, results: Mapping[str, Result]) -> dict[str, Any]:
-    """Return what a run found.
-
-    Parameters
-    ----------
-    structure : Structure or None
-    results : mapping of str to Result
-        By the names of the analyzers.
-    """
+    """Return what a run found; `results` are by the names of the analyzers."""
     records: dict[str, Record] = {} if structure is None else {"structure": structure}
     records |= results
     return plain(
@@ -57,49 +49,25 @@ def run_data(structure: Structure | None, results: Mapping[str, Result]) -> dict
 
 
 def findings_data(record: str, findings: Iterable[Finding], names: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return findings with their sentences.
-
-    Parameters
-    ----------
-    record : str
-        What they belong to: ``"structure"`` or the name of an analyzer.
-    findings : iterable of Finding
-    names : sequence of str
-        Of the attractors.
-    """
+    """Return findings with their sentences; `record` is ``"structure"`` or the name of an analyzer."""
     fields = ("code", "severity", "source", "target", "values", "advice")
     return [plain({"record": record, **_fields(one, fields), "text": one.sentence(names)}) for one in findings]
 
 
-@singledispatch
 def plain(value: Any) -> Any:
     """Return a value as JSON has it: complex numbers as pairs, numbers that are not finite as None."""
+    match value:
+        case np.generic() | np.ndarray():
+            return plain(value.tolist())
+        case Mapping():
+            return {str(name): plain(entry) for name, entry in value.items()}
+        case list() | tuple():
+            return [plain(entry) for entry in value]
+        case complex():
+            return [plain(value.real), plain(value.imag)]
+        case float():
+            return value if math.isfinite(value) else None
     return value
-
-
-@plain.register
-def _(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-@plain.register
-def _(value: complex) -> list[Any]:
-    return [plain(value.real), plain(value.imag)]
-
-
-@plain.register
-def _(value: np.generic | np.ndarray) -> Any:
-    return plain(value.tolist())
-
-
-@plain.register
-def _(value: Mapping) -> dict[str, Any]:  # type: ignore[type-arg]
-    return {str(name): plain(entry) for name, entry in value.items()}
-
-
-@plain.register
-def _(value: list | tuple) -> list[Any]:  # type: ignore[type-arg]
-    return [plain(entry) for entry in value]
 
 
 def _fields(thing: Any, names: Iterable[str]) -> dict[str, Any]:

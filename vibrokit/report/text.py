@@ -11,6 +11,7 @@ from vibrokit.comparison.transitions import Transitions
 from vibrokit.progress import Stats
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding, Severity
+from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
@@ -30,6 +31,11 @@ def record_text(title: str, record: Record) -> str:
 def _tables(record: Record) -> list[str]:
     """Tables of a record's numbers; a record of another kind has its findings only."""
     return []
+
+
+@_tables.register
+def _plain_tables(record: PlainRecord) -> list[str]:
+    return [energy_table(record, record.energies)] if record.energies else []
 
 
 @_tables.register
@@ -71,16 +77,17 @@ def saddle_table(structure: Structure) -> str:
     return "\n".join(text_table(rows))
 
 
-def energy_table(result: Result, energies: Iterable[ActivationEnergy]) -> str:
+def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> str:
     """Return activation energies, a line each, also as multiples of the scene's noise intensity."""
-    intensity = noise_intensity(result)
+    intensity = noise_intensity(record)
     rows = [("exit", "ΔU", "ΔU/D", "lower", "upper", "bound", "error", "residual", "saddle", "method")]
     for e in energies:
         ratio = number_text(e.value / intensity if intensity else math.nan, ".4g")
         bounds = f"{e.lower:.6g}", f"{e.upper:.6g}", str(e.bound)
         errors = number_text(e.numerical_error, ".1e"), number_text(e.residual, ".1e")
         saddle = str(e.saddle) if e.saddle >= 0 else "–"
-        rows.append((result.exit_of(e), f"{e.value:.{_digits(e)}g}", ratio, *bounds, *errors, saddle, e.method))
+        value = f"{e.value:.{_digits(e)}g}"
+        rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, e.method))
     return "\n".join(text_table(rows)) if len(rows) > 1 else "No activation energy was found."
 
 

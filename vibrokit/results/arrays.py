@@ -37,17 +37,7 @@ class Arrays:
     def numbers(
         self, name: str, shape: Shape, low: float = -np.inf, high: float = np.inf, *, finite: bool = True
     ) -> NDArray[np.float64]:
-        """Return an array of real numbers from `low` to `high`.
-
-        Parameters
-        ----------
-        name : str
-        shape : tuple
-            None stands for any length.
-        low, high : float
-        finite : bool
-            Whether infinity and NaN are refused.
-        """
+        """Return an array of real numbers from `low` to `high`; None in `shape` stands for any length."""
         values = np.array(self._array(name, shape, "biuf"), dtype=np.float64)
         if finite and not np.isfinite(values).all():
             raise ResultFileError(f"its array {name!r} holds NaN or infinity where finite numbers are needed")
@@ -96,13 +86,7 @@ class Arrays:
 
 
 def taken(table: Any, key: str, kind: type[T]) -> T:
-    """Return an entry of a table of plain data.
-
-    Raises
-    ------
-    ResultFileError
-        It is missing or of another type.
-    """
+    """Return an entry of a table of plain data; raises ResultFileError if it is missing or of another type."""
     if not isinstance(table, dict) or key not in table:
         raise ResultFileError(f"its provenance has no entry {key!r}")
     value = table[key]

@@ -8,13 +8,7 @@ from pathlib import Path
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that at any moment it is the old one or the whole new one.
-
-    Raises
-    ------
-    FileNotFoundError
-        Its folder does not exist.
-    """
+    """Write a file so that at any moment it is the old one or the whole new one."""
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path} would be in {path.parent}, which is no folder; make it first.")
     with tempfile.NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.name}-", delete=False) as file:

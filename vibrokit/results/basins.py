@@ -1,13 +1,17 @@
-"""Basins on a grid: where each cell of the region leads."""
+"""Basins on a grid: where each cell of the region leads, and how files hold it."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.results.region import Region
+from vibrokit.errors import ResultFileError, StructureError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.fields import Variable
+from vibrokit.results.region import Region, centres
 
 UNSETTLED = -1
 """Label of cells whose motion is in the region and had reached no attractor within the budget."""
@@ -15,6 +19,9 @@ LEFT = -2
 """Label of cells whose motion was outside the region at the end of the budget, or diverged."""
 NOT_FOLLOWED = -3
 """Label of cells that were not followed, because the work was stopped."""
+
+_OTHERS = {NOT_FOLLOWED: "not_followed", LEFT: "left_region", UNSETTLED: "unsettled"}
+_AXES = {"x": ("displacement", "m"), "v": ("velocity", "m s-1")}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -37,3 +44,53 @@ class Basins:
 
     def __repr__(self) -> str:
         return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"
+
+
+def region_variables(region: Region) -> dict[str, Variable]:
+    """Return the arrays that hold a region."""
+    return {
+        f"region_{axis}": (
+            ("bound",),
+            np.array(bounds, dtype=float),
+            {"long_name": f"least and largest {noun} of the region", "units": units},
+        )
+        for (axis, (noun, units)), bounds in zip(_AXES.items(), (region.x, region.v), strict=True)
+    }
+
+
+def read_region(arrays: Arrays) -> Region:
+    """Return the region; raises ResultFileError."""
+    x, v = (arrays.numbers(f"region_{axis}", (2,)).tolist() for axis in _AXES)
+    try:
+        return Region((x[0], x[1]), (v[0], v[1]))
+    except StructureError as error:
+        raise ResultFileError(f"its {str(error).rstrip('.')}") from error
+
+
+def grid_variables(labels: NDArray[np.int16], region: Region, names: Sequence[str]) -> dict[str, Variable]:
+    """Return the arrays that hold the labels of the cells of a region, and the coordinates of the cells."""
+    values = np.array([*_OTHERS, *range(len(names))], dtype=np.int16)
+    words = [*_OTHERS.values(), *(name.replace(" ", "_") or f"attractor_{label}" for label, name in enumerate(names))]
+    found: dict[str, Variable] = {
+        "basin": (
+            ("v", "x"),  # so that xarray draws x to the right
+            np.asarray(labels, dtype=np.int16).T,
+            {
+                "long_name": "label of the attractor that the cell leads to",
+                "flag_values": values,
+                "flag_meanings": " ".join(words),
+            },
+        )
+    }
+    for (axis, (noun, units)), places in zip(_AXES.items(), centres(region.bounds, np.shape(labels)), strict=True):
+        found[axis] = ((axis,), places, {"long_name": noun, "units": units})
+    return found | region_variables(region)
+
+
+def read_grid(arrays: Arrays, attractors: int) -> tuple[Region, NDArray[np.int16]]:
+    """Return the region and the labels of its cells; raises ResultFileError."""
+    highest = min(attractors - 1, int(np.iinfo(np.int16).max))
+    labels = arrays.wholes("basin", (None, None), NOT_FOLLOWED, highest)
+    if labels.size == 0:
+        raise ResultFileError("its array 'basin' is empty")
+    return read_region(arrays), np.ascontiguousarray(labels.T, dtype=np.int16)

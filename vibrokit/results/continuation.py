@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.results.attractor import Attractor
-from vibrokit.results.bifurcation import Bifurcation
-from vibrokit.results.continuation_table import continuation_dataset, read_continuation
+from vibrokit.errors import ResultFileError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
+from vibrokit.results.basins import UNSETTLED, read_region, region_variables
+from vibrokit.results.bifurcation import BIFURCATIONS, Bifurcation
+from vibrokit.results.fields import LARGEST, STATE, Field, Length, Number, Variable, Vectors, Whole, Word
 from vibrokit.results.labels import label_of
+from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
 from vibrokit.results.record import Record
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.summary import Summary, counted
+from vibrokit.results.table import Table
 
 if TYPE_CHECKING:
     from vibrokit.plots.bifurcation import BifurcationArtists, FractionArtists
@@ -24,6 +31,50 @@ _GREEK = (
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda",
     "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
 )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class _Findings(Field):
+    """Findings as JSON."""
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        texts = [json_text(findings_data(findings)) for findings in values]
+        yield name, ((record,), np.array(texts, dtype=str), {"long_name": "findings at the value, as JSON"})
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        return [findings_from(json_data(text)) for text in arrays.words(name, (arrays.size(record),))]
+
+
+_STATES = Table(
+    "value",
+    {"value": Number("value of the parameter", "", -LARGEST, LARGEST), "findings": _Findings()},
+    index="value",
+)
+_ATTRACTORS = Table(
+    "attractor",
+    {
+        **ATTRACTOR_FIELDS,
+        "label": Whole("label of the attractor at its value; negative if none was given", low=UNSETTLED),
+        "basin_fraction": Number("share of the region's cells that lead to the attractor; NaN if it is not known"),
+        "basin_fraction_error": Number("standard error of the share"),
+    },
+)
+_OWNERS = Table(
+    "attractor", {"at": Whole("place of the value at which it exists"), "branch": Whole("number of its branch")}
+)
+_BRANCHES = Table("branch", {"name": Word("name of the branch")})
+_MARKS = Table(
+    "bifurcation",
+    {
+        "kind": Word("kind of the bifurcation", known=BIFURCATIONS),
+        "value": Number("value of the parameter at the bifurcation", "", -LARGEST, LARGEST),
+        "error": Number("error of the value", "", 0.0, LARGEST),
+        "branch": Whole("number of the branch"),
+        "period": Whole("period of the orbit in forcing periods", low=1),
+        "point": Vectors(Length("point", "points"), STATE),
+        "side": Word("side of the stop that is grazed", known=("", "left", "right")),
+    },
+)
 
 
 class Continuation(Record):
@@ -152,12 +203,41 @@ class Continuation(Record):
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays with dimensions, coordinates, units and long names."""
-        return continuation_dataset(self)
+        attractors = [attractor for at in self.states for attractor in at.attractors]
+        places = [place for place, at in enumerate(self.states) for _ in at.attractors]
+        branches = [branch for at in self.states for branch in at.branches]
+        found: dict[str, Variable] = {
+            **_STATES.variables(self.states),
+            **attractor_variables(_ATTRACTORS, attractors),
+            **_OWNERS.variables(attractors, at=places, branch=branches),
+            **_BRANCHES.variables(self.branch_names, name=self.branch_names),
+            **_MARKS.variables(self.bifurcations, point=[mark.point[None] for mark in self.bifurcations]),
+        }
+        for name in ("value", "bifurcation_value", "bifurcation_error"):
+            found[name][2]["units"] = self.unit or "1"
+        texts = {
+            "parameter": ((), self.parameter, {"long_name": "path of the parameter"}),
+            "symbol": ((), self.symbol, {"long_name": "symbol of the parameter"}),
+            "unit": ((), self.unit or "", {"long_name": "unit of the parameter"}),
+        }
+        return xarray.Dataset(found | texts | ({} if self.region is None else region_variables(self.region)))
 
     @classmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
         """Make a continuation of its arrays; raises ResultFileError."""
-        return cls(**read_continuation(dataset), **provenance)
+        arrays = Arrays(dataset)
+        parameter, symbol, unit = (arrays.words(name, ())[0] for name in ("parameter", "symbol", "unit"))
+        names = tuple(row["name"] for row in _BRANCHES.read(arrays))
+        return cls(
+            parameter=parameter,
+            symbol=symbol,
+            unit=unit or None,
+            region=read_region(arrays) if "region_x" in arrays else None,
+            branch_names=names,
+            states=_states(arrays, len(names)),
+            bifurcations=tuple(_bifurcations(arrays, len(names))),
+            **provenance,
+        )
 
 
 def _unit_in_tex(unit: str) -> str:
@@ -166,3 +246,33 @@ def _unit_in_tex(unit: str) -> str:
         base, _, power = word.partition("^")
         words.append(f"{base}$^{{{power}}}$" if power else base)
     return " ".join(words)
+
+
+def _bifurcations(arrays: Arrays, branches: int) -> Iterator[Bifurcation]:
+    for values in _MARKS.read(arrays):
+        if values["branch"] >= branches:
+            raise ResultFileError(f"a bifurcation is on branch {values['branch']}, and there are {branches}")
+        if len(values["point"]) != 1:
+            raise ResultFileError(f"a bifurcation has {len(values['point'])} points, and one is needed")
+        yield Bifurcation(**{**values, "point": values["point"][0]})
+
+
+def _states(arrays: Arrays, branches: int) -> tuple[SteadyStates, ...]:
+    rows = _STATES.read(arrays)
+    attractors, others = read_attractors(arrays, _ATTRACTORS)
+    if others:
+        raise ResultFileError(f"{len(others)} of its survivals belong to no attractor")
+    owners = _OWNERS.read(arrays)
+    if any(owner["at"] >= len(rows) or owner["branch"] >= branches for owner in owners):
+        raise ResultFileError(f"an attractor belongs to a value or a branch that does not exist; there are {len(rows)}")
+    own: list[list[int]] = [[] for _ in rows]
+    for place, owner in enumerate(owners):
+        own[owner["at"]].append(place)
+    return tuple(
+        SteadyStates(
+            **row,
+            attractors=tuple(attractors[place] for place in places),
+            branches=tuple(owners[place]["branch"] for place in places),
+        )
+        for row, places in zip(rows, own, strict=True)
+    )

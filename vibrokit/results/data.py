@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from vibrokit.errors import ResultFileError
 
-_RESERVED = re.compile(
-    r"basin|bound|(attractor|saddle|chaotic_saddle|stable_manifold|energy|branch|path)(_.*)?|region_[xv]"
-)
-"""Names of arrays and dimensions that results use themselves."""
+_OWN = ("basin", "bound", "region_x", "region_v")  # names of arrays and dimensions that results use themselves
+_PREFIXES = "attractor, saddle, chaotic_saddle, stable_manifold, energy, branch, path"
+_RESERVED = re.compile(rf"{'|'.join(_OWN)}|({_PREFIXES.replace(', ', '|')})(_.*)?")
+_SOURCE = ("source", "source_name")  # made when the data of all attractors is joined
 _GRID = ("x", "v")  # coordinates of the basins, which data may share
 _FILLS: Mapping[str, Any] = {"i": -1, "u": 0, "b": False, "U": "", "O": ""}
 
@@ -28,8 +29,10 @@ def joined(data: Mapping[int, xarray.Dataset], names: Sequence[str]) -> xarray.D
     Raises
     ------
     ResultFileError
-        An array has other dimensions for one attractor than for another, or is named ``source``.
+        An array has other dimensions for one attractor than for another, or a name that is taken.
     """
+    for one in data.values():
+        _refuse([name for name in (*one.variables, *one.dims) if name in _SOURCE])
     filled = {label: _indexed(one) for label, one in data.items() if one.variables}
     if not filled:
         return xarray.Dataset()
@@ -59,26 +62,20 @@ def _indexed(one: xarray.Dataset) -> xarray.Dataset:
     return one.assign_coords({dim: np.arange(size) for dim, size in one.sizes.items() if dim not in one.indexes})
 
 
-def joined_with(data: xarray.Dataset, own: xarray.Dataset) -> xarray.Dataset:
-    """Return the data beside the arrays of the result itself.
-
-    Raises
-    ------
-    ResultFileError
-        They use the same name for different things.
-    """
-    for name in (*data.variables, *data.dims):
-        if _RESERVED.fullmatch(str(name)) or (name in _GRID and not _same(data, own, str(name))):
-            raise ResultFileError(
-                f"its data uses the name {str(name)!r}, which results use for an array or a dimension of another "
-                "meaning; give it another name"
-            )
-    return own.assign_coords(data.coords).assign(data.data_vars).assign_attrs(data.attrs)
+def check_names(data: xarray.Dataset, grid: Mapping[str, NDArray[np.float64]]) -> None:
+    """Raise ResultFileError if data uses a name that is taken; `grid` has the coordinates of the basins, x and v."""
+    names = (*data.variables, *data.dims)
+    shared = {axis for axis in _GRID if axis in data.indexes and np.array_equal(data[axis].values, grid[axis])}
+    _refuse([name for name in names if _RESERVED.fullmatch(str(name)) or (name in _GRID and name not in shared)])
 
 
-def _same(data: xarray.Dataset, own: xarray.Dataset, name: str) -> bool:
-    """Whether the data uses a coordinate of the basins as they do."""
-    return name in data.indexes and np.array_equal(data[name].values, own[name].values)
+def _refuse(names: Sequence[Hashable]) -> None:
+    if names:
+        raise ResultFileError(
+            f"its data uses the name {str(names[0])!r}, which results use for an array or a dimension of another "
+            f"meaning; give it another name. Names that are taken: {', '.join((*_OWN, *_SOURCE))}; {_PREFIXES}, also "
+            "with an underscore and more after them; x and v, unless they are the coordinates of the basins."
+        )
 
 
 def data_in(dataset: xarray.Dataset) -> xarray.Dataset:

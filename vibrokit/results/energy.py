@@ -1,14 +1,33 @@
-"""ActivationEnergy: the least action of an exit, with bounds."""
+"""ActivationEnergy: the least action of an exit, with bounds, path and evidence; and how files hold it."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.results.certificate import Certificate
+from vibrokit.errors import ResultFileError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.basins import NOT_FOLLOWED
+from vibrokit.results.fields import (
+    STATE,
+    Column,
+    Columns,
+    Field,
+    Flag,
+    Length,
+    Number,
+    Series,
+    Variable,
+    Vectors,
+    Whole,
+    Word,
+)
+from vibrokit.results.table import Table
 
 
 class Bound(StrEnum):
@@ -54,6 +73,46 @@ class ExitPath:
         return f"ExitPath: {len(self.t)} samples over {np.ptp(self.t):g} s, action {self.action[-1]:.6g} m² s⁻³"
 
 
+@dataclasses.dataclass(frozen=True)
+class Certificate:
+    """Evidence for a polished exit path: how well it solves its equations, and how the action depends on the settings.
+
+    Attributes
+    ----------
+    residual : float
+        Largest misfit of the pieces and of both ends, relative to the size of what is matched.
+    start_distance : float
+        Distance in (x, v) between the path's first point and the attractor, where the linear end is joined.
+    end_distance : float
+        Distance in (x, v) between its last point and the saddle, along the saddle's stable manifold; 0 for a path that
+        ends at first contact with a stop.
+    periods : float
+        Length of the path between its two ends, in forcing periods (2π/ω_n without forcing).
+    by_start : float
+        Change of the action when the start is ten times as far from the attractor (m² s⁻³).
+    by_length : float
+        Change when two periods are added at each end.
+    by_stepper : float
+        Change when the integration is tightened.
+    transversality : float
+        Sine of the angle at which the two manifolds meet along the path, from 0 (tangent: a flat valley) to 1.
+    """
+
+    residual: float
+    start_distance: float
+    end_distance: float
+    periods: float
+    by_start: float
+    by_length: float
+    by_stepper: float
+    transversality: float
+
+    @property
+    def error(self) -> float:
+        """Estimated error of the action (m² s⁻³): the changes, added."""
+        return abs(self.by_start) + abs(self.by_length) + abs(self.by_stepper)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class ActivationEnergy:
     """Activation energy ΔU of one exit; the mean exit time grows like exp(ΔU/D) as D → 0.
@@ -94,3 +153,94 @@ class ActivationEnergy:
     path: ExitPath | None = dataclasses.field(default=None, repr=False)
     saddle: int = -1
     certificate: Certificate | None = None
+
+    def exit_between(self, names: Sequence[str]) -> str:
+        """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""
+        source, target = (names[label] if label >= 0 else "exit" for label in (self.source, self.target))
+        return f"{source} → {target}"
+
+
+_ACTION = "m2 s-3"
+
+_SAMPLES = Length("sample", "samples of the path")
+_MOMENTA = Columns(
+    (Column("p1", "momentum p1", "m s-3"), Column("p2", "momentum p2", "m s-2")), Column("p", "momentum p")
+)
+
+PATHS = Table(
+    "path",
+    {
+        "t": Series(_SAMPLES, "time", "s"),
+        "q": Vectors(_SAMPLES, STATE, prefixed=False),
+        "p": Vectors(_SAMPLES, _MOMENTA, prefixed=False),
+        "action": Series(_SAMPLES, "action", _ACTION),
+        "section": Series(Length("crossing", "samples on the section"), "sample on the section", whole=True, low=0),
+    },
+)
+_EVIDENCE: dict[str, Field] = {
+    "residual": Number("largest misfit of the path's equations, relative"),
+    "start_distance": Number("distance in (x, v) between the first point and the attractor"),
+    "end_distance": Number("distance in (x, v) between the last point and the saddle"),
+    "periods": Number("length of the path in forcing periods"),
+    "by_start": Number("change of the action when the path starts ten times as far from the attractor", _ACTION),
+    "by_length": Number("change of the action when two periods are added at either end", _ACTION),
+    "by_stepper": Number("change of the action when the integration is tightened", _ACTION),
+    "transversality": Number("sine of the angle between the manifolds that meet along the path"),
+}
+_FIELDS: dict[str, Field] = {
+    "source": Whole("label of the attractor that is left"),
+    "target": Whole("label of the attractor that is reached; -1 for an exit that is no attractor", low=NOT_FOLLOWED),
+    "value": Number("activation energy", _ACTION),
+    "lower": Number("lower bound of the activation energy", _ACTION),
+    "upper": Number("upper bound of the activation energy", _ACTION),
+    "method": Word("method"),
+    "bound": Word("what the bounds rest on", known=tuple(Bound)),
+    "numerical_error": Number("error of the value as the action of its own path or on its own grid", _ACTION),
+    "residual": Number("largest misfit of the path's equations, relative"),
+    "saddle": Whole("place of the saddle that the path ends on; -1 for none", low=-1),
+    "path": Whole("place of the path; -1 for none", low=-1),
+    "certified": Flag("whether there is a certificate"),
+    **{f"certificate_{name}": field for name, field in _EVIDENCE.items()},
+}
+ENERGIES, BRANCHES = Table("energy", _FIELDS), Table("branch", _FIELDS)
+
+
+def energy_variables(energies: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy]) -> dict[str, Variable]:
+    """Return the arrays that hold energies, branches and their paths, each path once."""
+    paths = {id(one.path): one.path for one in (*energies, *branches) if one.path is not None}
+    place = {key: index for index, key in enumerate(paths)} | {id(None): -1}
+    found = PATHS.variables(list(paths.values()))
+    for table, some in ((ENERGIES, energies), (BRANCHES, branches)):
+        evidence = {
+            f"certificate_{name}": [np.nan if e.certificate is None else getattr(e.certificate, name) for e in some]
+            for name in _EVIDENCE
+        }
+        certified = [e.certificate is not None for e in some]
+        found |= table.variables(some, path=[place[id(e.path)] for e in some], certified=certified, **evidence)
+    return found
+
+
+def read_energies(arrays: Arrays, attractors: int) -> tuple[tuple[ActivationEnergy, ...], tuple[ActivationEnergy, ...]]:
+    """Return the energies and the branches of some arrays; raises ResultFileError."""
+    paths = [ExitPath(**values) for values in PATHS.read(arrays)]
+    for path in paths:
+        if len(path.t) == 0 or (len(path.section) and path.section.max() >= len(path.t)):
+            raise ResultFileError(f"one of its paths has {len(path.t)} samples, fewer than its points on the section")
+    energies, branches = (
+        tuple(_energy(values, paths, attractors) for values in table.read(arrays)) for table in (ENERGIES, BRANCHES)
+    )
+    return energies, branches
+
+
+def _energy(values: dict[str, Any], paths: Sequence[ExitPath], attractors: int) -> ActivationEnergy:
+    evidence = {name: values.pop(f"certificate_{name}") for name in _EVIDENCE}
+    certificate = Certificate(**evidence) if values.pop("certified") else None
+    path = values.pop("path")
+    if path >= len(paths):
+        raise ResultFileError(f"an energy has path {path}, and there are {len(paths)} paths")
+    energy = ActivationEnergy(**values, certificate=certificate, path=paths[path] if path >= 0 else None)
+    if max(energy.source, energy.target) >= attractors:
+        raise ResultFileError(
+            f"an energy leads from attractor {energy.source} to {energy.target}, and there are {attractors}"
+        )
+    return dataclasses.replace(energy, bound=Bound(energy.bound))

@@ -8,9 +8,10 @@ instead, which the CF conventions (cfconventions.org, section 9.3.3) call a cont
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,20 +122,10 @@ class BySide(Scalar):
 
 @dataclasses.dataclass(frozen=True)
 class Length:
-    """A length that differs from record to record.
+    """A length that differs from record to record; ragged arrays lie end to end and are not padded."""
 
-    Attributes
-    ----------
-    dimension : str
-        Along which the arrays lie; the name of the record goes before it.
-    what : str
-        What is counted, in the plural.
-    ragged : bool
-        Whether arrays lie end to end, and are not padded.
-    """
-
-    dimension: str
-    what: str
+    dimension: str  # the name of the record goes before it
+    what: str  # is counted, in the plural
     ragged: bool = False
 
     def counts(self, record: str, lengths: Sequence[int]) -> tuple[str, Variable]:
@@ -219,13 +210,12 @@ def _complex(real: Array, imag: Array) -> NDArray[np.complex128]:
     return values
 
 
-@dataclasses.dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column of an array of vectors: the end of its name, its long name, its units."""
 
     name: str
     long_name: str
-    units: str
+    units: str = "1"
 
     @property
     def about(self) -> dict[str, Any]:
@@ -233,71 +223,51 @@ class Column:
         return _about(self.long_name, self.units)
 
 
-@dataclasses.dataclass(frozen=True)
-class Columns:
-    """The columns of an array of vectors.
-
-    Attributes
-    ----------
-    first : tuple of Column
-        Those that all vectors have.
-    further : Column or None
-        Those of extra noise states, which are numbered; None if there are none.
-    """
+class Columns(NamedTuple):
+    """The columns that all vectors have, and those of extra noise states, which are numbered."""
 
     first: tuple[Column, ...]
     further: Column | None = None
 
-    def __getitem__(self, index: int) -> Column:
-        if index < len(self.first) or self.further is None:
-            return self.first[index]
-        number = index + 1
-        return Column(f"{self.further.name}{number}", f"{self.further.long_name} {number}", self.further.units)
-
-    def allows(self, count: int) -> bool:
-        """Whether vectors may have so many entries."""
-        return count == len(self.first) or (count > len(self.first) and self.further is not None)
+    def of(self, width: int) -> list[Column]:
+        """Return the columns of vectors with so many entries; fewer if there are none for the others."""
+        if self.further is None:
+            return list(self.first[:width])
+        name, long_name, units = self.further
+        numbers = range(len(self.first) + 1, width + 1)
+        return [*self.first[:width], *(Column(f"{name}{n}", f"{long_name} {n}", units) for n in numbers)]
 
 
 PLANE = Columns((Column("x", "displacement", "m"), Column("v", "velocity", "m s-1")))
-STATE = Columns(PLANE.first, Column("state", "state of the noise", "1"))
+STATE = Columns(PLANE.first, Column("state", "state of the noise"))
 
 
 @dataclasses.dataclass(frozen=True)
 class Vectors(Field):
-    """An array (length, n) of finite vectors, each column an array of its own.
-
-    Attributes
-    ----------
-    length : Length
-    columns : Columns
-    prefixed : bool
-        Whether the names of the arrays contain that of the attribute.
-    """
+    """An array (length, n) of finite vectors, each column an array of its own."""
 
     length: Length
     columns: Columns
-    prefixed: bool = True
+    prefixed: bool = True  # whether the names of the arrays contain that of the attribute
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         yield self.length.counts(record, [len(value) for value in values])
-        widths = {value.shape[1] for value in values if len(value)} or {len(self.columns.first)}
-        width = widths.pop()
-        if widths or not self.columns.allows(width):
-            raise ResultFileError(f"{name} have {sorted({width, *widths})} columns, which a file cannot hold")
-        for index in range(width):
+        least = len(self.columns.first)
+        widths = {value.shape[1] for value in values if len(value)} or {least}
+        columns = self.columns.of(max(widths))
+        if len(widths) > 1 or not least <= max(widths) == len(columns):
+            raise ResultFileError(f"{name} have {sorted(widths)} columns, which a file cannot hold")
+        for index, column in enumerate(columns):
             pieces = [value[:, index] if len(value) else np.empty(0) for value in values]
-            about = self.columns[index].about
-            yield self._name(record, name, index), (*self.length.lay(record, pieces), about)
+            yield self._name(record, name, column), (*self.length.lay(record, pieces), column.about)
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        width = len(self.columns.first)
-        while self.columns.allows(width + 1) and self._name(record, name, width) in arrays:
-            width += 1
-        columns = [
-            self.length.take(arrays, record, self._name(record, name, index), finite=True) for index in range(width)
-        ]
+        most = len(arrays.dataset.variables)
+        names = [self._name(record, name, column) for column in self.columns.of(most)]
+        least = len(self.columns.first)
+        present = [*names[:least], *itertools.takewhile(arrays.__contains__, names[least:])]
+        columns = [self.length.take(arrays, record, column, finite=True) for column in present]
         return [np.stack(piece, axis=1) for piece in zip(*columns, strict=True)]
 
-    def _name(self, record: str, name: str, index: int) -> str:
-        return f"{name if self.prefixed else record}_{self.columns[index].name}"
+    def _name(self, record: str, name: str, column: Column) -> str:
+        return f"{name if self.prefixed else record}_{column.name}"

@@ -31,15 +31,7 @@ _INT32 = np.iinfo(np.int32)
 
 
 def save_record(record: Record, path: str | os.PathLike[str]) -> None:
-    """Write a record to a netCDF file, whole or not at all; `load_result` opens it.
-
-    Raises
-    ------
-    ResultFileError
-        The record holds something that netCDF 3 cannot hold.
-    FileNotFoundError
-        There is no such folder.
-    """
+    """Write a record to a netCDF file, whole or not at all; raises ResultFileError where netCDF 3 cannot hold it."""
     try:
         content = _content(record)
     except ResultFileError as error:
@@ -68,12 +60,14 @@ def load_result(path: str | os.PathLike[str]) -> Any:
         There is no such file.
     """
     try:
-        dataset, header = _opened(path)
+        content = _read(path)
+        dataset, header = _opened(content)
         kind = taken(header, "kind", str)
         provenance = provenance_from(header)
-        record = _record_class(kind)
-        if record is None:
-            return PlainRecord.from_dataset(dataset, unknown_kind=kind, **provenance)
+        try:
+            record = load(Group.RECORDS, kind, Record)
+        except UnknownNameError:
+            return PlainRecord.from_dataset(dataset, unknown_kind=kind, content=content, **provenance)
         return record.from_dataset(dataset, **provenance)
     except ResultFileError as error:
         raise ResultFileError(
@@ -81,27 +75,20 @@ def load_result(path: str | os.PathLike[str]) -> Any:
         ) from error
 
 
-def _record_class(kind: str) -> type[Record] | None:
-    """The class that is registered under a kind; None if there is none."""
-    try:
-        return load(Group.RECORDS, kind, Record)
-    except UnknownNameError:
-        return None
-
-
 # Writing
 
 
 def _content(record: Record) -> bytes:
+    if isinstance(record, PlainRecord):
+        return record.content
     arrays = record.to_dataset()
     for name in ATTRIBUTES:
         if name in arrays.attrs:
             raise ResultFileError(f"its dataset has an attribute {name!r}, a name that files use; give it another name")
     empty = {str(name): array for name, array in arrays.variables.items() if array.size == 0}
-    text = provenance_text(record, empty={name: _shape(array) for name, array in empty.items()})
     full = arrays.drop_vars(list(empty)).drop_encoding()
     full = full.assign({name: _storable(name, array) for name, array in full.variables.items()})
-    full.attrs |= _readable_attributes(record) | {HEADER: text}
+    full.attrs |= _attributes(record, {name: _shape(array) for name, array in empty.items()})
     plain: dict[Hashable, dict[str, Any]] = {name: {"_FillValue": None} for name in full.variables}
     try:
         return bytes(full.to_netcdf(path=None, engine="scipy", encoding=plain))
@@ -111,17 +98,18 @@ def _content(record: Record) -> bytes:
         ) from error  # fmt: skip
 
 
-def _readable_attributes(record: Record) -> dict[str, str]:
-    """Attributes for people who look into a file."""
+def _attributes(record: Record, empty: dict[str, Any]) -> dict[str, Any]:
+    """Attributes for people who look into a file, and the provenance."""
     document = (type(record).__doc__ or "").strip().partition("\n")[0]
     software = f"vibrokit {record.versions.get('vibrokit', '')}".strip()
     seed = "" if record.seed is None else f", seed {record.seed}"
     return {
-        "title": f"{record.file_kind}: {document}",
+        "title": f"{record.kind}: {document}",
         "Conventions": "CF-1.11",
         "source": software,
         "history": f"computed by {software} in {record.seconds:.1f} s{seed}",
         "status": record.status,
+        HEADER: provenance_text(record, empty=empty),
     }
 
 
@@ -158,14 +146,17 @@ class _ReadOnce(io.BytesIO):
         return content
 
 
-def _opened(path: str | os.PathLike[str]) -> tuple[xarray.Dataset, Any]:
-    """The arrays of a file and its provenance. Nothing is masked, scaled or taken for a time."""
+def _read(path: str | os.PathLike[str]) -> bytes:
     try:
-        content = Path(path).read_bytes()
+        return Path(path).read_bytes()
     except FileNotFoundError:
         raise
     except (OSError, TypeError, ValueError) as error:
         raise ResultFileError(f"it cannot be read ({error})") from error
+
+
+def _opened(content: bytes) -> tuple[xarray.Dataset, Any]:
+    """The arrays of a file and its provenance. Nothing is masked, scaled or taken for a time."""
     file = _ReadOnce(content)
     file.left = _READINGS * len(content) + 1024
     try:

@@ -10,22 +10,10 @@ from vibrokit.errors import StructureError, nearest, shown
 
 
 def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:
-    """Return the label of an attractor given by its label or its name.
+    """Return the label of an attractor given by its label, its name or the beginning of its name.
 
-    The beginning of a name is enough if it is unique.
-
-    Parameters
-    ----------
-    which : int or str
-    names : sequence of str
-        Of all attractors, in the order of their labels.
-    what : str
-        What is labelled, for errors.
-
-    Raises
-    ------
-    StructureError
-        There is no such attractor, or several names have this beginning.
+    `names` are those of all attractors, in the order of their labels. Raises StructureError if there is no such
+    attractor, or if several names have this beginning.
     """
     if isinstance(which, str):
         matches = [label for label, name in enumerate(names) if name == which] or [

@@ -18,13 +18,7 @@ _FORMATS = (".png", ".pdf", ".svg")
 
 
 def checked_picture(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a picture that can be written.
-
-    Raises
-    ------
-    VibrokitError
-        An ending other than .png, .pdf or .svg.
-    """
+    """Return the path of a picture; raises VibrokitError if its ending is not that of a picture."""
     target = Path(path)
     if target.suffix not in _FORMATS:
         raise VibrokitError(f"{target} ends in {target.suffix!r}; a picture ends in {', '.join(_FORMATS)}.")
@@ -32,13 +26,7 @@ def checked_picture(path: str | os.PathLike[str]) -> Path:
 
 
 def save_figure(artists: Artists, path: str | os.PathLike[str]) -> None:
-    """Save the figure of a picture; the file's ending chooses the format.
-
-    Raises
-    ------
-    VibrokitError
-        An ending other than .png, .pdf or .svg.
-    """
+    """Save the figure of a picture; the file's ending chooses the format. Raises VibrokitError for other endings."""
     target = checked_picture(path)
     content = io.BytesIO()
     artists.figure.savefig(content, format=target.suffix[1:], dpi=_DPI)

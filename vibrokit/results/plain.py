@@ -8,6 +8,7 @@ import xarray
 
 from vibrokit.errors import ResultFileError, UnknownNameError
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.energy import ActivationEnergy, read_energies
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.record import Record
 from vibrokit.results.summary import Summary, counted
@@ -20,24 +21,30 @@ class PlainRecord(Record):
     ----------
     dataset : xarray.Dataset
     unknown_kind : str
-        The kind that the file names. Saved again, it names it still.
+        The kind that the file names.
+    content : bytes
+        Of the file. Saved again, the record writes the same file.
     """
 
     kind: ClassVar[str] = "plain"
 
     dataset: xarray.Dataset
     unknown_kind: str
-
-    @property
-    def file_kind(self) -> str:
-        """The kind that a file of this record names."""
-        return self.unknown_kind
+    content: bytes
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the attractors, if the file has them in the usual place."""
         try:
             return tuple(Arrays(self.dataset).words("attractor_name", (None,)))
+        except ResultFileError:
+            return ()
+
+    @property
+    def energies(self) -> tuple[ActivationEnergy, ...]:
+        """Activation energies, if the file has them in the usual place."""
+        try:
+            return read_energies(Arrays(self.dataset), len(self.names))[0]
         except ResultFileError:
             return ()
 
@@ -53,15 +60,13 @@ class PlainRecord(Record):
         return self.dataset
 
     @classmethod
-    def from_dataset(cls, dataset: xarray.Dataset, *, unknown_kind: str = "", **provenance: Any) -> Self:
-        """Make a record of arrays and of the name of their kind."""
-        record = cls(dataset=dataset, unknown_kind=unknown_kind, **provenance)
-        if record.found(Code.UNKNOWN_KIND):
-            return record
-        finding = Finding.of(Code.UNKNOWN_KIND, kind=unknown_kind)
-        return cls(
-            dataset=dataset, unknown_kind=unknown_kind, **provenance | {"findings": (*record.findings, finding)}
-        )  # fmt: skip
+    def from_dataset(
+        cls, dataset: xarray.Dataset, *, unknown_kind: str = "", findings: tuple[Finding, ...] = (), **provenance: Any
+    ) -> Self:
+        """Make a record of arrays, of the name of their kind, and of the content of their file."""
+        unknown = Finding.of(Code.UNKNOWN_KIND, kind=unknown_kind)
+        known = findings if unknown in findings else (*findings, unknown)
+        return cls(dataset=dataset, unknown_kind=unknown_kind, findings=known, **provenance)
 
     @property
     def summary(self) -> Summary:

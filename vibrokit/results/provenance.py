@@ -27,16 +27,10 @@ _LONGEST_SEED = 1000  # digits; Python refuses to read more than a few thousand
 
 
 def provenance_text(record: Record, **further: Any) -> str:
-    """Return the provenance of a record, and further entries, as JSON.
-
-    Raises
-    ------
-    ResultFileError
-        Something in it is not plain data.
-    """
+    """Return the provenance of a record, and further entries, as JSON; raises ResultFileError."""
     entries = {
         "format": FORMAT,
-        "kind": record.file_kind,
+        "kind": record.kind,
         "complete": bool(record.complete),
         "seed": None if record.seed is None else str(record.seed),
         "seconds": float(record.seconds),
@@ -68,6 +62,7 @@ def json_data(text: Any) -> Any:
 
 def provenance_from(header: Any) -> dict[str, Any]:
     """Return the provenance as the attributes of a record have it; raises ResultFileError."""
+    versions = taken(header, "versions", dict)
     return {
         "scene": _scene(header),
         "settings": taken(header, "settings", dict),
@@ -76,7 +71,7 @@ def provenance_from(header: Any) -> dict[str, Any]:
         "complete": taken(header, "complete", bool),
         "seed": _seed(header),
         "seconds": taken(header, "seconds", float),
-        "versions": _versions(taken(header, "versions", dict)),
+        "versions": {name: taken(versions, name, str) for name in versions},
     }
 
 
@@ -88,7 +83,7 @@ def findings_data(findings: Sequence[Finding], names: Sequence[str] = ()) -> lis
             "source": finding.source,
             "target": finding.target,
             "values": dict(finding.values),
-            "sentence": _rendered(finding, names),
+            "sentence": finding.sentence(names),
         }
         for finding in findings
     ]
@@ -111,19 +106,10 @@ def _finding(entry: Any) -> Finding:
         entries = value if isinstance(value, list) else [value]
         if not all(one is None or isinstance(one, float | int | str) for one in entries):
             raise ResultFileError(f"its finding {word!r} has {name} = {shown(value)}, and a number or text is needed")
-    finding = Finding(_CODES[word], source, target, values)
-    _rendered(finding)
-    return finding
-
-
-def _rendered(finding: Finding, names: Sequence[str] = ()) -> str:
     try:
-        return finding.sentence(names)
-    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
-        raise ResultFileError(
-            f"its finding {finding.code.value!r} has values that do not fit its sentence "
-            f"({type(error).__name__}: {error})"
-        ) from error
+        return Finding(_CODES[word], source, target, values)
+    except TypeError as error:
+        raise ResultFileError(f"its {error}") from error
 
 
 def _stats(table: dict[str, Any]) -> Stats:
@@ -141,10 +127,6 @@ def _seed(header: Any) -> int | None:
     if not (text.isascii() and text.isdigit() and len(text) < _LONGEST_SEED):
         raise ResultFileError(f"its provenance has seed = {shown(text)}, and a whole number is needed")
     return int(text)
-
-
-def _versions(table: dict[str, Any]) -> dict[str, str]:
-    return {name: taken(table, name, str) for name in table}
 
 
 def _scene(header: Any) -> dict[str, Any]:

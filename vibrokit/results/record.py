@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 import inspect
 import os
+import platform
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.progress import Stats
 from vibrokit.registry import load_attribute
-from vibrokit.results.finding import Code, Finding, Severity
+from vibrokit.results.finding import Code, Finding, Severity, check_findings
 from vibrokit.results.summary import Summary
-from vibrokit.results.versions import versions
 
 if TYPE_CHECKING:
     import xarray
 
     from vibrokit.oscillator import Oscillator
+
+_LIBRARIES = ("vibrokit", "numpy", "scipy", "sympy", "numba")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, the toolkit and the libraries it uses, by name."""
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _LIBRARIES}
 
 
 @dataclass_transform(frozen_default=True, eq_default=False, kw_only_default=True, field_specifiers=(dataclasses.field,))
@@ -72,6 +80,9 @@ class Record(ABC):
                 f'{cls.__name__} names no kind; write kind: ClassVar[str] = "...", the name that its files carry.'
             )
 
+    def __post_init__(self) -> None:
+        check_findings(self.findings)
+
     @property
     @abstractmethod
     def names(self) -> tuple[str, ...]:
@@ -89,11 +100,6 @@ class Record(ABC):
     @abstractmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
         """Make a record of its arrays, which may come from a stranger's file; raises ResultFileError."""
-
-    @property
-    def file_kind(self) -> str:
-        """The kind that a file of this record names."""
-        return self.kind
 
     @property
     def status(self) -> str:

@@ -72,8 +72,12 @@ class Region:
 
     def cell_centres(self, cells: Sequence[int]) -> NDArray[np.float64]:
         """Return the centres of a grid of cells, shape (nx · nv, 2), v running fastest."""
-        axes = [
-            low + (high - low) * (np.arange(count) + 0.5) / count
-            for (low, high), count in zip((self.x, self.v), cells, strict=True)
-        ]
+        axes = centres(self.bounds, cells)
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def centres(bounds: NDArray[np.float64], cells: Sequence[int]) -> list[NDArray[np.float64]]:
+    """Return x and v at the centres of a grid of cells between bounds, array (2, 2)."""
+    return [
+        low + (high - low) * (np.arange(count) + 0.5) / count for (low, high), count in zip(bounds, cells, strict=True)
+    ]

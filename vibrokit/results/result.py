@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
 import xarray
 
-from vibrokit.errors import StructureError
+from vibrokit.errors import ResultFileError, StructureError
 from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.data import data_in, joined, joined_with
-from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.energy_table import energy_variables, read_energies
+from vibrokit.results.data import check_names, data_in, joined
+from vibrokit.results.energy import ActivationEnergy, ExitPath, energy_variables, read_energies
 from vibrokit.results.labels import label_of
-from vibrokit.results.path_pictures import plot_exit_paths, plot_histories
-from vibrokit.results.quasi_potential import plot_quasi_potential
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
@@ -26,6 +24,9 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer
     from vibrokit.plots.exit_paths import ExitPathArtists, HistoryArtists
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
+
+_AT_REST = 0.01  # of the extent of a path: a path that moves less at first leaves an equilibrium
+_SHOWN = 1.5  # times the largest energy: above it, all shades of a quasi-potential are the same
 
 
 class Result(Record):
@@ -55,6 +56,10 @@ class Result(Record):
     branches: tuple[ActivationEnergy, ...] = ()
     data: xarray.Dataset = dataclasses.field(default_factory=xarray.Dataset)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_names(self.data, self.section.grid)
+
     @classmethod
     def assembled(
         cls,
@@ -65,7 +70,14 @@ class Result(Record):
         data: Mapping[int, xarray.Dataset],
         **provenance: Any,
     ) -> Self:
-        """Put together what was found about each attractor, by label."""
+        """Put together what was found about each attractor, by label.
+
+        Raises
+        ------
+        ResultFileError
+            An array or a dimension of `data` has a name that files use otherwise, or arrays of different attractors
+            contradict one another.
+        """
         return cls(
             energies=tuple(energy for some in estimates.values() for energy in some),
             branches=tuple(branch for some in branches.values() for branch in some),
@@ -98,16 +110,13 @@ class Result(Record):
         found = [e for e in self.energies if e.source == start and end in (None, e.target)]
         if not found:
             known = ", ".join(self.exit_of(e) for e in self.energies) or "none"
-            wanted = self.names[start] if end is None else f"{self.names[start]} → {self._named(end)}"
-            raise StructureError(f"there is no energy of {wanted}; the result has {known}.")
+            goal = "" if end is None else f" → {self.names[end] if end >= 0 else 'exit'}"
+            raise StructureError(f"there is no energy of {self.names[start]}{goal}; the result has {known}.")
         return min(found, key=lambda energy: energy.value)
 
     def exit_of(self, energy: ActivationEnergy) -> str:
         """Return the names of the attractors between which an exit leads: ``"hammering → clear"``."""
-        return f"{self._named(energy.source)} → {self._named(energy.target)}"
-
-    def _named(self, label: int) -> str:
-        return self.names[label] if label >= 0 else "exit"
+        return energy.exit_between(self.names)
 
     @property
     def summary(self) -> Summary:
@@ -133,7 +142,24 @@ class Result(Record):
 
     def plot_paths(self, ax: Any = None) -> ExitPathArtists:
         """Draw the exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`."""
-        return plot_exit_paths(self, ax)
+        from vibrokit.plots.exit_paths import exit_paths
+
+        section, drawn = self.section, _with_paths(self.energies)
+        curves = [_from_rest(path) for _, path in drawn]
+        return exit_paths(
+            section.labels,
+            section.bounds,
+            section.points,
+            [path.q if curve else path.q[path.section] for curve, (_, path) in zip(curves, drawn, strict=True)],
+            sources=[energy.source for energy, _ in drawn],
+            titles=[self._title(energy) for energy, _ in drawn],
+            names=section.names,
+            curves=curves,
+            saddles=section.saddles,
+            chaotic=section.chaotic,
+            stable=section.stable,
+            ax=ax,
+        )
 
     def plot_history(self, ax: Any = None) -> HistoryArtists:
         """Draw p₂ and S along each exit path; see `vibrokit.plots.exit_paths.path_history`.
@@ -143,7 +169,25 @@ class Result(Record):
         StructureError
             No energy has a path.
         """
-        return plot_histories(self, ax)
+        from vibrokit.plots.exit_paths import path_history
+
+        drawn = _with_paths(self.energies)
+        if not drawn:
+            raise StructureError("the result has no exit path, so there is no history to draw; see its status.")
+        steps = [step for _, path in drawn for step in np.diff(path.t[path.section]).tolist()]
+        return path_history(
+            [(path.t, path.p[:, 1], path.action, path.section) for _, path in drawn],
+            sources=[energy.source for energy, _ in drawn],
+            titles=[self._title(energy) for energy, _ in drawn],
+            period=float(np.median(steps)) if steps and min(steps) > 0 else None,
+            ax=ax,
+        )
+
+    def _title(self, energy: ActivationEnergy) -> str:
+        """What pictures call a path."""
+        mantissa, _, exponent = f"{energy.value:.3e}".partition("e")
+        value = f"{mantissa} × 10$^{{{int(exponent)}}}$" if exponent else mantissa
+        return f"{self.exit_of(energy)}, $\\Delta U$ = {value} m$^2$ s$^{{-3}}$"
 
     def plot_quasi_potential(self, source: int | str | None = None, ax: Any = None) -> QuasiPotentialArtists:
         """Draw a quasi-potential on the section; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
@@ -158,19 +202,54 @@ class Result(Record):
         ------
         StructureError
             It was not computed for this attractor, or for any.
+        ResultFileError
+            The arrays are not those of a quasi-potential, which `ActionGraphResult` describes.
         """
-        return plot_quasi_potential(self, source, ax)
+        from vibrokit.plots.quasi_potential import quasi_potential_map
+
+        known = self._quasi_potentials()
+        if not known:
+            raise StructureError("the result has no quasi-potential.")
+        label = min(known) if source is None else label_of(source, self.names)
+        if label not in known:
+            have = ", ".join(self.names[other] for other in known)
+            raise StructureError(f"the result has no quasi-potential of {self.names[label]}; it has those of {have}.")
+        values, bounds = known[label]
+        own = [energy for energy in self.energies if energy.source == label]
+        return quasi_potential_map(
+            values,
+            bounds,
+            self.section.points[label],
+            label=label,
+            names=self.names,
+            top=_SHOWN * max(energy.value for energy in own) if own else None,
+            saddles=self.section.saddles,
+            paths=[path.q[path.section] for _, path in _with_paths(own)],
+            ax=ax,
+        )
+
+    def _quasi_potentials(self) -> dict[int, tuple[Any, Any]]:
+        """By label: the quasi-potential on the nodes, and the bounds of the cells around them."""
+        arrays = Arrays(self.data)
+        if "quasi_potential" not in arrays:
+            return {}
+        labels = arrays.wholes("source", (None,), 0, len(self.names) - 1)
+        values = arrays.numbers("quasi_potential", (len(labels), None, None), finite=False)
+        nodes = [arrays.numbers(f"quasi_potential_{axis}", (len(labels), None), finite=False) for axis in ("x", "v")]
+        if values.shape[1:] != (nodes[0].shape[1], nodes[1].shape[1]):
+            raise ResultFileError(f"its quasi_potential has shape {values.shape}, which its nodes contradict")
+        known = {}
+        for label, psi, *axes in zip(labels.tolist(), values, *nodes, strict=True):
+            if np.isfinite(psi).any():
+                x, v = (axis[: np.isfinite(axis).sum()] for axis in axes)  # shorter ones end in NaN
+                known[label] = psi[: len(x), : len(v)], np.array([_bounds(x), _bounds(v)])
+        return known
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return the arrays with dimensions, coordinates, units and long names.
-
-        Raises
-        ------
-        ResultFileError
-            An array or a dimension of `data` has a name that the result uses itself.
-        """
-        own = self.section.variables | energy_variables(self.energies, self.branches)
-        return joined_with(self.data, xarray.Dataset(own).set_coords("attractor_name"))
+        """Return the arrays with dimensions, coordinates, units and long names."""
+        own = xarray.Dataset(self.section.variables | energy_variables(self.energies, self.branches))
+        own = own.set_coords("attractor_name")
+        return own.assign_coords(self.data.coords).assign(self.data.data_vars).assign_attrs(self.data.attrs)
 
     @classmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
@@ -179,3 +258,24 @@ class Result(Record):
         section = Section.read(arrays)
         energies, branches = read_energies(arrays, len(section.names))
         return cls(energies=energies, branches=branches, section=section, data=data_in(dataset), **provenance)
+
+
+def _with_paths(energies: Iterable[ActivationEnergy]) -> list[tuple[ActivationEnergy, ExitPath]]:
+    """The energies that have a path, each with it."""
+    return [(energy, energy.path) for energy in energies if energy.path is not None]
+
+
+def _from_rest(path: ExitPath) -> bool:
+    """Whether a path leaves a state of rest: then the whole curve is shown, and samples by phase have no meaning."""
+    if len(path.section) < 2:
+        return False
+    begun = np.ptp(path.q[: path.section[1] + 1], axis=0)
+    return bool(np.all(begun <= _AT_REST * np.ptp(path.q, axis=0)))
+
+
+def _bounds(nodes: Any) -> tuple[float, float]:
+    """Bounds of the cells around the nodes of one axis."""
+    if len(nodes) < 2 or not np.all(np.diff(nodes) > 0):
+        raise ResultFileError("its quasi_potential needs at least two nodes along each side, in ascending order")
+    half = (nodes[-1] - nodes[0]) / (len(nodes) - 1) / 2
+    return float(nodes[0] - half), float(nodes[-1] + half)

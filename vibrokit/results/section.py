@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.basins import grid_variables, read_grid
 from vibrokit.results.fields import PLANE, STATE, Length, Variable, Vectors, Whole, Word
-from vibrokit.results.grid import grid_variables, read_grid
-from vibrokit.results.region import Region
+from vibrokit.results.region import Region, centres
 from vibrokit.results.structure import Structure
 from vibrokit.results.table import Table
 
@@ -75,13 +75,7 @@ class Section:
 
     @classmethod
     def read(cls, arrays: Arrays) -> Section:
-        """Take the section out of the arrays of a result.
-
-        Raises
-        ------
-        ResultFileError
-            Something is missing, of another shape or kind, or contradicts the rest.
-        """
+        """Take the section out of the arrays of a result; raises ResultFileError."""
         attractors = _ATTRACTORS.read(arrays)
         region, labels = read_grid(arrays, len(attractors))
         lists: dict[str, Any] = {
@@ -93,10 +87,14 @@ class Section:
         return cls(labels, region.bounds, points, tuple(values["name"] for values in attractors), **lists)
 
     @property
+    def grid(self) -> dict[str, Array]:
+        """Coordinates of the cells' centres: x and v."""
+        return dict(zip("xv", centres(self.bounds, self.labels.shape), strict=True))
+
+    @property
     def variables(self) -> dict[str, Variable]:
         """The arrays that hold the section, by name."""
-        x, v = self.bounds.tolist()
-        found = grid_variables(self.labels, Region((x[0], x[1]), (v[0], v[1])), self.names)
+        found = grid_variables(self.labels, Region.of(self.bounds), self.names)
         found |= _ATTRACTORS.variables(self.points, label=range(len(self.points)), name=self.names, points=self.points)
         for name, table in _LISTS.items():
             found |= table.variables(getattr(self, name), points=getattr(self, name))

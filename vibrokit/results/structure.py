@@ -6,19 +6,51 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray
 
-from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import Basins
+from vibrokit.errors import ResultFileError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
+from vibrokit.results.basins import NOT_FOLLOWED, Basins, grid_variables, read_grid
+from vibrokit.results.fields import PLANE, Flag, Length, Number, Series, Vectors, Whole, Word
 from vibrokit.results.labels import label_of
-from vibrokit.results.manifold import Manifold
+from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record
 from vibrokit.results.saddle import Saddle
-from vibrokit.results.structure_table import read_structure, structure_dataset
 from vibrokit.results.summary import Summary, counted
 from vibrokit.results.survival import Survival
+from vibrokit.results.table import Table
 
 if TYPE_CHECKING:
     from vibrokit.plots.basins import SectionArtists
     from vibrokit.plots.portraits import MotionArtists
+
+_ENDS = {end.value: end for end in ManifoldEnd}
+
+_ATTRACTORS = Table("attractor", ATTRACTOR_FIELDS, index="label")
+_SADDLES = Table(
+    "saddle",
+    {
+        "kind": Word("kind of the unstable orbit", known=("saddle", "flip saddle", "repeller", "chaotic")),
+        "period": Whole("period in forcing periods; 0 for a chaotic set"),
+        "duration": Number("time after which the motion repeats; NaN for a chaotic set", "s"),
+        **{name: ATTRACTOR_FIELDS[name] for name in ("points", "multipliers", "exponents")},
+        "leads_to": Series(
+            Length("side", "sides"), "label of the attractor that each unstable branch reaches; negative as in basin",
+            whole=True, low=NOT_FOLLOWED,
+        ),
+        **{name: ATTRACTOR_FIELDS[name] for name in ("residual", "error")},
+    },
+)  # fmt: skip
+_MANIFOLDS = Table(
+    "manifold",
+    {
+        "saddle": Whole("place of the saddle that the branch belongs to"),
+        "point": Whole("point of the saddle from which the branch starts"),
+        "stable": Flag("whether the branch belongs to the stable manifold"),
+        "side": Whole("along the eigenvector (1) or against it (-1)", low=-1, high=1),
+        "curve": Vectors(Length("vertex", "vertices", ragged=True), PLANE, prefixed=False),
+        "end": Word("why the branch ends", known=tuple(_ENDS)),
+    },
+)
 
 
 class Structure(Record):
@@ -111,12 +143,40 @@ class Structure(Record):
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays with dimensions, coordinates, units and long names."""
-        return structure_dataset(self)
+        about = {"long_name": "distance at which an attractor counts as reached", "units": "1"}
+        longest = {"long_name": "largest number of forcing periods that a trajectory was followed", "units": "1"}
+        return xarray.Dataset(
+            {
+                **grid_variables(self.basins.labels, self.basins.region, self.names),
+                **attractor_variables(_ATTRACTORS, self.attractors, self.survival),
+                **_SADDLES.variables(self.saddles),
+                **_MANIFOLDS.variables(self.manifolds),
+                "settling": ((), self.settling, about),
+                "budget": ((), self.budget, longest),
+                "stepper": ((), self.stepper, {"long_name": "stepper of the basin grid"}),
+            }
+        ).set_coords("attractor_name")
 
     @classmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
         """Make a structure of its arrays; raises ResultFileError."""
-        return cls(**read_structure(dataset), **provenance)
+        arrays = Arrays(dataset)
+        attractors, survival = read_attractors(arrays, _ATTRACTORS)
+        for place, attractor in enumerate(attractors):
+            if attractor.label != place:
+                raise ResultFileError(f"attractor {place} has label {attractor.label}; the two must be the same")
+        saddles = _saddles(arrays, len(attractors))
+        return cls(
+            attractors=attractors,
+            saddles=saddles,
+            manifolds=_manifolds(arrays, saddles),
+            basins=Basins(*read_grid(arrays, len(attractors))),
+            survival=survival,
+            settling=float(arrays.numbers("settling", (), 0.0, 1e300)),
+            budget=int(arrays.wholes("budget", ())),
+            stepper=arrays.words("stepper", ())[0],
+            **provenance,
+        )
 
 
 def _described(attractor: Attractor) -> str:
@@ -128,3 +188,26 @@ def _described(attractor: Attractor) -> str:
         hits = f"pressed on the {pressed[0]} stop"
     per = "" if attractor.repeats or not attractor.impacts else " per period"
     return f"{attractor.name}: {kind}, {hits}{per}"
+
+
+def _saddles(arrays: Arrays, attractors: int) -> tuple[Saddle, ...]:
+    saddles = []
+    for values in _SADDLES.read(arrays):
+        values["leads_to"] = tuple(values["leads_to"].tolist())
+        saddles.append(Saddle(**values))
+        if any(label >= attractors for label in values["leads_to"]):
+            raise ResultFileError(f"a saddle leads to {values['leads_to']}, and there are {attractors} attractors")
+        if len(values["points"]) == 0:
+            raise ResultFileError(f"a {values['kind']} orbit has no points")
+    return tuple(saddles)
+
+
+def _manifolds(arrays: Arrays, saddles: tuple[Saddle, ...]) -> tuple[Manifold, ...]:
+    manifolds = tuple(Manifold(**values | {"end": _ENDS[values["end"]]}) for values in _MANIFOLDS.read(arrays))
+    for one in manifolds:
+        known = one.saddle < len(saddles) and one.point < len(saddles[one.saddle].points)
+        if not known or one.side == 0:
+            raise ResultFileError(
+                f"a manifold starts on side {one.side} of point {one.point} of saddle {one.saddle}, which is missing"
+            )
+    return manifolds

@@ -48,8 +48,9 @@ class Trajectory:
 
         from vibrokit.results.fields import STATE
 
+        columns = zip(STATE.of(self.states.shape[1]), self.states.T, strict=True)
         return xarray.Dataset(
-            {STATE[k].name: ("t", values, STATE[k].about) for k, values in enumerate(self.states.T)},
+            {column.name: ("t", values, column.about) for column, values in columns},
             coords={"t": ("t", self.t, {"long_name": "time", "units": "s"})},
         )
 

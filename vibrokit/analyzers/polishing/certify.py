@@ -10,7 +10,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
 from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
-from vibrokit.results.certificate import Certificate
+from vibrokit.results.energy import Certificate
 
 _FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows
 
