@@ -22,7 +22,7 @@ from vibrokit.registry import Group
 from vibrokit.results import data
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.bifurcation import Bifurcation
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
@@ -117,7 +117,7 @@ def full_structure() -> Structure:
     saddles = (
         Saddle("saddle", 1, 11.0, circle(0.2)[:1], two, rates, (0, 1), 1e-13, 1e-12),
         Saddle("flip saddle", 2, 22.0, circle(0.3)[:2], -two, rates, (1, 1), 1e-13, 1e-12),
-        Saddle("repeller", 1, 11.0, circle(0.4)[:1], two, rates, (UNSETTLED, LEFT), 1e-13, 1e-12),
+        Saddle("repeller", 1, 11.0, circle(0.4)[:1], two, rates, (UNSETTLED, ESCAPED), 1e-13, 1e-12),
         Saddle("chaotic", 0, np.nan, circle(0.35), np.empty(0, complex), np.array([0.1 + 0j]), (0, 2), np.nan, np.nan),
     )
     manifolds = (

@@ -26,7 +26,7 @@ import vibrokit as vk
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import CoarseStepsWarning
 from vibrokit.kernels.named import named_stepper
-from vibrokit.results.basins import LEFT, UNSETTLED
+from vibrokit.results.basins import ESCAPED, UNSETTLED
 
 SCENE = "hertz-0.570"
 GRIDS = (50, 100, 200, 400, 800)
@@ -126,7 +126,7 @@ def row(name: str, value: float, cells: int, limit: int) -> str:
         error = f"{np.mean(labels != expected):9.1e}{shift:9.1e}"
     except (VibrokitError, TooLongError) as problem:
         error, words = f"{'none':>9}{'none':>9}", f"{words}; tightened, {type(problem).__name__}: {problem}"
-    shares = f"{basins.fraction(UNSETTLED):10.1e}{basins.fraction(LEFT):9.1e}"
+    shares = f"{basins.fraction(UNSETTLED):10.1e}{basins.fraction(ESCAPED):9.1e}"
     return f"{head}{seconds:9.1f}{error}{shares}  {words}"
 
 

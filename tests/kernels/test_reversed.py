@@ -13,7 +13,7 @@ from vibrokit_hunt_crossley import HuntCrossley
 import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
-from vibrokit.structure.manifolds import preimages
+from vibrokit.structure.manifolds import FlowMap
 from vibrokit.symbolic.flow_kind import Flow
 
 FORCES = (vk.Harmonic(amplitude=0.18, frequency=0.57, phase=0.3), vk.Constant(force=0.2))
@@ -25,6 +25,11 @@ def scene(law=None, adhesive=False, **more):
     stops = [vk.Barrier(law, side * 0.5, name, adhesive) for side, name in ((1, "right"), (-1, "left")) if law]
     settings = {"natural_frequency": 1.0, "damping_ratio": 0.02, "barriers": stops, "excitations": FORCES}
     return vk.Oscillator(**(settings | more))
+
+
+def preimages(osc, states, periods=1, *, stepper):
+    """States of the section mapped backwards in time."""
+    return FlowMap(osc, stepper, Flow.STATE_REVERSED, periods)(states)
 
 
 def backwards(acceleration, states, duration):

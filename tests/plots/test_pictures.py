@@ -79,7 +79,7 @@ def test_segments_are_cut(curve, inside):
 
 
 def test_cells_have_the_same_labels_as_in_the_records():
-    for name in ("UNSETTLED", "LEFT", "NOT_FOLLOWED"):
+    for name in ("UNSETTLED", "ESCAPED", "NOT_FOLLOWED"):
         assert getattr(cells, name) == getattr(records, name)
 
 

@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 import vibrokit as vk
 from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, classify_grid
@@ -92,8 +92,8 @@ def test_a_softening_spring_lets_go_beyond_its_saddles():
         beyond = x * v > 0  # past the saddle and still going out, where the spring pushes it on
         labels = basins.labels.ravel()
         assert (labels[low & (np.abs(x) < 1)] == 0).all()
-        assert (labels[(np.abs(x) > 1) & (low | beyond)] == LEFT).all()
-        assert set(labels) == {0, LEFT}
+        assert (labels[(np.abs(x) > 1) & (low | beyond)] == ESCAPED).all()
+        assert set(labels) == {0, ESCAPED}
 
 
 def circles():
@@ -193,9 +193,9 @@ def test_an_attractor_outside_the_region_is_found(wells):
 def test_too_small_a_budget_leaves_cells_unsettled(duffing):
     short = classifier(duffing.osc, [a.points for a in duffing.attractors], ((-3, 3), (-3, 3)), budget=3)
     labels = classify_grid(short, (20, 20)).labels
-    assert set(labels.ravel()) <= {UNSETTLED, LEFT, 0, 1}
+    assert set(labels.ravel()) <= {UNSETTLED, ESCAPED, 0, 1}
     assert np.mean(labels == UNSETTLED) > 0.8
-    assert (short.labels(np.array([[40.0, 0.0]])) == LEFT).all()  # outside when the time is up
+    assert (short.labels(np.array([[40.0, 0.0]])) == ESCAPED).all()  # outside when the time is up
     assert short.labels(np.empty((0, 2))).shape == (0,)
 
 

@@ -7,10 +7,10 @@ from scipy.optimize import brentq, root
 
 import vibrokit as vk
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
-from vibrokit.structure.cycles import find_cycle
+from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.tracing.following import family_of, follow
+from vibrokit.structure.tracing.following import follow
 from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
@@ -23,11 +23,11 @@ def passed(osc, path, state, target, *, size=(2.0, 2.0), cycle=False):
     """What a motion meets from where the scene stands to the target, and whether it arrives there stable."""
     stepper, start = single_stepper(osc, Flow.STATE_VARIATIONAL), osc.parameters[path]
     if cycle:
-        attractor = describe_cycle(osc, find_cycle(osc, np.array(state), stepper, longest=50.0), stepper)
+        orbit = find_cycle(osc, np.array(state), stepper, longest=50.0)
     else:
-        attractor = describe_orbit(osc, refine_orbit(osc, np.array(state), 1, stepper), stepper)
-    family = family_of(osc, path, attractor, start, target, np.array(size), stepper)
-    return follow(family, attractor, start, target)
+        orbit = refine_orbit(osc, np.array(state), 1, stepper)
+    attractor = describe_orbit(osc, orbit, stepper)
+    return follow(osc, path, attractor, start, target, np.array(size), stepper)
 
 
 def only(followed, kind):

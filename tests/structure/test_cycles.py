@@ -6,9 +6,8 @@ from scipy.integrate import solve_ivp
 
 import vibrokit as vk
 from vibrokit.errors import StructureError
-from vibrokit.structure.attractors.describe import describe_cycle
-from vibrokit.structure.cycles import find_cycle, refine_cycle
-from vibrokit.structure.equilibria import equilibrium_exponents
+from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.autonomous import equilibrium_exponents, find_cycle, refine_cycle
 
 VAN_DER_POL = vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=1.0)
 # Of the Van der Pol oscillator at μ = 1 (Amore, Boyd & Fernández, Appl. Math. Comput. 305, 2017, and others).
@@ -193,7 +192,7 @@ def test_a_cycle_that_finer_steps_do_not_have_is_described_with_an_infinite_erro
 
     osc = van_der_pol()
     cycle = find_cycle(osc, np.array([2.0, 0.0]), vk.RK4(512), longest=20.0)
-    monkeypatch.setattr("vibrokit.structure.attractors.describe.refine_cycle", none_at_all)
-    described = describe_cycle(osc, cycle, vk.RK4(512))
+    monkeypatch.setattr("vibrokit.structure.autonomous.refine_cycle", none_at_all)
+    described = describe_orbit(osc, cycle, vk.RK4(512))
     assert (described.kind, described.error) == ("limit cycle", np.inf)
     assert described.residual == cycle.residual

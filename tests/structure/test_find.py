@@ -6,10 +6,10 @@ from scipy.optimize import fsolve
 import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
 from vibrokit.progress import OutOfTime
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
-from vibrokit.structure.basins.fractions import cell_findings
+from vibrokit.structure.basins.grid import cell_findings
 from vibrokit.structure.orbits import refine_orbit
 
 
@@ -163,15 +163,15 @@ def test_equilibria_have_eigenvalues():
 def test_what_escapes_is_said_to_have_left():
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
     structure = vk.find_structure(osc, region=((-1.5, 1.5), (-1.5, 1.5)), cells=(30, 30), starts=(8, 8))
-    assert structure.basins.fraction(LEFT) > 0.1
-    assert structure.basins.fraction(0) + structure.basins.fraction(LEFT) == pytest.approx(1.0)
+    assert structure.basins.fraction(ESCAPED) > 0.1
+    assert structure.basins.fraction(0) + structure.basins.fraction(ESCAPED) == pytest.approx(1.0)
     (finding,) = structure.found(Code.CELLS_LEFT_REGION)
-    assert finding.values["fraction"] == structure.basins.fraction(LEFT)
+    assert finding.values["fraction"] == structure.basins.fraction(ESCAPED)
     assert sorted(round(saddle.points[0, 0], 9) for saddle in structure.saddles) == [-1.0, 1.0]
 
 
 def test_cells_without_an_attractor_are_findings():
-    labels = np.array([[0, 1, LEFT, LEFT], [0, UNSETTLED, 0, 0]], dtype=np.int16)
+    labels = np.array([[0, 1, ESCAPED, ESCAPED], [0, UNSETTLED, 0, 0]], dtype=np.int16)
     found = cell_findings(Basins(Region((0, 1), (0, 1)), labels))
     assert {finding.code: finding.values["fraction"] for finding in found} == {
         Code.CELLS_UNSETTLED: 1 / 8, Code.CELLS_LEFT_REGION: 2 / 8,

@@ -10,15 +10,15 @@ from scipy.optimize import brentq
 import vibrokit as vk
 from tests.scenes import Coloured, double_well
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
-from vibrokit.results.basins import LEFT, Basins
+from vibrokit.results.basins import ESCAPED, Basins
 from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
-from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
+from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import classify_grid
-from vibrokit.structure.boundaries.edges import edge_states, meeting_cells, spread
-from vibrokit.structure.boundaries.saddles import find_saddles
-from vibrokit.structure.cycles import find_cycle
+from vibrokit.structure.boundaries.edges import Straddles, meeting_cells, spread
+from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -39,11 +39,14 @@ def orbits(osc, *starts, period=1):
     return tuple(describe_orbit(osc, refine_orbit(osc, end, period, stepper), stepper) for end in ends)
 
 
+def searched(classifier, basins, rng=0, **limits):
+    search = SaddleSearch(classifier, basins, single_stepper(classifier.osc, Flow.STATE_VARIATIONAL), **limits)
+    search.run(np.random.default_rng(rng))
+    return search
+
+
 def saddles_of(osc, attractors, bounds, rng=0, **options):
-    classifier, basins = settled(osc, attractors, bounds, **options)
-    search = find_saddles(
-        classifier, basins, single_stepper(osc, Flow.STATE_VARIATIONAL), np.random.default_rng(rng)
-    )  # fmt: skip
+    search = searched(*settled(osc, attractors, bounds, **options), rng)
     return search.saddles, search.findings
 
 
@@ -90,7 +93,7 @@ def test_a_saddle_that_presses_on_a_stop():
     top = brentq(lambda x: x - x**3 + (x - 0.9) ** 1.5, 1.0, 1.3, xtol=1e-15)
     slope = 3 * top**2 - 1 - 1.5 * np.sqrt(top - 0.9)
     assert len(found) == 2, findings
-    for saddle, x, grows, ends in zip(found, (-1.0, top), (2.0, slope), ((LEFT, 0), (0, LEFT)), strict=True):
+    for saddle, x, grows, ends in zip(found, (-1.0, top), (2.0, slope), ((ESCAPED, 0), (0, ESCAPED)), strict=True):
         np.testing.assert_allclose(saddle.points, [[x, 0]], atol=1e-10)
         np.testing.assert_allclose(saddle.exponents, hilltop(0.1, grows), rtol=1e-8)
         assert saddle.leads_to == ends
@@ -191,7 +194,7 @@ def test_the_paper_scene_has_one_boundary_saddle(stops):
     for seed, stepper in ((0, classifier.stepper), (1, vk.RK4(512)), (2, orbit_stepper)):
         few = {"trackers": 3, "sections": 40} if stepper is orbit_stepper else {}
         changed = dataclasses.replace(classifier, stepper=stepper)
-        search = find_saddles(changed, basins, orbit_stepper, np.random.default_rng(seed), **few)
+        search = searched(changed, basins, seed, **few)
         found = search.saddles
         assert len(found) == 1, search.findings
         points.append(found[0].points[0])
@@ -202,8 +205,14 @@ def test_the_paper_scene_has_one_boundary_saddle(stops):
 
 def test_edge_tracks_are_trajectories_on_the_boundary(stops):
     osc, _, classifier, basins = stops
-    tracks = edge_states(classifier, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
-    again = edge_states(classifier, basins, trackers=4, sections=30, rng=np.random.default_rng(0))
+
+    def tracked():
+        straddles = Straddles(classifier, basins, 4, np.random.default_rng(0))
+        for _ in range(30):
+            straddles.advance()
+        return straddles.tracks()
+
+    tracks, again = tracked(), tracked()
     assert len(tracks) >= 2
     for track, same in zip(tracks, again, strict=True):
         assert track.labels == (0, 1)
@@ -228,7 +237,7 @@ def test_an_unstable_limit_cycle_parts_rest_from_motion():
     inner, outer = np.sort(np.sqrt(np.roots([0.04 / 16, -0.08 / 8, 0.005])))
     exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
     cycle = find_cycle(osc, osc.section_map([[outer, 0.0]], 200)[0], exact, longest=20.0)
-    attractors = (*orbits(osc, (0.0, 0.0)), describe_cycle(osc, cycle, exact))
+    attractors = (*orbits(osc, (0.0, 0.0)), describe_orbit(osc, cycle, exact))
     (saddle,), findings = saddles_of(osc, attractors, ((-2.5, 2.5), (-2.5, 2.5)), cells=(40, 40))
     assert (saddle.kind, saddle.period, saddle.leads_to) == ("repeller", 1, (0, 1)), findings
     assert np.abs(saddle.points[0, 0]) == pytest.approx(inner, rel=1e-3)  # averaging is right to second order

@@ -21,7 +21,7 @@ from vibrokit.plots.clipping import clipped
 Style = dict[str, Any]
 
 # Labels of cells that lead to no attractor, as `vibrokit.results.basins` has them, and how they look.
-UNSETTLED, LEFT, NOT_FOLLOWED = -1, -2, -3
+UNSETTLED, ESCAPED, NOT_FOLLOWED = -1, -2, -3
 _GREY, _DARK, _CLEAR = (0.8, 0.8, 0.8, 1.0), (0.42, 0.42, 0.42, 1.0), (1.0, 1.0, 1.0, 0.0)
 _HATCH: Style = {"facecolor": "white", "edgecolor": "0.72", "hatch": "////", "linewidth": 0}
 _PALE = 0.35
@@ -99,13 +99,13 @@ def basin_map(
 ) -> BasinArtists:
     """Draw basins as pale colours and attractors as markers.
 
-    Cells that did not settle are grey, those whose motion left the region are hatched, and those that were not
+    Cells that did not settle are grey, those whose motion escaped from the region are hatched, and those that were not
     followed are dark.
 
     Parameters
     ----------
     labels : int array (nx, nv)
-        Label of the attractor that each cell leads to; −1 not settled, −2 left the region, −3 not followed.
+        Label of the attractor that each cell leads to; −1 not settled, −2 escaped, −3 not followed.
     bounds : array_like (2, 2)
         Bounds of x and v.
     points : sequence of array_like (count, n)
@@ -136,7 +136,7 @@ def basin_map(
         interpolation="nearest",
     )
     hatching = None
-    if (cells == LEFT).any():  # seen through the image where that is clear
+    if (cells == ESCAPED).any():  # seen through the image where that is clear
         hatching = Rectangle((x_low, v_low), x_high - x_low, v_high - v_low, zorder=-1, **_HATCH)
         axes.add_patch(hatching)
     attractors: list[Line2D] = []
@@ -233,7 +233,7 @@ def cell_samples(cells: NDArray[Any]) -> list[Patch]:
     """Entries of the legend for cells that lead to no attractor, if there are any."""
     samples = (
         (UNSETTLED, {"facecolor": _GREY}, "not settled"),
-        (LEFT, _HATCH, "leaves the region"),
+        (ESCAPED, _HATCH, "leaves the region"),
         (NOT_FOLLOWED, {"facecolor": _DARK}, "not followed"),
     )
     return [

@@ -15,12 +15,12 @@ from vibrokit.results.region import Region, centres
 
 UNSETTLED = -1
 """Label of cells whose motion is in the region and had reached no attractor within the budget."""
-LEFT = -2
+ESCAPED = -2
 """Label of cells whose motion was outside the region at the end of the budget, or diverged."""
 NOT_FOLLOWED = -3
 """Label of cells that were not followed, because the work was stopped."""
 
-_OTHERS = {NOT_FOLLOWED: "not_followed", LEFT: "left_region", UNSETTLED: "unsettled"}
+_OTHERS = {NOT_FOLLOWED: "not_followed", ESCAPED: "left_region", UNSETTLED: "unsettled"}
 _AXES = {"x": ("displacement", "m"), "v": ("velocity", "m s-1")}
 
 
@@ -32,7 +32,7 @@ class Basins:
     ----------
     region : Region
     labels : int16 array (nx, nv)
-        Label of the attractor that each cell's centre leads to; UNSETTLED, LEFT or NOT_FOLLOWED if it leads to none.
+        Label of the attractor that each cell's centre leads to; UNSETTLED, ESCAPED or NOT_FOLLOWED if it leads to none.
     """
 
     region: Region

@@ -9,7 +9,7 @@ from typing import Any
 
 from vibrokit.errors import shown
 from vibrokit.progress import OutOfTime
-from vibrokit.results.basins import LEFT
+from vibrokit.results.basins import ESCAPED
 
 INTERRUPT, TIME_LIMIT = "interrupt", "time limit"  # reasons for which work is stopped
 Value = float | int | str | bool | None | Sequence[float] | Sequence[int] | Sequence[str]
@@ -90,7 +90,8 @@ class Code(StrEnum):
         "cells-unsettled", WARNING, "{fraction:.2%} of the cells did not settle within the budget.", _RAISE_BUDGET,
     )  # fmt: skip
     CELLS_LEFT_REGION = (
-        "cells-left-region", INFO, "{fraction:.2%} of the cells left the region.", "Widen the region if this matters.",
+        "cells-left-region", INFO, "{fraction:.2%} of the cells escaped from the region.",
+        "Widen the region if this matters.",
     )  # fmt: skip
     CELLS_NOT_FOLLOWED = (
         "cells-not-followed", WARNING, "{fraction:.2%} of the cells were not followed.", "Run it again with more time.",
@@ -270,8 +271,8 @@ class Finding:
     code : Code
     source, target : int or None
         Labels of the attractors that it is about: the one left and the one reached, or the two on either side of a
-        basin boundary. −1 stands for an exit that is not an attractor, `LEFT` for motion that leaves the region. In a
-        continuation the numbers of branches take the place of labels.
+        basin boundary. −1 stands for an exit that is not an attractor, `ESCAPED` for motion that leaves the region. In
+        a continuation the numbers of branches take the place of labels.
     values : dict
         Numbers and short texts by name, as the code's sentence uses them.
 
@@ -341,7 +342,7 @@ def check_findings(findings: Any) -> None:
 
 def _named(label: int | None, names: Sequence[str]) -> str:
     if label is None or label < 0:
-        return "motion that leaves the region" if label == LEFT else "the exit"
+        return "motion that leaves the region" if label == ESCAPED else "the exit"
     return names[label] if label < len(names) else f"attractor {label}"
 
 

@@ -28,11 +28,17 @@ from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled
-from vibrokit.structure.basins.fractions import CELL_CODES, basin_fractions
+from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.regions import frame_of
-from vibrokit.structure.tracing.branches import Tracing, without_fraction
-from vibrokit.structure.tracing.outcome import bifurcations_of, branch_findings, branch_names, thinned
+from vibrokit.structure.scales import frame_of
+from vibrokit.structure.tracing.branches import (
+    Tracing,
+    bifurcations_of,
+    branch_findings,
+    branch_names,
+    thinned,
+    without_fraction,
+)
 from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -60,8 +66,8 @@ def continuation(
     The steady states are searched for at each value independently. Every orbit, equilibrium and limit cycle is then
     followed to the next value by pseudo-arclength continuation of its equations, and those that were not reached are
     followed back. This joins them into branches, finds attractors that the search missed, and locates the bifurcations
-    on the way. What cannot be followed so (chaotic sets, a period that has doubled) is joined by the smallest distance
-    between the sets of points. Finally, basin fractions are found on a grid.
+    on the way. What cannot be followed in this way (chaotic sets, a period that has doubled) is joined by the smallest
+    distance between the sets of points. Finally, basin fractions are found on a grid.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete; branches that
     were not followed yet are joined by distance. If nothing is known by then, KeyboardInterrupt is raised.
@@ -76,7 +82,7 @@ def continuation(
         Finite and distinct; they are taken in ascending order.
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Region of the searches and of the basin fractions, the same at all values so that these can be compared. By
-        default each search chooses its own region, and the fractions are shares of the smallest region that contains
+        default each search chooses its own region, and the fractions refer to the smallest region that contains
         the steady states of all values and the stops, with a margin around them.
     cells : (int, int)
         Cells of the basin grid in x and v.
@@ -119,7 +125,7 @@ def continuation(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Found:
-    """What the search found at one value, and how it was stopped."""
+    """Steady states found at one value, and the reason if the search was stopped."""
 
     value: float
     attractors: tuple[Attractor, ...] = ()
@@ -129,19 +135,18 @@ class _Found:
     stopped: Finding | None = None
 
 
+@dataclasses.dataclass(eq=False)
 class _Run:
     """Goes through the stages and keeps what each has found."""
 
-    def __init__(
-        self,
-        osc: Oscillator,
-        entry: Entry,
-        values: list[float],
-        request: Request,
-        executor: concurrent.futures.Executor | None,
-    ) -> None:
-        self.osc, self.entry, self.path, self.values = osc, entry, entry.path, values
-        self.request, self.executor, self.region = request, executor, request.region
+    osc: Oscillator
+    entry: Entry
+    values: list[float]
+    request: Request
+    executor: concurrent.futures.Executor | None
+
+    def __post_init__(self) -> None:
+        self.path, self.region = self.entry.path, self.request.region
         self.found: list[_Found] = []
         self.cell_findings: dict[float, tuple[Finding, ...]] = {}
         self.stopped: Finding | None = None
@@ -204,7 +209,7 @@ class _Run:
     def tracing(self) -> Tracing:
         """The branches through what was found."""
         held = [at for at in self.found if at.attractors]
-        frame = _union([at.region.bounds for at in held if at.region is not None])
+        frame = _union([at.region for at in held if at.region is not None])
         size = np.ones(2) if frame is None else np.diff(frame.bounds)[:, 0]
         stepper = self.request.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
         attractors = [[without_fraction(attractor) for attractor in at.attractors] for at in held]
@@ -214,12 +219,11 @@ class _Run:
         """Find the basin fractions of all attractors at each value."""
         tracing = self.tracing
         held = list(zip(tracing.values, tracing.found, strict=True))
-        frames = [frame_of(self.osc.replace({self.path: value}), attractors).bounds for value, attractors in held]
-        self.region = self.region or _union(frames)
+        self.region = self.region or _union([frame_of(tracing.at(value), attractors) for value, attractors in held])
         budgets = {found.value: found.budget for found in self.found}
         tasks = [
             (
-                self.osc.replace({self.path: value}), labelled(attractors, has_stops=bool(self.osc.barriers)),
+                tracing.at(value), labelled(attractors, has_stops=bool(self.osc.barriers)),
                 self.region, self.request.cells, budgets[value], self.request.stepper,
             )
             for value, attractors in held
@@ -247,10 +251,7 @@ class _Run:
             )
 
     def _each(self, work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Generator[Any, None, None]:
-        if self.executor is not None:
-            yield from carry(work, tasks, self.executor)
-        else:
-            yield from (work(*task) for task in tasks)
+        return (work(*task) for task in tasks) if self.executor is None else carry(work, tasks, self.executor)
 
 
 def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> _Found:
@@ -265,11 +266,10 @@ def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> 
     return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings, stopped)
 
 
-def _union(bounds: list[Array]) -> Region | None:
-    if not bounds:
-        return None
-    low, high = np.min(bounds, axis=0)[:, 0], np.max(bounds, axis=0)[:, 1]
-    return Region.of(np.stack([low, high], axis=1).tolist())
+def _union(regions: list[Region]) -> Region | None:
+    """Return the smallest region that contains some regions; None if there are none."""
+    corners = [region.bounds.T for region in regions]
+    return Region.around(np.concatenate(corners), margin=0.0) if corners else None
 
 
 def _entry(osc: Oscillator, parameter: str) -> Entry:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from vibrokit.results.manifold import ManifoldEnd
 
 MARGIN = 1.0
-"""Share of its width and height by which a region is widened on every side; beyond that a curve is outside."""
+"""Fraction of its width and height by which a region is widened on every side; beyond that a curve is outside."""
 
 _FLOOR = 0.01  # shortest chord that is divided because of its angle, in units of the spacing
-_REST = 1e-5  # length of an image, as a share of the region, below which a curve has converged to a point
+_REST = 1e-5  # length of an image, relative to the region, below which a curve has converged to a point
 _SEEDS = 5
 _THINNING = 1.1  # largest ratio of the lengths of a curve before and after it is thinned
 _MOST_VERTICES, _MOST_IMAGES = 100_000, 5000
@@ -76,8 +76,8 @@ class Limits:
         lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(states, axis=0), axis=1))])
         if lengths[-1] >= remaining:
             end = int(np.searchsorted(lengths, remaining))
-            share = (remaining - lengths[end - 1]) / (lengths[end] - lengths[end - 1])
-            last = states[end - 1 : end] + share * (states[end] - states[end - 1])
+            fraction = (remaining - lengths[end - 1]) / (lengths[end] - lengths[end - 1])
+            last = states[end - 1 : end] + fraction * (states[end] - states[end - 1])
             states = np.concatenate([states[:end], last])
         elif outside.any():
             return states, ManifoldEnd.LEAVES_REGION
@@ -89,8 +89,8 @@ class Limits:
         """Where a chord leaves the widened region, shape (1, 2)."""
         start, step = (inner - self.low) / self.width, (outer - inner) / self.width
         with np.errstate(divide="ignore", invalid="ignore"):
-            shares = (np.where(step > 0, 1.0 + MARGIN, -MARGIN) - start) / step
-        return (inner + np.min(np.where(step == 0, np.inf, shares)) * (outer - inner))[None]
+            fractions = (np.where(step > 0, 1.0 + MARGIN, -MARGIN) - start) / step
+        return (inner + np.min(np.where(step == 0, np.inf, fractions)) * (outer - inner))[None]
 
     def same(self, one: Array, other: Array) -> bool:
         """Whether two states are the same up to rounding."""
@@ -115,34 +115,28 @@ class Limits:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Domain:
-    """Fundamental domain, from `share` = 0 near the saddle to 1 at the image; the distance grows geometrically."""
+    """Fundamental domain, from `fraction` = 0 near the saddle to 1 at the image; the distance grows geometrically."""
 
     point: Array
     reach: Array
     growth: float
     mismatch: Array
 
-    def __call__(self, share: Array) -> Array:
-        along = self.growth ** (share[:, None] - 1.0) * self.reach
-        return self.point + along + share[:, None] * self.mismatch
+    def __call__(self, fraction: Array) -> Array:
+        along = self.growth ** (fraction[:, None] - 1.0) * self.reach
+        return self.point + along + fraction[:, None] * self.mismatch
 
     @property
     def resolution(self) -> float:
-        """Smallest difference of `share` that is not lost in rounding."""
+        """Smallest difference of `fraction` that is not lost in rounding."""
         step = np.abs(self.reach).max() / self.growth * np.log(self.growth)
         return float(8.0 * np.finfo(float).eps * np.abs(self.point).max() / step) + 1e-12
 
 
 def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, ManifoldEnd]:
-    """Join the images of a domain to a curve until it is long enough, leaves the region, or converges to a point.
-
-    Returns
-    -------
-    curve : array (count, 2)
-    end : ManifoldEnd
-    """
-    shares = np.linspace(0.0, 1.0, _SEEDS)
-    states = domain(shares)
+    """Join the images of a domain to a curve (count, 2) until it is long enough, leaves the region, or converges."""
+    fractions = np.linspace(0.0, 1.0, _SEEDS)
+    states = domain(fractions)
     curve = [domain.point[None], states]
     if not limits.inside(np.concatenate(curve)).all():
         return domain.point[None], ManifoldEnd.SADDLE_OUTSIDE
@@ -152,12 +146,12 @@ def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, Manifol
     extent = 0.0
     for count in range(1, _MOST_IMAGES + 1):
         before = curve[-1][-2]
-        shares, states = _image(domain, images, count, (shares, images(states, 1)), before, remaining, limits)
+        fractions, states = _image(domain, images, count, (fractions, images(states, 1)), before, remaining, limits)
         kept = limits.thinned(states)
-        shares, states = shares[kept], states[kept]
+        fractions, states = fractions[kept], states[kept]
         joined = np.concatenate([curve[-1][-1:], states[limits.same(states[0], curve[-1][-1]) :]])
         room = max(2, _MOST_VERTICES - vertices)
-        if shares[-1] < 1.0 or not limits.inside(states).all() or _length(joined) >= remaining or len(joined) > room:
+        if fractions[-1] < 1.0 or not limits.inside(states).all() or _length(joined) >= remaining or len(joined) > room:
             piece, end = limits.cut(joined, remaining, room)
             return np.concatenate([*curve, piece[1:]]), end
         curve.append(joined[1:])
@@ -181,16 +175,16 @@ def _image(
 
     Every new vertex is an image of a point of the domain; `before` is the point of the curve before the image begins.
     """
-    shares, states = known
+    fractions, states = known
     while True:
         needed = limits.needed(states, _THINNING * remaining)
-        shares, states = shares[:needed], states[:needed]
-        coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(shares) > domain.resolution)
+        fractions, states = fractions[:needed], states[:needed]
+        coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(fractions) > domain.resolution)
         if not coarse.any() or len(states) > _MOST_VERTICES:
-            return shares, states
-        middle = 0.5 * (shares[:-1] + shares[1:])[coarse]
+            return fractions, states
+        middle = 0.5 * (fractions[:-1] + fractions[1:])[coarse]
         places = 1 + np.flatnonzero(coarse)
-        shares = np.insert(shares, places, middle)
+        fractions = np.insert(fractions, places, middle)
         states = np.insert(states, places, images(domain(middle), count), axis=0)
 
 

@@ -27,21 +27,20 @@ from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.basins.fractions import cell_findings, with_fractions
-from vibrokit.structure.basins.grid import BasinGrid
+from vibrokit.structure.basins.grid import BasinGrid, cell_findings, with_fractions
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, grow_manifolds
-from vibrokit.structure.regions import frame_of, lies_in, search_region, states_at
+from vibrokit.structure.scales import frame_of, lies_in, search_region, states_at
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_FOLDS = 30  # e-foldings of the linear damping that a transient is given
+_FOLDS = 30  # e-foldings of the linear damping for a transient
 _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
-_LIFETIMES = 5  # of chaotic transients that a cell is given
+_LIFETIMES = 5  # of chaotic transients for a cell
 _SEARCH_SETTLING = 1e-3
-_MOST_STEPS = 8192  # beyond which locating contacts is as fast
+_MOST_STEPS = 8192  # above this, locating contacts is as fast
 
 Array = NDArray[np.float64]
 
@@ -177,7 +176,7 @@ class _Finder:
         starts = _starts(self.osc, self.searched, self.request.starts, self.rng)
         self.search.run(starts, self.budget, self.budget >= self.wait)
         if not self.search.attractors:
-            raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.budget < self.wait))
+            raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
         self._order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
             raise StructureError(_none_inside(self.region, self.attractors))
@@ -206,13 +205,13 @@ class _Finder:
 
     @property
     def classifier(self) -> BasinClassifier:
-        """What finds the attractor that a state leads to."""
+        """Finds the attractor that a state leads to."""
         return BasinClassifier(
             self.osc, self.attractors, self.frame, self.tolerance, self.budget, self.stepper, self.executor
         )
 
     def _find_basins(self) -> None:
-        """Classify every cell of the grid, and note the basin fraction of each attractor."""
+        """Classify every cell of the grid, and set the basin fraction of each attractor."""
         request = self.request
         grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
         try:
@@ -234,18 +233,16 @@ class _Finder:
         saddles = {n: s for n, s in enumerate(self.saddle_search.saddles) if s.kind in ("saddle", "flip saddle")}
         with stage("manifolds", unit=BRANCHES, total=sum(map(branch_count, saddles.values()))):
             for index, saddle in saddles.items():
-                grown: list[Manifold] = []
+                known = self.manifolds
                 try:
-                    branches = grow_manifolds(
+                    for branch in grow_manifolds(
                         self.osc, index, saddle,
                         region=self.frame, stepper=self.request.stepper, executor=self.executor,
-                    )  # fmt: skip
-                    grown.extend(branches)
+                    ):  # fmt: skip
+                        self.manifolds += (branch,)
                 except StructureError as error:
-                    grown = []
+                    self.manifolds = known
                     self.without_manifolds.append(Finding.of(Code.NO_MANIFOLDS, saddle=index, reason=str(error)))
-                finally:
-                    self.manifolds += tuple(grown)
 
     def structure(self, work: Work) -> Structure:
         """Return the record of all that was found."""
@@ -291,7 +288,7 @@ def _survival_finding(survival: Survival) -> Finding:
 
 
 def _wait(osc: Oscillator) -> int:
-    """Periods that a transient is given, by the damping."""
+    """Return the periods that a transient needs, by the damping."""
     rate = osc.damping_ratio * osc.natural_frequency
     if rate == 0 and osc.model.undamped:
         raise StructureError(
@@ -310,9 +307,9 @@ def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.ra
     return states_at(osc, region.cell_centres(counts) + shift)
 
 
-def _nothing_found(search: Search, region: Region, budget: int, hasty: bool) -> str:
-    """Return why there is no structure, and what to change; `hasty`: the budget is less than the damping requires."""
-    advice = "raise budget" if hasty else "widen the region or raise budget"
+def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> str:
+    """Return why there is no structure, and what to change; `wait` is the budget that the damping requires."""
+    advice = "raise budget" if budget < wait else "widen the region or raise budget"
     if search.diverged > search.starts / 2:
         advice = "most motions grow without bound; narrow the region, or check the signs of the forces"
     return (

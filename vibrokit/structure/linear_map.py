@@ -1,6 +1,6 @@
 """The flow linearised along trajectories: images, derivatives and covariances of many states at once.
 
-This is the one place that knows how the variational flows lay out their numbers.
+Only this module depends on the layout of the states of the variational flows.
 """
 
 from __future__ import annotations
@@ -23,30 +23,17 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearMap:
-    """The flow over some time from each of some states. NaN where numbers went out of range.
+    """The flow over some time from each of some states; NaN where the motion diverged."""
 
-    Attributes
-    ----------
-    images : array (count, n)
-    derivatives : array (count, n, n)
-        M, derivative of the image in the state.
-    """
-
-    images: Array
-    derivatives: Array
+    images: Array  # (count, n)
+    derivatives: Array  # (count, n, n): M, derivative of the image in the state
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GaussianMap(LinearMap):
-    """The same under weak noise: a state goes to a normal distribution about its image.
+    """The same under weak noise, which spreads the image of a state to a normal distribution about it."""
 
-    Attributes
-    ----------
-    covariances : array (count, n, n)
-        C, covariance about the image per unit D.
-    """
-
-    covariances: Array
+    covariances: Array  # (count, n, n): C, covariance about the image per unit D
 
     def composed(self) -> tuple[Array, Array]:
         """Return M and C over all rows, each of which begins where the one before ends."""
@@ -59,41 +46,21 @@ class GaussianMap(LinearMap):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HamiltonianMap:
-    """The flow of Hamilton's equations over some time from each of some (q, p). NaN where numbers went out of range.
+    """The flow of Hamilton's equations over some time from each of some (q, p); NaN where the motion diverged."""
 
-    Attributes
-    ----------
-    images : array (count, 2n)
-    derivatives : array (count, 2n, 2n)
-    actions : array (count,)
-        Action of each trajectory.
-    """
-
-    images: Array
-    derivatives: Array
-    actions: Array
+    images: Array  # (count, 2n)
+    derivatives: Array  # (count, 2n, 2n)
+    actions: Array  # (count,), of the trajectories
 
 
 Map = TypeVar("Map", GaussianMap, HamiltonianMap)
 
 
 def linear_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int = 1, **over: Any) -> LinearMap:
-    """Linearise the flow from states.
+    """Linearize the flow from states (count, n) over some intervals, each from section to section by default.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    states : array (count, n)
-    stepper : Stepper
-    intervals : int
-        How many intervals to follow, each from section to section unless `interval` is given.
-    **over
-        `start_time`, `interval` and `executor` as for `run_ensemble`.
-
-    Raises
-    ------
-    StepperError
-        The stepper cannot integrate the variational equations of this scene.
+    `over` are `start_time`, `interval` and `executor` of `run_ensemble`. A StepperError is raised if the stepper cannot
+    integrate the variational equations of this scene.
     """
     count, n = states.shape
     found = _ends(osc, Flow.STATE_VARIATIONAL, stepper, [states, _identities(count, n)], intervals, over)
@@ -101,19 +68,12 @@ def linear_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int 
 
 
 def gaussian_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int = 1, **over: Any) -> GaussianMap:
-    """Linearise the flow with the covariance that noise adds; parameters as in `linear_map`.
+    """Linearize the flow with the covariance that noise adds; as `linear_map`, with a SceneError if there is no noise.
 
     C is integrated as C′ = A C + C Aᵀ + a, with A = ∂b/∂q. Hamilton's equations at p = 0 also give C, as a block C M⁻ᵀ
-    of their derivative, but M⁻ᵀ grows as fast as M decays and buries C in rounding errors. Over one period of
+    of their derivative, but M⁻ᵀ grows as fast as M decays, so that C is lost in rounding errors. Over one period of
     ``hertz-0.570`` at damping ratio 1, from x = 0.53 and v = −0.04, C from them has a relative error of 6e-9, and
     3e-16 here; the time is the same within a tenth. Here C is also symmetric and positive, over any time.
-
-    Raises
-    ------
-    SceneError
-        The scene has no noise.
-    StepperError
-        The stepper cannot integrate these equations of this scene.
     """
     count, n = states.shape
     rows, columns = np.triu_indices(n)
@@ -127,24 +87,9 @@ def gaussian_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: in
 def gaussian_pieces(
     osc: Oscillator, point: Array, stepper: Stepper, pieces: int, count: int
 ) -> tuple[Array, GaussianMap]:
-    """Linearise along the trajectory from one point of the section, in pieces of a section interval.
+    """Linearize along the trajectory from a point of the section, in `count` pieces, `pieces` to a section interval.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    point : array (n,)
-    stepper : Stepper
-    pieces : int
-        Pieces in a section interval.
-    count : int
-        Pieces in all.
-
-    Returns
-    -------
-    nodes : array (count + 1, n)
-        Where the pieces begin, and where the last one ends.
-    GaussianMap
-        Of each piece.
+    Returns the nodes (count + 1, n), where the pieces begin and the last one ends, and the map of each piece.
     """
     interval = osc.section_interval / pieces
     nodes, parts = [point], list[GaussianMap]()
@@ -156,7 +101,7 @@ def gaussian_pieces(
 
 
 def hamiltonian_map(osc: Oscillator, points: Array, stepper: Stepper, **over: Any) -> HamiltonianMap:
-    """Linearise Hamilton's equations over one interval from points (q, p), shape (count, 2n).
+    """Linearize Hamilton's equations over one interval from points (q, p), shape (count, 2n).
 
     `over` and the errors are those of `gaussian_map`.
     """

@@ -1,18 +1,10 @@
 """Stable and unstable manifolds of a periodic saddle, grown as curves of controlled curvature.
 
 A branch is the union of the images of a fundamental domain, the piece of its linear approximation from a point near the
-saddle to the image of that point (You, Kostelich & Yorke 1991). Where neighbouring points of an image are too far apart
-or the angle between chords is too large, points are inserted into the domain and mapped from there (Hobson 1993), so
-that no point is interpolated. The criterion for the angle is that of Krauskopf & Osinga (1998).
-
-References
-----------
-Z. You, E. J. Kostelich and J. A. Yorke, "Calculating stable and unstable manifolds", *International Journal of
-Bifurcation and Chaos* 1 (1991) 605–623.
-D. Hobson, "An efficient method for computing invariant manifolds of planar maps", *Journal of Computational Physics*
-104 (1993) 14–22.
-B. Krauskopf and H. Osinga, "Growing 1D and quasi-2D unstable manifolds of maps", *Journal of Computational Physics* 146
-(1998) 404–419.
+saddle to the image of that point (You, Kostelich & Yorke, *Int. J. Bifurcation Chaos* 1, 605, 1991). Where neighbouring
+points of an image are too far apart or the angle between chords is too large, points are inserted into the domain and
+mapped from there (Hobson, *J. Comput. Phys.* 104, 14, 1993), so that no point is interpolated. The criterion for the
+angle is that of Krauskopf & Osinga (*J. Comput. Phys.* 146, 404, 1998).
 """
 
 from __future__ import annotations
@@ -39,16 +31,16 @@ from vibrokit.progress import advance
 from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.autonomous import refine_equilibrium
 from vibrokit.structure.curves import Domain, Limits, grow
-from vibrokit.structure.equilibria import refine_equilibrium
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
 BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
-_START = 1e-6  # extent of the domain from the saddle, as a share of the region
-_CLOSE = 1e-9  # largest error of the saddle, as a share of the region
+_START = 1e-6  # extent of the domain from the saddle, relative to the region
+_CLOSE = 1e-9  # largest error of the saddle, relative to the region
 _MOST_STEPS = 1024  # of an ensemble in a free oscillation, above which located contacts are no slower
 _PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
 _NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
@@ -59,41 +51,25 @@ _WEAKEST = 1e-8  # smallest multiplier, relative to the other one, that rounding
 Array = NDArray[np.float64]
 
 
-def preimages(
-    osc: Oscillator,
-    states: Array,
-    periods: int = 1,
-    *,
-    stepper: Stepper | None = None,
-    interval: float | None = None,
-    executor: concurrent.futures.Executor | None = None,
-) -> Array:
-    """Map states of the section backwards in time.
+@dataclasses.dataclass(frozen=True, eq=False)
+class FlowMap:
+    """A power of the section map, or of its inverse if the flow is the reversed one."""
 
-    Parameters
-    ----------
-    osc : Oscillator
-    states : array (count, n)
-        States (x, v), extra noise states after.
-    periods : int
-        Forcing periods to go back; units of 2π/ω_n for a scene without forcing.
-    stepper : Stepper, optional
-    interval : float, optional
-        Length of a period (s), for scenes without forcing.
-    executor : concurrent.futures.Executor, optional
+    osc: Oscillator
+    stepper: Stepper
+    flow: Flow
+    periods: int = 1
+    interval: float | None = None  # of a period (s); that of the section by default
 
-    Returns
-    -------
-    array (count, n)
-        NaN where the motion diverged: backwards in time, damping adds energy.
-    """
-    flip = np.ones(np.shape(states)[1])
-    flip[1] = -1.0
-    chosen = stepper or ensemble_stepper(osc, Flow.STATE_REVERSED)
-    ended = run_ensemble(
-        osc, Flow.STATE_REVERSED, chosen, states * flip, periods, interval=interval, executor=executor
-    )  # fmt: skip
-    return np.where((ended.status == COMPLETED)[:, None], ended.states * flip, np.nan)
+    def __call__(self, states: Array, images: int = 1) -> Array:
+        """Return images of states (count, n); NaN where they diverged: backwards in time, damping adds energy."""
+        flip = np.ones(np.shape(states)[1])
+        if self.flow is Flow.STATE_REVERSED:
+            flip[1] = -1.0
+        ended = run_ensemble(
+            self.osc, self.flow, self.stepper, states * flip, images * self.periods, interval=self.interval
+        )  # fmt: skip
+        return np.where((ended.status == COMPLETED)[:, None], ended.states * flip, np.nan)
 
 
 def branch_count(saddle: Saddle) -> int:
@@ -116,42 +92,19 @@ def grow_manifolds(
 ) -> Iterator[Manifold]:
     """Grow both branches of the stable and the unstable manifold from each point of a saddle, one after another.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    saddle_index : int
-        Place of the saddle among those of the structure, kept in the result.
-    saddle : Saddle
-        A periodic orbit or an equilibrium with one stable and one unstable direction.
-    region : Region or ((x_min, x_max), (v_min, v_max))
-        Lengths are measured in units of its width and height; a branch ends where it leaves the region widened by
-        its own size on every side.
-    arc_length : float, optional
-        Length in the plane of x and v at which a branch is cut; by default 10 diagonals of the region.
-    stepper : Stepper, optional
-        Integrates the points; the saddle is refined with it too, because a coarse stepper moves the saddle. By default
-        RK4 with four times the steps of ensembles, or the stepper of single trajectories if that is no slower. On
-        ``hertz-0.570``, against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within
-        2e-4 of the curve and all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
-    spacing : float
-        Largest distance of neighbouring points, as a share of the region's size.
-    bend : float
-        Largest angle (rad) between neighbouring chords longer than a hundredth of `spacing`. The product of an angle
-        and its longer chord is kept below half of ``spacing * bend``.
-    stable : sequence of bool
-        Which manifolds: True for the stable one, False for the unstable one.
-    executor : concurrent.futures.Executor, optional
-        Grows the branches; threads of this process by default.
+    They come by point of the saddle, then as in `stable` (True for the stable manifold), then against and along the
+    eigenvector, which points to larger x. A branch is cut at `arc_length`, by default 10 diagonals of the region, and
+    where it leaves the region widened by its own size on every side. Neighbouring points are at most `spacing` apart,
+    in units of the region's width and height; the angle between neighbouring chords longer than a hundredth of that is
+    at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``.
 
-    Yields
-    ------
-    Manifold
-        By point of the saddle, then as in `stable`, then against and along the eigenvector, which points to larger x.
+    The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is RK4 with
+    four times the steps of ensembles, or the stepper of single trajectories if that is no slower. On ``hertz-0.570``,
+    against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within 2e-4 of the curve and
+    all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
 
-    Raises
-    ------
-    StructureError
-        The saddle does not have one stable and one unstable direction, or there are more states than x and v.
+    A StructureError is raised if the saddle does not have one stable and one unstable direction, or if there are more
+    states than x and v.
     """
     _check(osc, saddle, spacing, bend, arc_length)
     frame = Region.of(region)
@@ -190,25 +143,6 @@ def _check(osc: Oscillator, saddle: Saddle, spacing: float, bend: float, arc_len
             raise StructureError(f"{name} must be {allowed}, got {shown(value)}.")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Map:
-    """A power of the section map or of its inverse, along which a manifold grows away from the saddle."""
-
-    osc: Oscillator
-    stepper: Stepper
-    backwards: bool
-    periods: int
-    interval: float
-
-    def __call__(self, states: Array, images: int = 1) -> Array:
-        """Return images of states; NaN where they diverged."""
-        count = images * self.periods
-        if self.backwards:
-            return preimages(self.osc, states, count, stepper=self.stepper, interval=self.interval)
-        ended = run_ensemble(self.osc, Flow.STATE, self.stepper, states, count, interval=self.interval)
-        return np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
-
-
 def _branch(
     osc: Oscillator,
     saddle_index: int,
@@ -231,10 +165,10 @@ def _branch(
         interval, periods = min(osc.section_interval, math.log(_MOST_GROWTH) / rate), 1
     else:
         interval, periods = osc.section_interval, saddle.period
-        point = _fixed_point(_Map(osc, chosen, backwards, periods, interval), here, limits)
+        point = _fixed_point(FlowMap(osc, chosen, flow, periods, interval), here, limits)
     repeats = math.ceil(math.log(_LEAST_GROWTH) / (rate * interval * periods))
     repeats += repeats % 2 if multiplier < 0 else 0
-    images = _Map(osc, chosen, backwards, periods * repeats, interval)
+    images = FlowMap(osc, chosen, flow, periods * repeats, interval)
     domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
     return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
 
@@ -285,9 +219,9 @@ def _direction(here: _Linearised, backwards: bool, limits: Limits) -> tuple[floa
     return float(multipliers[chosen]), vector if vector[0] > 0 or (vector[0] == 0 < vector[1]) else -vector
 
 
-def _fixed_point(images: _Map, here: _Linearised, limits: Limits) -> Array:
-    """Fixed point of the map that the curve grows along, by Newton's method with the derivative of a more exact map."""
-    derivative = np.linalg.inv(here.derivative) if images.backwards else here.derivative
+def _fixed_point(images: FlowMap, here: _Linearised, limits: Limits) -> Array:
+    """Fixed point of the map that the curve grows along, by Newton's method with the derivative of a finer map."""
+    derivative = np.linalg.inv(here.derivative) if images.flow is Flow.STATE_REVERSED else here.derivative
     jacobian = derivative - np.eye(2)
 
     def evaluate(points: Array) -> Evaluation:
@@ -304,7 +238,7 @@ def _fixed_point(images: _Map, here: _Linearised, limits: Limits) -> Array:
     return point
 
 
-def _domain(images: _Map, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:
+def _domain(images: FlowMap, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:
     """The piece of the linear manifold from a point to its image; a shorter one where rounding requires it."""
     reach = _START * direction
     if _START / growth < _NEAREST:

@@ -14,38 +14,19 @@ Array = NDArray[np.float64]
 
 
 class Evaluation(NamedTuple):
-    """The equations at some places.
+    """The equations at some places, and what the caller wants returned with each root."""
 
-    Attributes
-    ----------
-    residuals : array (count, n)
-        What is to be zero; NaN where it does not exist.
-    jacobians : array (count, n, n)
-        Its derivatives.
-    attached : array (count, …)
-        What the caller wants returned with each root.
-    """
-
-    residuals: Array
-    jacobians: Array
-    attached: NDArray[Any]
+    residuals: Array  # (count, n); NaN where they do not exist
+    jacobians: Array  # (count, n, n)
+    attached: NDArray[Any]  # (count, …)
 
 
 class Roots(NamedTuple):
-    """Where the iteration ended.
+    """Where the iteration ended, and what was attached to each place."""
 
-    Attributes
-    ----------
-    places : array (count, n)
-    sizes : array (count,)
-        Norms of the residuals; NaN where the first residual was not finite.
-    attached : array (count, …)
-        What was attached to each place.
-    """
-
-    places: Array
-    sizes: Array
-    attached: NDArray[Any]
+    places: Array  # (count, n)
+    sizes: Array  # (count,), norms of the residuals; NaN where the first residual was not finite
+    attached: NDArray[Any]  # (count, …)
 
 
 def newton(
@@ -53,47 +34,35 @@ def newton(
     guesses: Array,
     *,
     iterations: int = 30,
-    least_share: float = 1.0,
+    least_fraction: float = 1.0,
     limited: Callable[[Array, Array], Array] = lambda places, steps: steps,
     converged: Callable[[Array, Array], NDArray[np.bool_]] = lambda places, sizes: sizes == 0,
 ) -> Roots:
     """Improve guesses (count, n) by Newton steps for as long as the residual falls.
 
-    A step that does not make the residual smaller is taken back. With `least_share` below 1 a quarter of it is tried
-    next, and each success doubles the share, up to the whole step; otherwise that start has ended.
-
-    Parameters
-    ----------
-    evaluate : callable
-        Takes places (count, n), of those starts that have not ended.
-    guesses : array (count, n)
-    iterations : int
-        Most evaluations.
-    least_share : float
-        Smallest share of a Newton step to try.
-    limited : callable, optional
-        Takes places and steps (count, n); returns the steps, shortened where they are too long.
-    converged : callable, optional
-        Takes places and sizes of the residuals; returns which need no further step. By default the iteration goes on
-        until rounding keeps the residual from falling.
+    There are `iterations` evaluations at most. A step that does not reduce the residual is taken back, and a quarter of
+    it is tried next, down to the fraction `least_fraction` of a Newton step; each success doubles the fraction, up to
+    the whole step. `limited` shortens steps that are too long for their places. `converged` tells from places and sizes
+    of the residuals which need no further step; by default the iteration goes on until rounding keeps the residual from
+    falling.
     """
     places = np.array(guesses, dtype=float)
     now = evaluate(places)
     sizes = np.linalg.norm(now.residuals, axis=1)
-    attached, shares = now.attached.copy(), np.ones(len(places))
+    attached, fractions = now.attached.copy(), np.ones(len(places))
     steps = limited(places, _steps(now))
     going = np.isfinite(sizes)
     for _ in range(iterations - 1):
-        going &= ~converged(places, sizes) & np.isfinite(steps).all(axis=1) & (shares >= least_share)
+        going &= ~converged(places, sizes) & np.isfinite(steps).all(axis=1) & (fractions >= least_fraction)
         active = np.flatnonzero(going)
         if not len(active):
             break
-        tried = places[active] + shares[active, None] * steps[active]
+        tried = places[active] + fractions[active, None] * steps[active]
         new = evaluate(tried)
         count(newton_iterations=len(active))
         new_sizes = np.linalg.norm(new.residuals, axis=1)
         better = new_sizes < sizes[active]  # never where it is not finite
-        shares[active] = np.where(better, np.minimum(1.0, 2 * shares[active]), shares[active] / 4)
+        fractions[active] = np.where(better, np.minimum(1.0, 2 * fractions[active]), fractions[active] / 4)
         moved = active[better]
         places[moved], sizes[moved], attached[moved] = tried[better], new_sizes[better], new.attached[better]
         steps[moved] = limited(tried, _steps(new))[better]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import linear_map
@@ -29,29 +30,34 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Orbit:
-    """A fixed point of the section map's power, with its linearisation.
+    """A closed orbit with its linearization; of this class itself, a fixed point of the section map's power."""
 
-    Attributes
-    ----------
-    point : array (n,)
-    period : int
-    monodromy : array (n, n)
-        Derivative of the map over `period` periods.
-    residual : float
-        Distance between the point and its image.
-    """
+    kind: ClassVar[str] = "periodic"
 
-    point: Array
-    period: int
-    monodromy: Array
-    residual: float
+    point: Array  # (n,)
+    period: int  # in forcing periods
+    duration: float  # time after which it repeats (s)
+    monodromy: Array  # (n, n), derivative of the flow over the duration
+    residual: float  # distance between the point and its image
+
+    def refined(self, osc: Oscillator, stepper: Stepper) -> Orbit:
+        """Return the orbit that Newton's method finds from here with another stepper; may raise StructureError."""
+        return refine_orbit(osc, self.point, self.period, stepper)
+
+    def moved_by_tightening(self, osc: Oscillator, stepper: Stepper, times: int) -> float:
+        """Return how far its point moves when the stepper is refined so many times; infinite if the orbit vanishes."""
+        furthest = 0.0
+        for _ in range(times):
+            stepper = stepper.refined()
+            try:
+                furthest = max(furthest, float(np.linalg.norm(self.refined(osc, stepper).point - self.point)))
+            except StructureError:
+                return math.inf
+        return furthest
 
 
 def section_equations(
-    osc: Oscillator,
-    period: int,
-    stepper: Stepper,
-    executor: concurrent.futures.Executor | None = None,
+    osc: Oscillator, period: int, stepper: Stepper, executor: concurrent.futures.Executor | None = None
 ) -> Callable[[Array], Evaluation]:
     """Return the equations of a fixed point of the section map's power; attached is the derivative of that map."""
 
@@ -63,15 +69,9 @@ def section_equations(
 
 
 def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
-    """Refine a periodic point by Newton's method until the residual no longer falls.
-
-    Raises
-    ------
-    StructureError
-        The iteration did not converge to a periodic point.
-    """
-    roots = newton(section_equations(osc, period, stepper), guess[None])
-    orbit = Orbit(roots.places[0], period, roots.attached[0], float(roots.sizes[0]))
+    """Refine a periodic point by Newton's method until the residual stays; StructureError where it stays large."""
+    (point,), (residual,), (monodromy,) = newton(section_equations(osc, period, stepper), guess[None])
+    orbit = Orbit(point, period, period * osc.section_interval, monodromy, float(residual))
     if not orbit.residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(guess))):
         raise StructureError(
             f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: the "
@@ -108,35 +108,14 @@ def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) ->
     return bool(nearest < tolerance * (size_of(osc) + np.abs(known).max()))
 
 
+def arrival_at(orbits: Mapping[int, Array], tolerance: float) -> Stop:
+    """Return the test that ends a trajectory within a distance in (x, v) of a point of orbits, given by label."""
+    points = np.concatenate([np.empty((0, 2)), *(points[:, :2] for points in orbits.values())])
+    labels = np.repeat(list(orbits), [len(points) for points in orbits.values()])
+    return Stop(points=points, point_labels=labels.astype(np.int64), tolerance=tolerance)
+
+
 def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:
     """Return the growth rates (s⁻¹) of multipliers over a duration; −∞ for a multiplier 0."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(multipliers) / duration, dtype=np.complex128)
-
-
-def moved_by_tightening(point: Array, refined: Callable[[Stepper], Array], stepper: Stepper, times: int) -> float:
-    """Return how far a point of an orbit moves when the integration is tightened.
-
-    Parameters
-    ----------
-    point : array (n,)
-    refined : callable
-        Returns the point that a stepper finds; raises StructureError where it finds no such orbit.
-    stepper : Stepper
-        The one that found the point.
-    times : int
-        How often the stepper is refined.
-
-    Returns
-    -------
-    float
-        The largest distance; infinite if a finer stepper finds no such orbit.
-    """
-    furthest, finer = 0.0, stepper
-    for _ in range(times):
-        finer = finer.refined()
-        try:
-            furthest = max(furthest, float(np.linalg.norm(refined(finer) - point)))
-        except StructureError:
-            return math.inf
-    return furthest

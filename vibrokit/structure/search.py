@@ -1,8 +1,9 @@
-"""The search for steady states: starts are followed until they recur; those that do not are followed for long."""
+"""The search for steady states: starts are followed until they recur; the others are followed for a long time."""
 
 from __future__ import annotations
 
 import concurrent.futures
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -10,33 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, UNSETTLED
+from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.survival import Survival
-from vibrokit.structure.attractors.bands import separate
-from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit, describe_wandering
-from vibrokit.structure.attractors.lyapunov import kind_of, lyapunov_exponent
-from vibrokit.structure.attractors.survival import follow, watch
-from vibrokit.structure.cycles import find_cycle
-from vibrokit.structure.orbits import EQUAL, least_period, refine_orbit, same_point, visited
+from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
+from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, survival_of
+from vibrokit.structure.autonomous import find_cycle
+from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
-"""Longest period of orbits that are looked for among all starts."""
-_LONGER_PERIOD = 256  # looked for among starts that settle slowly
+"""Longest period of orbits that are searched for among all starts."""
+_LONGER_PERIOD = 256  # of orbits that are searched for among starts that settle slowly
 _RECURRENCE = 1e-5
 _NEAR = 1e-3  # distance, relative to the motion, between an orbit and its approximation by a coarse stepper
 _LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
 _FIRST_ROUND = 64  # periods; doubled from round to round
-_WATCHED = 64  # starts that are followed for long
+_WATCHED = 64  # starts that are followed for a long time
 _LEAST_WATCHED = 16
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent
@@ -52,39 +51,17 @@ _LONGEST_CYCLE = 50  # units of 2π/ω_n
 Array = NDArray[np.float64]
 
 
+@dataclasses.dataclass(eq=False)
 class Search:
-    """Finds the steady states of a scene, one after another; an interrupt leaves those found so far.
+    """Finds the steady states of a scene, one after another; an interrupt leaves those found so far."""
 
-    Parameters
-    ----------
-    osc : Oscillator
-    tolerance : float
-        Distance at which a state counts as settled on a known orbit.
-    stepper : Stepper
-        Of ensembles.
-    orbit_stepper : Stepper
-        Of orbits.
-    executor : concurrent.futures.Executor, optional
+    osc: Oscillator
+    tolerance: float  # distance at which a state counts as settled on a known orbit
+    stepper: Stepper  # of ensembles
+    orbit_stepper: Stepper
+    executor: concurrent.futures.Executor | None
 
-    Attributes
-    ----------
-    attractors : list of Attractor
-    survival : tuple of Survival
-    starts, diverged : int
-        Number of starts, and of those that diverged.
-    findings : list of Finding
-    """
-
-    def __init__(
-        self,
-        osc: Oscillator,
-        tolerance: float,
-        stepper: Stepper,
-        orbit_stepper: Stepper,
-        executor: concurrent.futures.Executor | None = None,
-    ) -> None:
-        self.osc, self.tolerance = osc, tolerance
-        self.stepper, self.orbit_stepper, self.executor = stepper, orbit_stepper, executor
+    def __post_init__(self) -> None:
         self.attractors: list[Attractor] = []
         self.survival: tuple[Survival, ...] = ()
         self.starts = self.diverged = 0
@@ -93,14 +70,9 @@ class Search:
     def run(self, states: Array, wait: int, patient: bool) -> None:
         """Follow the states (count, n) until each recurs, diverges, or has not settled for a long time.
 
-        Parameters
-        ----------
-        states : array (count, n)
-        wait : int
-            Periods that a transient is given; starts are followed for twice as long, for some settle slowly.
-        patient : bool
-            Whether that is as long as the damping requires. If not, and nothing has settled, motion that goes on is
-            not evidence of an attractor.
+        Starts are followed for twice the periods `wait` that a transient is given, because some settle slowly.
+        `patient` is whether that is as long as the damping requires. If not, and nothing has settled, motion that goes
+        on is not evidence of an attractor.
         """
         self.starts = len(states)
         with stage("attractors", unit="starts", total=self.starts):
@@ -118,17 +90,18 @@ class Search:
 
     @property
     def _many(self) -> int:
-        """Number of starts that are followed for long: fewer for steppers that integrate them one by one."""
+        """Number of starts that are followed for a long time: fewer for steppers without lanes."""
         return _WATCHED if isinstance(self.stepper, RK4) else _LEAST_WATCHED
+
+    def _follow(self, states: Array, periods: int, stepper: Stepper) -> tuple[Ensemble, NDArray[np.int64]]:
+        """Follow states until they reach a known attractor, or for some periods."""
+        stop = arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.tolerance)
+        return follow(self.osc, states, stop, periods, stepper, self.executor)
 
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit and those that diverged."""
-        known = [attractor.points for attractor in self.attractors]
-        ended, labels = follow(
-            self.osc, states, known,
-            tolerance=self.tolerance, periods=periods, stepper=self.stepper, executor=self.executor,
-        )  # fmt: skip
-        self.diverged += int(np.sum(labels == LEFT))
+        ended, labels = self._follow(states, periods, self.stepper)
+        self.diverged += int(np.sum(labels == ESCAPED))
         return ended.states[labels == UNSETTLED]
 
     def _known(self, point: Array, tolerance: float) -> bool:
@@ -195,7 +168,7 @@ class Search:
         if np.sort(np.abs(np.linalg.eigvals(cycle.monodromy)))[-2:][0] >= 1:
             return False
         if not any(_is_on(orbit, cycle.point) for orbit in known):
-            self.attractors.append(describe_cycle(self.osc, cycle, self.orbit_stepper))
+            self.attractors.append(describe_orbit(self.osc, cycle, self.orbit_stepper))
         return True
 
     def _watch(self, states: Array) -> None:
@@ -203,12 +176,9 @@ class Search:
         watched = states[np.linspace(0, len(states) - 1, min(self._many, len(states))).astype(int)]
         survivors = watched[:0]
         for stepper in (self.stepper, self.stepper.refined()):
-            points = [attractor.points for attractor in self.attractors]
-            survival, survivors, _ = watch(
-                self.osc, watched, points,
-                tolerance=self.tolerance, periods=_WATCH, stepper=stepper, executor=self.executor,
-            )  # fmt: skip
-            self.survival = (*self.survival, survival)
+            ended, labels = self._follow(watched, _WATCH, stepper)
+            survivors = ended.states[labels == UNSETTLED]
+            self.survival = (*self.survival, survival_of(ended, labels, _WATCH, stepper))
         if self.survival[0].survivors and len(survivors):
             self._add_wandering(self._add_orbits(survivors, _LONGER_PERIOD))
         elif self.survival[0].survivors:

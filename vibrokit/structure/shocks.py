@@ -101,56 +101,19 @@ def shape_stability(
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Moment:
-    """A state of the attractor, and how it is reached.
-
-    Attributes
-    ----------
-    origin : array (n,)
-        A point of the attractor on the section.
-    lag : float
-        Time from there to the state (s).
-    state : array (n,)
-    time : float
-        Of the state after the section (s): the lag; 0 in an autonomous scene.
-    """
-
-    origin: Array
-    lag: float
-    state: Array
-    time: float
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
 class _Rays:
-    """Straight lines from the attractor: index of the moment at which each starts, and its angle."""
+    """Straight lines from states of an attractor."""
 
-    moments: list[_Moment]
-    starts: NDArray[np.intp]
-    angles: Array
-
-    @classmethod
-    def from_each(cls, moments: list[_Moment], angles: Array) -> _Rays:
-        """Return rays of all angles at every moment."""
-        return cls(moments, np.repeat(np.arange(len(moments)), len(angles)), np.tile(angles, len(moments)))
+    origins: Array  # (count, n), points of the attractor on the section
+    lags: Array  # (count,), times from these to the states (s)
+    states: Array  # (count, n)
+    angles: Array  # (count,)
 
     def __len__(self) -> int:
-        return len(self.starts)
-
-    @property
-    def states(self) -> Array:
-        return np.array([moment.state for moment in self.moments])[self.starts]
-
-    @property
-    def times(self) -> Array:
-        return np.array([moment.time for moment in self.moments])[self.starts]
+        return len(self.angles)
 
     def chosen(self, which: Any) -> _Rays:
-        return _Rays(self.moments, self.starts[which], self.angles[which])
-
-    def only(self) -> tuple[_Moment, float]:
-        """Return the start of a single ray, and its angle."""
-        return self.moments[int(self.starts[0])], float(self.angles[0])
+        return _Rays(self.origins[which], self.lags[which], self.states[which], self.angles[which])
 
 
 class _KickSearch:
@@ -163,8 +126,8 @@ class _KickSearch:
 
     def smallest(self, angles: Array, width: float, phases: int) -> Shock | None:
         """Try all times and angles first, then refine around the best; `width` is the angle between two."""
-        moments, step = self._moments(phases)
-        rays = _Rays.from_each(moments, angles)
+        starts, step = self._starts(phases)
+        rays = self._rays(starts, angles)
         low, high, limits = self._bracket(rays, np.zeros(len(rays)), np.full(len(rays), self.reach))
         if not np.isfinite(high).any():
             return None
@@ -172,8 +135,8 @@ class _KickSearch:
         for _ in range(_ZOOMS if self.attractor.repeats else 0):
             width, step = width / _ZOOM, step / _ZOOM
             offsets = np.arange(-_ZOOM, _ZOOM + 1)
-            moment, angle = best[1].only()
-            rays = _Rays.from_each(self._near(moment, step * offsets), np.unique(angle + width * offsets))
+            near = self._near(best[1].origins[0], float(best[1].lags[0]), step * offsets)
+            rays = self._rays(near, np.unique(best[1].angles[0] + width * offsets))
             around = best[2] * (1 + 1e-9), 0.5 * best[2]
             low, high, limits = self._bracket(rays, np.full(len(rays), around[1]), np.full(len(rays), around[0]))
             if np.isfinite(high).any():
@@ -181,43 +144,51 @@ class _KickSearch:
                 error = max(best[2] - found[2], found[3])
                 best = (found[0], found[1], found[2], error) if found[2] <= best[2] else best
         target, ray, size, error = best
-        moment, _ = ray.only()
-        kick = self._kick(ray.angles, np.array([size]))[0]
-        return Shock(self.attractor.label, target, size, error, kick, moment.state, moment.time)
+        (kick,) = self._kick(ray.angles, np.array([size]))
+        return Shock(self.attractor.label, target, size, error, kick, ray.states[0], float(self._times(ray)[0]))
 
-    def _moments(self, phases: int) -> tuple[list[_Moment], float]:
-        """Return states all along the attractor, and the time between two."""
+    def _starts(self, phases: int) -> tuple[list[tuple[Array, float]], float]:
+        """Return points of the attractor and lags that lead to states all along it, and the time between two."""
         attractor = self.attractor
         if attractor.kind == "equilibrium":
-            return [_Moment(attractor.points[0], 0.0, attractor.points[0], 0.0)], 0.0
+            return [(attractor.points[0], 0.0)], 0.0
         step = (attractor.duration if attractor.kind == "limit cycle" else self.osc.section_interval) / phases
         points = attractor.points[: attractor.period or _SETS]
-        return [self._moment(point, k * step) for point in points for k in range(phases)], step
+        return [(point, k * step) for point in points for k in range(phases)], step
 
-    def _near(self, moment: _Moment, offsets: Array) -> list[_Moment]:
-        """Return the same motion a little earlier and later, within the period of the moment."""
+    def _near(self, origin: Array, lag: float, offsets: Array) -> list[tuple[Array, float]]:
+        """Return the same motion a little earlier and later, within the period."""
         kind, duration = self.attractor.kind, self.attractor.duration
         if kind == "equilibrium":
-            return [moment]
+            return [(origin, lag)]
         if kind == "limit cycle":
-            lags = (moment.lag + offsets) % duration
+            lags = (lag + offsets) % duration
         else:
-            lags = np.unique(np.clip(moment.lag + offsets, 0.0, self.osc.section_interval * (1 - 1e-12)))
-        return [self._moment(moment.origin, float(lag)) for lag in lags]
+            lags = np.unique(np.clip(lag + offsets, 0.0, self.osc.section_interval * (1 - 1e-12)))
+        return [(origin, float(lag)) for lag in lags]
 
-    def _moment(self, origin: Array, lag: float) -> _Moment:
-        state = origin
-        if lag > 0:
-            ended = run_ensemble(self.osc, Flow.STATE, self.classifier.stepper, origin[None], interval=lag)
-            state = ended.states[0]
-        return _Moment(origin, lag, state, 0.0 if self.attractor.kind == "limit cycle" else lag)
+    def _rays(self, starts: list[tuple[Array, float]], angles: Array) -> _Rays:
+        """Return rays of all angles from the motion some lags after points of the attractor."""
+        origins, lags = np.array([origin for origin, _ in starts]), np.array([lag for _, lag in starts])
+        states = origins.copy()
+        for index in np.flatnonzero(lags > 0):
+            ended = run_ensemble(
+                self.osc, Flow.STATE, self.classifier.stepper, origins[[index]], interval=float(lags[index])
+            )  # fmt: skip
+            states[index] = ended.states[0]
+        every = np.repeat(np.arange(len(starts)), len(angles))
+        return _Rays(origins[every], lags[every], states[every], np.tile(angles, len(starts)))
+
+    def _times(self, rays: _Rays) -> Array:
+        """Return the times of the states after the section (s); these are 0 in an autonomous scene."""
+        return np.zeros(len(rays)) if self.attractor.kind == "limit cycle" else rays.lags
 
     def _kick(self, angles: Array, sizes: Array) -> Array:
         return np.stack([sizes * np.cos(angles) / self.osc.natural_frequency, sizes * np.sin(angles)], axis=1)
 
     def _limits(self, rays: _Rays, sizes: Array) -> NDArray[np.int64]:
         """Return the labels that states at some distance along the rays lead to."""
-        states, times = rays.states, rays.times
+        states, times = rays.states.copy(), self._times(rays)
         states[:, :2] += self._kick(rays.angles, sizes)
         limits = np.empty(len(rays), dtype=np.int64)
         for time in np.unique(times):
@@ -230,8 +201,7 @@ class _KickSearch:
 
     def _bracket(self, rays: _Rays, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.int64]]:
         """Return for each ray a size that is not fatal, the next one that is or infinity, and the label it leads to."""
-        shares = np.arange(1, _RADII + 1) / _RADII
-        sizes = low[:, None] + (high - low)[:, None] * shares
+        sizes = low[:, None] + (high - low)[:, None] * (np.arange(1, _RADII + 1) / _RADII)
         every = rays.chosen(np.repeat(np.arange(len(rays)), _RADII))
         limits = self._limits(every, sizes.ravel()).reshape(sizes.shape)
         fatal = self._fatal(limits)

@@ -18,19 +18,18 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import TRAJECTORIES, Progress, stage, working
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.autonomous import equilibrium_equations
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
-from vibrokit.structure.equilibria import equilibrium_equations
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, section_equations, visited
-from vibrokit.structure.regions import search_region, states_at
-from vibrokit.structure.scales import size_of
+from vibrokit.structure.scales import search_region, size_of, states_at
 from vibrokit.structure.validation import check_means, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 8  # times as many cells on a side as starts, in which turning points of the map are searched for
 _ITERATIONS = 60
-_LEAST_SHARE = 1e-3  # of a Newton step, below which a start has failed
+_LEAST_FRACTION = 1e-3  # of a Newton step, below which a start has failed
 _LONGEST_STEP = 0.25  # of the region's size
 _CONVERGED = 1e-9
 _APART = 1e-5  # of the region's size: largest distance between an orbit of the coarser map and the refined one
@@ -102,32 +101,21 @@ def unstable_orbits(
         )
     counts = pair("starts", starts, _MOST_STARTS)
     where = search_region(osc) if region is None else Region.of(region)
-    with working(progress, time_limit), stage("unstable orbits", unit=TRAJECTORIES):
-        return _unstable_orbits(osc, period, where, counts, stepper, classifier, executor)
-
-
-def _unstable_orbits(
-    osc: Oscillator,
-    period: int,
-    region: Region,
-    counts: tuple[int, int],
-    stepper: Stepper | None,
-    classifier: BasinClassifier | None,
-    executor: concurrent.futures.Executor | None,
-) -> tuple[Saddle, ...]:
     orbit_stepper = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
-    finer = (_FINER * counts[0], _FINER * counts[1])
-    turning = _turning_cells(osc, period, region, finer, stepper or ensemble_stepper(osc, Flow.STATE), executor)
-    starts = states_at(osc, np.concatenate([region.cell_centres(counts), turning]))
-    equations = equilibrium_equations(osc)
-    if not osc.autonomous:
-        equations = section_equations(osc, period, stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL), executor)
-    roots = _roots(osc, equations, starts, region.size)
     found = []
-    for orbit, points in _distinct(osc, roots, period, orbit_stepper, _APART * region.size):
-        if region.contains(points).any() and np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1:
-            limits = () if classifier is None else branch_limits(classifier, orbit)
-            found.append(describe_unstable(osc, orbit, orbit_stepper, limits))
+    with working(progress, time_limit), stage("unstable orbits", unit=TRAJECTORIES):
+        finer = (_FINER * counts[0], _FINER * counts[1])
+        turning = _turning_cells(osc, period, where, finer, stepper or ensemble_stepper(osc, Flow.STATE), executor)
+        guesses = states_at(osc, np.concatenate([where.cell_centres(counts), turning]))
+        equations = equilibrium_equations(osc)
+        if not osc.autonomous:
+            many = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
+            equations = section_equations(osc, period, many, executor)
+        roots = _roots(osc, equations, guesses, where.size)
+        for orbit, points in _distinct(osc, roots, period, orbit_stepper, _APART * where.size):
+            if where.contains(points).any() and np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1:
+                limits = () if classifier is None else branch_limits(classifier, orbit)
+                found.append(describe_unstable(osc, orbit, orbit_stepper, limits))
     return tuple(sorted(found, key=lambda saddle: tuple(saddle.points[0])))
 
 
@@ -167,7 +155,7 @@ def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Ar
         return np.asarray(sizes < _CONVERGED * (size_of(osc) + np.linalg.norm(places, axis=1)))
 
     places, sizes, _ = newton(
-        equations, starts, iterations=_ITERATIONS, least_share=_LEAST_SHARE, limited=limited, converged=converged
+        equations, starts, iterations=_ITERATIONS, least_fraction=_LEAST_FRACTION, limited=limited, converged=converged
     )
     return places[converged(places, sizes)]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
-import functools
 import json
 from collections.abc import Mapping
 from numbers import Integral, Real
@@ -25,13 +24,7 @@ _MOST_CELLS = 10**9
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """Arguments of `find_structure`.
-
-    Raises
-    ------
-    StructureError
-        One of them is not allowed.
-    """
+    """Arguments of `find_structure`; a StructureError is raised if one of them is not allowed."""
 
     region: Any
     cells: Any
@@ -81,24 +74,12 @@ def plain(arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {name: _plain(value) for name, value in arguments.items()}
 
 
-@functools.singledispatch
 def _plain(value: Any) -> Any:
-    return value
-
-
-@_plain.register
-def _(value: Region) -> Any:
-    return value.bounds.tolist()
-
-
-@_plain.register
-def _(value: Stepper) -> Any:
-    return name_of(value)
-
-
-@_plain.register(tuple)
-def _(value: tuple[Any, ...]) -> Any:
-    return list(value)
+    if isinstance(value, Region):
+        return value.bounds.tolist()
+    if isinstance(value, Stepper):
+        return name_of(value)
+    return list(value) if isinstance(value, tuple) else value
 
 
 def stepper_of(stepper: Stepper | str | None) -> Stepper | None:
@@ -107,38 +88,20 @@ def stepper_of(stepper: Stepper | str | None) -> Stepper | None:
 
 
 def seed_of(rng: int | np.random.Generator) -> int:
-    """Return a seed, or draw one from a generator.
-
-    Raises
-    ------
-    ParameterError
-        Neither a generator nor a whole number, 0 or more.
-    """
+    """Return a seed, or draw one from a generator; a ParameterError is raised for anything else."""
     generator = generator_from(rng)
     return int(rng) if isinstance(rng, Integral) else int(generator.integers(2**63))
 
 
 def whole(name: str, number: Any, least: int, most: int) -> int:
-    """Return a whole number within bounds.
-
-    Raises
-    ------
-    StructureError
-        It is not a whole number, or out of bounds.
-    """
+    """Return a whole number; a StructureError is raised if it is not one, or out of bounds."""
     if isinstance(number, bool) or not isinstance(number, Integral) or not least <= int(number) <= most:
         raise StructureError(f"{name} must be a whole number from {least} to {most}, got {shown(number)}.")
     return int(number)
 
 
 def pair(name: str, counts: Any, most: int = _MOST_CELLS) -> tuple[int, int]:
-    """Return two whole numbers, 1 or more, whose product is within bounds.
-
-    Raises
-    ------
-    StructureError
-        They are something else.
-    """
+    """Return two whole numbers; a StructureError is raised unless they are 1 or more, their product within bounds."""
     try:
         first, second = (whole(name, count, 1, most) for count in counts)
     except (TypeError, ValueError, StructureError):
@@ -151,13 +114,7 @@ def pair(name: str, counts: Any, most: int = _MOST_CELLS) -> tuple[int, int]:
 
 
 def check_means(osc: Any, stepper: Any, executor: Any) -> None:
-    """Refuse a wrong oscillator, stepper or executor before any work is done.
-
-    Raises
-    ------
-    SceneError, StepperError, StructureError
-        For each of them, in this order.
-    """
+    """Refuse a wrong oscillator, stepper or executor with a SceneError, StepperError or StructureError."""
     if not isinstance(osc, Oscillator):
         raise SceneError(
             f"the scene must be an Oscillator, got {shown(osc)}; compose one, or load a bundled one with load_scene."
@@ -171,17 +128,13 @@ def check_means(osc: Any, stepper: Any, executor: Any) -> None:
 
 
 def check_belongs(osc: Oscillator, structure: Any) -> None:
-    """Refuse a structure that is not one of this oscillator; the noise may differ, because it has no effect on one.
+    """Refuse, with a StructureError, a structure that is not one of this oscillator.
 
-    Raises
-    ------
-    StructureError
-        It is not a structure, or one of another scene.
+    The noise may differ, because it has no effect on a structure.
     """
     if not isinstance(structure, Structure):
         raise StructureError(f"structure must be a Structure from find_structure, got {shown(structure)}.")
-    ours, theirs = (_without_noise(data) for data in (scene_data(osc), structure.scene))
-    if ours != theirs:
+    if _without_noise(scene_data(osc)) != _without_noise(structure.scene):
         raise StructureError(
             "the structure is that of another scene, or of this one with other parameters; give the one that "
             "find_structure returns for this oscillator."

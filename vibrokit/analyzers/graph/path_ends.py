@@ -14,7 +14,7 @@ from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.basins.sharing import agreeing
+from vibrokit.structure.basins.stop_cells import agreeing
 from vibrokit.structure.linear_map import linear_map
 
 _DEPTH = 2  # cells of the basin grid, from the boundary to the nearest cell that surely lies inside

@@ -13,7 +13,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION
-from vibrokit.results.basins import LEFT, UNSETTLED
+from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -126,7 +126,7 @@ class Shooter:
         outcomes.confirmed[which[exits]] = True
         outcomes.status[which[exits]] = LEFT_BASIN
         outcomes.status[which[reached == UNSETTLED]] = COMPLETED
-        outcomes.status[which[reached == LEFT]] = DIVERGED
+        outcomes.status[which[reached == ESCAPED]] = DIVERGED
         again = which[returned]
         left = self.budget * self.problem.checks - outcomes.checks[again]
         more = self._integrated(states[returned], np.maximum(left, 0))

@@ -1,82 +1,58 @@
-"""Describes steady states: turns an orbit that was found into the record of an attractor."""
+"""Describes steady states: turns an orbit that was found into the record of an attractor, with its contacts."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
-from vibrokit.structure.attractors.contacts import Path, contacts_along
-from vibrokit.structure.attractors.lyapunov import LyapunovEstimate
-from vibrokit.structure.cycles import Cycle, refine_cycle
-from vibrokit.structure.equilibria import equilibrium_exponents
-from vibrokit.structure.orbits import Orbit, exponents_of, moved_by_tightening, refine_orbit, visited
+from vibrokit.structure.attractors.wandering import LyapunovEstimate
+from vibrokit.structure.autonomous import equilibrium_exponents
+from vibrokit.structure.orbits import Orbit, exponents_of, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 1024  # along one forcing period
-_LOOKED_AT = 64  # periods of motion that never repeats
+_WANDERING = 64  # periods of motion that never repeats
 _RESTING = 1e-6
 _TIGHTENED = 1  # time, for the error
+_FINER = 64  # samples of a stretch that is resolved further
+_REFINEMENTS = 6  # after which a touch that is not found counts as none
+_ENOUGH = 32  # samples in one contact, for its peak
+_PEAK_REFINEMENTS = 5  # each thirty times as fine as the one before
 
 Array = NDArray[np.float64]
 
 
 def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor:
-    """Describe a stable periodic orbit, or an equilibrium."""
-    period = orbit.period
-    path = _path(osc, orbit.point, period * osc.section_interval, _SAMPLES * period, stepper)
-    resting = osc.autonomous and np.ptp(path.states, axis=0).max() < _RESTING * (
-        size_of(osc) + np.abs(path.states).max()
-    )
+    """Describe a stable orbit or limit cycle, or the equilibrium that an orbit of an autonomous scene rests at."""
+    count = _SAMPLES * max(1, round(orbit.duration / osc.section_interval))
+    path = _path(osc, orbit.point, orbit.duration, count, stepper)
+    still = np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max())
+    resting = still and osc.autonomous and orbit.kind != "limit cycle"
     multipliers = np.linalg.eigvals(orbit.monodromy).astype(complex)
-    duration = 0.0 if resting else period * osc.section_interval
-    exponents = equilibrium_exponents(osc, orbit.point) if resting else exponents_of(multipliers, duration)
-
-    def refined(finer: Stepper) -> Array:
-        return refine_orbit(osc, orbit.point, period, finer).point
-
     return _described(
         osc, path, stepper,
-        kind="equilibrium" if resting else "periodic",
-        period=period,
-        duration=duration,
+        kind="equilibrium" if resting else orbit.kind,
+        period=orbit.period,
+        duration=0.0 if resting else orbit.duration,
         points=visited(osc, orbit, stepper),
         multipliers=multipliers,
-        exponents=exponents,
+        exponents=equilibrium_exponents(osc, orbit.point) if resting else exponents_of(multipliers, orbit.duration),
         residual=orbit.residual,
-        error=moved_by_tightening(orbit.point, refined, stepper, _TIGHTENED),
-    )  # fmt: skip
-
-
-def describe_cycle(osc: Oscillator, cycle: Cycle, stepper: Stepper) -> Attractor:
-    """Describe a stable limit cycle of an autonomous scene."""
-    count = _SAMPLES * max(1, round(cycle.duration / osc.section_interval))
-    path = _path(osc, cycle.point, cycle.duration, count, stepper)
-    multipliers = np.linalg.eigvals(cycle.monodromy).astype(complex)
-
-    def refined(finer: Stepper) -> Array:
-        return refine_cycle(osc, cycle.point, cycle.duration, finer).point
-
-    return _described(
-        osc, path, stepper,
-        kind="limit cycle",
-        period=1,
-        duration=cycle.duration,
-        points=cycle.point[None],
-        multipliers=multipliers,
-        exponents=exponents_of(multipliers, cycle.duration),
-        residual=cycle.residual,
-        error=moved_by_tightening(cycle.point, refined, stepper, _TIGHTENED),
+        error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
     )  # fmt: skip
 
 
@@ -102,12 +78,12 @@ def describe_wandering(
         error=np.nan,
         survival=survival,
     )  # fmt: skip
-    # Hits are per orbit, and of motion that never repeats per period.
-    return dataclasses.replace(found, hits={side: hits / _LOOKED_AT for side, hits in found.hits.items()})
+    # Hits are per orbit; those of motion that never repeats are per period.
+    return dataclasses.replace(found, hits={side: hits / _WANDERING for side, hits in found.hits.items()})
 
 
 def _described(osc: Oscillator, path: Path, stepper: Stepper, *, exponent_error: float = 0.0, **own: Any) -> Attractor:
-    """The record of an attractor: what is its own, and what is seen along a path on it; label and basin come later."""
+    """Return the record of an attractor, with its contacts along a path on it; label and basin are set later."""
     seen = {barrier.side: contacts_along(osc, path, stop, stepper) for stop, barrier in enumerate(osc.barriers)}
     return Attractor(
         label=UNSETTLED,
@@ -128,9 +104,104 @@ def _path(osc: Oscillator, point: Array, duration: float, count: int, stepper: S
 
 
 def _wandering_path(osc: Oscillator, point: Array, stepper: Stepper) -> Path:
-    """Some periods, each begun at the section anew: as the section map does, whose set this is."""
+    """Return some periods, each started from the section as by the section map, whose attractor this is."""
     interval, pieces = osc.section_interval, []
-    for _ in range(_LOOKED_AT):
+    for _ in range(_WANDERING):
         pieces.append(_path(osc, point, interval, _SAMPLES, stepper).states[:-1])
         point = run_ensemble(osc, Flow.STATE, stepper, point[None], 1).states[0]
     return Path(np.concatenate([*pieces, point[None]]), 0.0, interval / _SAMPLES)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Path:
+    """A recorded stretch of motion: states (count, n), the time of the first, and that from one to the next (s)."""
+
+    states: Array
+    start: float
+    spacing: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Contacts:
+    """The contacts of an orbit with a stop: entries into contact, largest depth (m), largest push (m s⁻²)."""
+
+    hits: int
+    depth: float
+    force: float
+
+
+def contacts_along(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> Contacts:
+    """Find the contacts with one stop in a path, sampled along a whole orbit by a stepper.
+
+    A contact shorter than the spacing of the samples shows by a velocity that turns next to the stop; such a stretch is
+    integrated again with finer samples.
+    """
+    barrier = osc.barriers[stop]
+    depth, _ = _depth_and_rate(path.states, barrier)
+    entries, deepest, hardest = int(np.sum((depth[:-1] <= 0) & (depth[1:] > 0))), 0.0, 0.0
+    touching = np.flatnonzero(depth > 0)
+    for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1):
+        if run.size:
+            around = _around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, len(depth) - 1), stepper)
+            peak = _peak(osc, around, stop, stepper)
+            deepest, hardest = max(deepest, peak[0]), max(hardest, peak[1])
+    for unseen in _hidden(osc, path, barrier, stepper, _REFINEMENTS):
+        peak = _peak(osc, unseen, stop, stepper)
+        entries, deepest, hardest = entries + 1, max(deepest, peak[0]), max(hardest, peak[1])
+    return Contacts(entries, deepest, hardest)
+
+
+def _depth_and_rate(states: Array, barrier: Barrier) -> tuple[Array, Array]:
+    return barrier.sign * (states[:, 0] - barrier.position), barrier.sign * states[:, 1]
+
+
+def _around(osc: Oscillator, path: Path, first: int, last: int, stepper: Stepper) -> Path:
+    """Return the stretch between two samples, with enough samples for its peaks."""
+    if last - first >= _ENOUGH or first == last:
+        return Path(path.states[first : last + 1], path.start + first * path.spacing, path.spacing)
+    finer = path.spacing * (last - first) / _FINER
+    begin = path.start + first * path.spacing
+    return Path(record(osc, Flow.STATE, stepper, path.states[first], begin, finer, _FINER), begin, finer)
+
+
+def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, finer: int) -> list[Path]:
+    """Stretches in which the stop is touched between two samples that are both clear of it."""
+    depth, rate = _depth_and_rate(path.states, barrier)
+    clear, turns = (depth[:-1] <= 0) & (depth[1:] <= 0), (rate[:-1] > 0) & (rate[1:] < 0)
+    reachable = depth[:-1] + rate[:-1] * path.spacing > 0
+    found = []
+    for index in np.flatnonzero(clear & turns & reachable):
+        closer = _around(osc, path, int(index), int(index) + 1, stepper)
+        inside, _ = _depth_and_rate(closer.states, barrier)
+        if inside.max() > 0:
+            found.append(closer)
+        elif finer > 0:
+            found += _hidden(osc, closer, barrier, stepper, finer - 1)
+    return found
+
+
+def _peak(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> tuple[float, float]:
+    """Return the greatest depth and the greatest push along a stretch."""
+    law, theta = kernel_for(osc, Flow.STATE, stepper).module.law, theta_of(osc)
+
+    def depths(states: Array) -> Array:
+        return _depth_and_rate(states, osc.barriers[stop])[0]
+
+    def pushes(states: Array) -> Array:
+        pairs = zip(*_depth_and_rate(states, osc.barriers[stop]), strict=True)
+        return np.array([float(law(stop, depth, rate, theta)) if depth > 0 else 0.0 for depth, rate in pairs])
+
+    return _greatest(osc, path, depths, stepper), _greatest(osc, path, pushes, stepper)
+
+
+def _greatest(osc: Oscillator, path: Path, measure: Callable[[Array], Array], stepper: Stepper) -> float:
+    """Return the largest value of a function of the state along a path, from ever finer samples around it."""
+    best = 0.0
+    for _ in range(_PEAK_REFINEMENTS):
+        values = measure(path.states)
+        top = int(np.argmax(values))
+        best = max(best, float(values[top]))
+        path = _around(osc, path, max(top - 1, 0), min(top + 1, len(values) - 1), stepper)
+        if len(path.states) < 2:
+            break
+    return best

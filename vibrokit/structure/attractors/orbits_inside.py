@@ -12,32 +12,19 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import EQUAL, Orbit, least_period, refine_orbit, same_point, visited
 
-_LONGEST = 64  # periods after which a return is looked for
+_LONGEST = 64  # largest number of periods between a point and its return
 _TRIES = 4  # closest returns of each period that are refined
-_NEAR = 4.0  # times the spacing of the sample: an orbit so near to it is inside
+_NEAR = 4.0  # times the spacing of the sample: largest distance of a return
 
 Array = NDArray[np.float64]
 
 
 def orbits_inside(osc: Oscillator, attractor: Attractor, stepper: Stepper, most: int) -> tuple[Orbit, ...]:
-    """Find unstable periodic orbits that are dense in a chaotic attractor, of the shortest periods first.
+    """Find unstable periodic orbits inside a chaotic attractor, the shortest periods first, `most` at most.
 
-    A chaotic motion passes by each of them: where it all but returns after some periods, Newton's method finds the
-    orbit (Lathrop & Kostelich, Phys. Rev. A 40, 4028, 1989).
-
-    Parameters
-    ----------
-    osc : Oscillator
-    attractor : Attractor
-        Whose `points` are a long sample of one motion, in the order of time.
-    stepper : Stepper
-    most : int
-        Orbits to stop at.
-
-    Returns
-    -------
-    tuple of Orbit
-        At most `most`; each begun at the point that was returned to.
+    A chaotic motion passes near each of them: where it nearly returns after some periods, Newton's method finds the
+    orbit (Lathrop & Kostelich, Phys. Rev. A 40, 4028, 1989). The attractor's points are a long sample of one motion in
+    the order of time.
     """
     points = attractor.points
     spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))

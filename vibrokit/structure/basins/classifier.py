@@ -16,11 +16,10 @@ from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, LEFT_REGION, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import LEFT, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
-from vibrokit.structure.basins.arrival import arrival_at
-from vibrokit.structure.basins.mask import AttractorMask, is_extended, mask_of
-from vibrokit.structure.basins.sharing import core_of
+from vibrokit.structure.basins.stop_cells import AttractorMask, core_of, is_extended, mask_of
+from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
 CELLS = "cells"
@@ -70,19 +69,10 @@ class BasinClassifier:
     core: Basins | None = None
 
     def labels(self, states: Array, start_time: float = 0.0) -> Whole:
-        """Return the label of the attractor that each state leads to.
+        """Return the label of the attractor that each state (count, n), at a start time (s), leads to.
 
-        Parameters
-        ----------
-        states : array (count, n)
-        start_time : float
-            Time of the states (s); they are integrated to the next section first.
-
-        Returns
-        -------
-        int64 array (count,)
-            UNSETTLED where the budget was spent inside the region, LEFT where it was spent outside or the trajectory
-            diverged.
+        It is UNSETTLED where the budget was spent inside the region, ESCAPED where it was spent outside or the motion
+        diverged.
         """
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.label(found, states, start_time)
@@ -105,7 +95,7 @@ class BasinClassifier:
             advance(known - before, CELLS)
 
     def sharing(self, basins: Basins, margin: int) -> BasinClassifier:
-        """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.sharing`."""
+        """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.stop_cells`."""
         return dataclasses.replace(self, core=core_of(self.osc, self.stepper, basins, margin, self.executor))
 
     @cached_property
@@ -139,7 +129,7 @@ class BasinClassifier:
 
 
 class _Trajectories:
-    """Trajectories under way: their states, the sections they have left, and the labels that are known."""
+    """Trajectories under way: their states, their remaining sections, and the labels that are known."""
 
     def __init__(self, classifier: BasinClassifier, states: Array, found: Whole) -> None:
         self.classifier = classifier
@@ -162,7 +152,7 @@ class _Trajectories:
                 executor=self.classifier.executor,
             )  # fmt: skip
             self.states = ended.states
-            self.found[ended.status == DIVERGED] = LEFT
+            self.found[ended.status == DIVERGED] = ESCAPED
 
     def integrate(self, which: Whole, most: int | Whole, stop: Stop) -> Ensemble:
         """Integrate some trajectories by at most so many sections, and note what they reach for certain."""
@@ -175,7 +165,7 @@ class _Trajectories:
         self.states[which] = ended.states
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
-        self.found[which[ended.status == DIVERGED]] = LEFT
+        self.found[which[ended.status == DIVERGED]] = ESCAPED
         in_core = (ended.status == LEFT_BASIN) & (ended.label < len(classifier.attractors))
         certain = (ended.status == REACHED) | (in_core & (stop is classifier.entering))
         self.found[which[certain]] = ended.label[certain]
@@ -206,4 +196,4 @@ class _Trajectories:
     def close(self) -> None:
         """Label the trajectories whose budget is spent."""
         over = np.flatnonzero((self.found == NOT_FOLLOWED) & (self.remaining <= 0))
-        self.found[over] = np.where(self.classifier.region.contains(self.states[over]), UNSETTLED, LEFT)
+        self.found[over] = np.where(self.classifier.region.contains(self.states[over]), UNSETTLED, ESCAPED)

@@ -1,19 +1,35 @@
-"""Basins on a grid, from coarse grids to fine ones whose cells share their answers."""
+"""Basins on a grid, from coarse grids to fine ones that use the coarse ones; basin fractions."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels.choice import ensemble_stepper
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
-from vibrokit.results.basins import NOT_FOLLOWED, Basins
+from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
-from vibrokit.structure.basins.sharing import agreeing, centres
+from vibrokit.structure.basins.stop_cells import agreeing, centres
+from vibrokit.structure.search import persistent_stepper
+from vibrokit.symbolic.flow_kind import Flow
 
 _COARSEST = 4096  # cells of the first grid, followed to the attractors
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
+_SETTLING = 1e-3  # of the region's size, the default of `find_structure`
+_WITHOUT_ATTRACTOR = {
+    UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
+}  # fmt: skip
+CELL_CODES = tuple(_WITHOUT_ATTRACTOR.values())
+"""Codes of the findings about cells that lead to no attractor."""
 
 Labels = NDArray[np.int16]
 
@@ -31,17 +47,9 @@ class BasinGrid:
     """The cells of a classifier's region; an interrupt leaves the labels known so far.
 
     The first grid is followed to the attractors. On each finer one a trajectory ends, after one section at least, in a
-    cell of the grid before whose whole neighbourhood agrees; see `vibrokit.structure.basins.sharing`.
-
-    Parameters
-    ----------
-    classifier : BasinClassifier
-    cells : (int, int)
-        Cells in x and in v.
-    margin : int, optional
-        How far cells must agree to classify a trajectory. None: every cell is followed to an attractor.
-    refine : int
-        How many times the cells near a boundary are split in four; the others keep their labels.
+    cell of the grid before whose whole neighbourhood agrees; see `vibrokit.structure.basins.stop_cells`.
+    `margin` is how far cells must agree to classify a trajectory; None: every cell is followed to an attractor. The
+    cells near a boundary are split in four `refine` times; the others keep their labels.
     """
 
     def __init__(
@@ -101,3 +109,34 @@ def _shapes(cells: tuple[int, int]) -> list[tuple[int, int]]:
 
 def _split(labels: Labels) -> Labels:
     return labels.repeat(2, axis=0).repeat(2, axis=1)
+
+
+def with_fractions(attractors: Sequence[Attractor], basins: Basins) -> tuple[Attractor, ...]:
+    """Return attractors with their basin fractions, and the standard errors of these."""
+    found = []
+    for attractor in attractors:
+        fraction = basins.fraction(attractor.label)
+        error = math.sqrt(fraction * (1 - fraction) / basins.labels.size)
+        found.append(dataclasses.replace(attractor, basin_fraction=fraction, basin_fraction_error=error))
+    return tuple(found)
+
+
+def cell_findings(basins: Basins) -> tuple[Finding, ...]:
+    """Return findings about the cells that lead to no attractor."""
+    fractions = {code: basins.fraction(label) for label, code in _WITHOUT_ATTRACTOR.items()}
+    return tuple(Finding.of(code, fraction=fraction) for code, fraction in fractions.items() if fraction)
+
+
+def basin_fractions(
+    osc: Oscillator,
+    attractors: Sequence[Attractor],
+    region: Region,
+    cells: tuple[int, int],
+    budget: int,
+    stepper: Stepper | None,
+) -> tuple[tuple[Attractor, ...], tuple[Finding, ...]]:
+    """Find the basin fraction of each attractor in a region, and findings about the cells that lead to none."""
+    tolerance = _SETTLING * region.size
+    chosen = stepper or persistent_stepper(osc, attractors, ensemble_stepper(osc, Flow.STATE), tolerance)
+    basins = classify_grid(BasinClassifier(osc, attractors, region, tolerance, budget, chosen), cells)
+    return with_fractions(attractors, basins), cell_findings(basins)

@@ -1,4 +1,4 @@
-"""Edge tracking: motions that stay on the boundary between two basins.
+"""Edge tracking: motions that stay on the boundary between two basins, and whether they have converged.
 
 Two close states that lead to different attractors lie on two sides of the boundary. Mapped forward, and brought
 together again whenever they have separated, they follow a motion on the boundary, which converges to an attracting set
@@ -10,16 +10,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Container
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator
-from vibrokit.results.basins import LEFT, Basins
-from vibrokit.structure.regions import states_at
+from vibrokit.results.basins import ESCAPED, Basins
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
@@ -30,38 +29,20 @@ _FEWEST_PIECES, _MOST_PIECES = 3, 63  # of a line between two ends, all corners 
 _AT_ONCE = 512  # states to classify, about: fewer take as long
 _MOST_CUTS = 60
 _FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label; the third choice is random
+_RECURRENCE = 1e-6  # of the region's size: a motion has returned
+_CLOSE = 1e-3  # of the region's size: a motion that returns within this distance
+_STAY = 48  # times in a row converges to an orbit
 
 Array = NDArray[np.float64]
-Labels = NDArray[np.int64]
-
-
-class Classifier(Protocol):
-    """What edge tracking needs of a `BasinClassifier`."""
-
-    @property
-    def osc(self) -> Oscillator:
-        """The scene."""
-
-    @property
-    def stepper(self) -> Stepper:
-        """Integrates the states."""
-
-    def labels(self, states: Array) -> Labels:
-        """Label of the attractor that each state leads to."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class EdgeTrack:
-    """A motion on the boundary between two basins.
+    """A motion on the boundary between two basins, whose labels at its end are given, the lower first.
 
-    Attributes
-    ----------
-    labels : (int, int)
-        Labels of the two sides at its end, the lower first.
-    points : array (count, n)
-        Midpoints between the two sides, at every section; at every sixteenth of 2π/ω_n in an autonomous scene.
-    stretches : array (count − 1,)
-        Logarithm of the ratio by which the distance of the two sides grows from each point to the next.
+    Its points (count, n) are the midpoints between the two sides at every section, at every sixteenth of 2π/ω_n in an
+    autonomous scene. Its stretches (count − 1,) are the logarithms of the ratios by which the distance of the two sides
+    grows from each point to the next.
     """
 
     labels: tuple[int, int]
@@ -69,92 +50,36 @@ class EdgeTrack:
     stretches: Array
 
 
-def edge_states(
-    classifier: Classifier, basins: Basins, *, trackers: int = 16, sections: int = 64, rng: np.random.Generator
-) -> list[EdgeTrack]:
-    """Follow motions on the boundaries between the basins of a grid.
-
-    Parameters
-    ----------
-    classifier : BasinClassifier
-    basins : Basins
-        Motions start between neighbouring cells of different labels.
-    trackers : int
-        Largest number of motions for each pair of labels that meet, distributed over the cells where they do.
-    sections : int
-        Length of each motion.
-    rng : numpy.random.Generator
-        Chooses the cells, and the change of label that is kept if there are several.
-
-    Returns
-    -------
-    list of EdgeTrack
-        Without motions that lost the boundary.
-    """
-    straddles = Straddles.across(classifier, basins, trackers, rng)
-    for _ in range(sections):
-        straddles.advance()
-    return straddles.tracks()
-
-
 class Straddles:
     """Pairs of states on two sides of a boundary, integrated together.
 
-    Attributes
-    ----------
-    ends : array (count, 2, n)
-    end_labels : int array (count, 2)
-    numbers : int array (count,)
-        Index of each pair among the initial ones.
-    origins : int array (initial pairs, 2)
-        Labels of the cells that each initial pair lies between.
-    lost : int
-        Number of pairs that lost the boundary and were dropped.
+    They start between neighbouring cells of different labels, distributed over the cells where the labels meet, at most
+    `trackers` pairs for each pair of labels. `only` are the pairs of labels to start between, the lower first; by
+    default all that meet. Pairs without a change of label between them are dropped.
     """
 
     def __init__(
-        self, classifier: Classifier, ends: Array, origins: Labels, width: float, rng: np.random.Generator
-    ) -> None:
-        """Bring the ends of each line together around a change of label on it; drop lines without one."""
-        self.classifier = classifier
-        self.width = width
-        self.rng = rng
-        self.ends = ends
-        self.end_labels = np.zeros(ends.shape[:2], dtype=np.int64)
-        self.numbers = np.arange(len(ends))
-        self.origins = origins
-        self.lost = 0
-        self._history: list[list[Array]] = [[] for _ in ends]
-        self._stretches: list[list[float]] = [[] for _ in ends]
-        self._bring_together(np.arange(len(ends)))
-
-    @classmethod
-    def across(
-        cls,
-        classifier: Classifier,
+        self,
+        classifier: BasinClassifier,
         basins: Basins,
         trackers: int,
         rng: np.random.Generator,
         only: Container[tuple[int, int]] | None = None,
-    ) -> Straddles:
-        """Start between neighbouring cells of different labels, at most `trackers` pairs for each pair of labels.
-
-        Parameters
-        ----------
-        classifier, basins, trackers, rng
-            As for `edge_states`.
-        only : collection of (int, int), optional
-            Pairs of labels to start between, the lower first; by default all that meet.
-        """
+    ) -> None:
+        self.classifier, self.rng, self.width = classifier, rng, _WIDTH * basins.region.size
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
         for pair, cells in meeting_cells(basins).items():
             if only is None or pair in only:
                 lines.append(spread(centres[cells], trackers, rng))
                 origins.append(np.tile(pair, (len(lines[-1]), 1)))
-        ends = states_at(classifier.osc, np.concatenate(lines))
-        width = _WIDTH * basins.region.size
-        return cls(classifier, ends, np.concatenate(origins), width, rng)
+        self.ends = states_at(classifier.osc, np.concatenate(lines))
+        self.origins = np.concatenate(origins)  # labels of the cells that each initial pair lies between
+        self.end_labels = np.zeros(self.ends.shape[:2], dtype=np.int64)
+        self.numbers = np.arange(len(self.ends))  # of each pair among the initial ones
+        self._points: list[Array] = []  # at each section, of all pairs
+        self._stretches: list[Array] = []
+        self._bring_together(np.arange(len(self.ends)))
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -169,32 +94,26 @@ class Straddles:
         """Map all ends to the next section, and bring those together again that have separated."""
         if not len(self):
             return
-        count, _, size = self.ends.shape
         before = self._widths()
         osc, stepper = self.classifier.osc, self.classifier.stepper
-        states = self.ends.reshape(-1, size)
-        self.ends = run_ensemble(osc, Flow.STATE, stepper, states, interval=self.interval).states.reshape(
-            count, 2, size
-        )
+        states = self.ends.reshape(-1, self.ends.shape[-1])
+        ended = run_ensemble(osc, Flow.STATE, stepper, states, interval=self.interval)
+        self.ends = ended.states.reshape(self.ends.shape)
         after = self._widths()
         with np.errstate(divide="ignore", invalid="ignore"):
-            grown = np.log(after / before)
-        for stretches, stretch in zip(self._stretches, grown, strict=True):
-            stretches.append(float(stretch))
+            self._stretches.append(np.log(after / before))
         separated = ~(after <= _SEPARATED * self.width)
-        if separated.any():  # the others come along: a call takes as long as its longest trajectory
+        if separated.any():  # the others are included: a call takes as long as its longest trajectory
             separated |= after > _TOGETHER * self.width
         self._bring_together(np.flatnonzero(separated))
 
-    def history(self, index: int) -> Array:
-        """Points of one motion so far, shape (count, n)."""
-        return np.array(self._history[index])
-
     def keep(self, kept: NDArray[np.bool_]) -> None:
         """Drop the pairs that are not kept."""
+        if kept.all():
+            return
         self.ends, self.end_labels, self.numbers = self.ends[kept], self.end_labels[kept], self.numbers[kept]
-        self._history = [history for history, wanted in zip(self._history, kept, strict=True) if wanted]
-        self._stretches = [stretches for stretches, wanted in zip(self._stretches, kept, strict=True) if wanted]
+        self._points = [points[kept] for points in self._points]
+        self._stretches = [stretches[kept] for stretches in self._stretches]
 
     def tracks(self) -> list[EdgeTrack]:
         """The motions so far."""
@@ -203,10 +122,11 @@ class Straddles:
     def track(self, index: int) -> EdgeTrack:
         """One motion so far."""
         low, high = sorted(int(label) for label in self.end_labels[index])
-        return EdgeTrack((low, high), self.history(index), np.array(self._stretches[index]))
+        points = np.array([points[index] for points in self._points])
+        return EdgeTrack((low, high), points, np.array([stretches[index] for stretches in self._stretches]))
 
     def _bring_together(self, wide: NDArray[np.intp]) -> None:
-        """Bring the ends of some pairs together, drop pairs on one side of the boundary, and record all places."""
+        """Bring the ends of some pairs together, drop pairs that lost the boundary, and record all points."""
         straddling = np.ones(len(self), dtype=bool)
         for _ in range(_MOST_CUTS):
             if not wide.size:
@@ -215,17 +135,14 @@ class Straddles:
             straddling[wide[~shrunk]] = False
             wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * self.width)]
         straddling[wide] = False
-        self.lost += int(np.sum(~straddling))
         self.keep(straddling)
-        for history, point in zip(self._history, self.ends.mean(axis=1), strict=True):
-            history.append(point)
+        self._points.append(self.ends.mean(axis=1))
 
     def _cut(self, wide: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Cut lines into pieces and keep of each a piece whose ends differ; return which lines have one."""
         low, high = self.ends[wide, 0], self.ends[wide, 1]
         pieces = int(np.clip(_AT_ONCE // len(wide) - 1, _FEWEST_PIECES, _MOST_PIECES))
-        shares = np.linspace(0.0, 1.0, pieces + 1)[:, None]
-        corners = low[:, None] + shares * (high - low)[:, None]
+        corners = low[:, None] + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (high - low)[:, None]
         corners[:, -1] = high
         labels = self.classifier.labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
         shrunk = np.zeros(len(wide), dtype=bool)
@@ -245,8 +162,8 @@ class Straddles:
 
 
 def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Whether labels are those of states that lead to an attractor, or leave the region for good."""
-    return (labels >= 0) | (labels == LEFT)
+    """Whether labels are those of states that lead to an attractor, or escape."""
+    return (labels >= 0) | (labels == ESCAPED)
 
 
 def meeting_cells(basins: Basins) -> dict[tuple[int, int], NDArray[np.intp]]:
@@ -283,3 +200,44 @@ def spread(lines: Array, most: int, rng: np.random.Generator) -> Array:
         distance = np.minimum(distance, np.linalg.norm(middles - middles[picked[-1]], axis=1))
         picked.append(int(np.argmax(distance)))
     return lines[picked]
+
+
+def same_place(points: Array, places: Array, distance: float) -> bool:
+    """Whether each point (count, n) is within a distance of one of some places."""
+    return bool(np.linalg.norm(points[:, None] - places, axis=2).min(axis=1).max() < distance)
+
+
+def recurrence(points: Array, size: float, longest: int) -> int:
+    """Return the number of sections after which a motion recurs for good; 0 if it does not.
+
+    On a chaotic set a motion passes near periodic orbits at any distance, the smaller the rarer.
+    """
+    for period in range(1, min(longest, len(points) - 1) + 1):
+        apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
+        staying = len(apart) >= _STAY and apart[-_STAY:].max() < _CLOSE * size
+        if apart[-period:].max() < _RECURRENCE * size or staying:
+            return period
+    return 0
+
+
+def almost_repeats(points: Array, last: int, longest: int, near: float) -> bool:
+    """Whether the last points of a motion are close to what they were some sections before."""
+    return any(
+        np.linalg.norm(points[-last:] - points[-last - period : -period], axis=1).max() < near
+        for period in range(1, min(longest, len(points) - last) + 1)
+    )
+
+
+def closing(points: Array, size: float, interval: float) -> tuple[Array, float] | None:
+    """Estimate the turning point of greatest x and the duration of a cycle from a motion, if it closes at its end."""
+    motion = CubicHermiteSpline(interval * np.arange(len(points)), points[:, 0], points[:, 1])
+    turns = motion.derivative().roots(extrapolate=False)
+    turns = turns[motion.derivative(2)(turns) < 0]
+    heights = motion(turns)
+    for back in range(1, len(turns)):
+        highest = len(turns) - back + int(np.argmax(heights[-back:]))
+        if highest >= back and abs(heights[highest] - heights[highest - back]) < _CLOSE * size:
+            state = points[int(turns[highest] / interval)].copy()
+            state[0], state[1] = heights[highest], 0.0
+            return state, float(turns[highest] - turns[highest - back])
+    return None

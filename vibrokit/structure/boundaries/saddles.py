@@ -15,27 +15,30 @@ from vibrokit.progress import report, stage
 from vibrokit.results.basins import Basins
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.autonomous import refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.boundaries.edges import PARTS_OF_A_TURN, EdgeTrack, Straddles, meeting_cells
-from vibrokit.structure.boundaries.recurrences import almost_repeats, closing, recurrence, same_place
-from vibrokit.structure.boundaries.unstable import (
-    branch_limits,
-    describe_unstable,
-    describe_unstable_cycle,
-    refine_unstable,
+from vibrokit.structure.boundaries.edges import (
+    PARTS_OF_A_TURN,
+    EdgeTrack,
+    Straddles,
+    almost_repeats,
+    closing,
+    meeting_cells,
+    recurrence,
+    same_place,
 )
-from vibrokit.structure.cycles import refine_cycle
+from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
 from vibrokit.structure.orbits import EQUAL
 from vibrokit.symbolic.flow_kind import Flow
 
 _LONGEST_PERIOD = 16
 _CHECKED_EVERY = 4  # sections
 _FARTHEST = 1e-2  # of the region's size: largest distance from a motion to the orbit that it converges to
-_NEAR = 1e-3  # of the region's size: a motion on the boundary that is so near to a saddle on it converges to it
+_NEAR = 1e-3  # of the region's size: distance from a saddle within which a motion on the boundary converges to it
 _MOST_TRIES = 4
-_FEW_POINTS = 12  # last points of a motion that must all be so near
+_FEW_POINTS = 12  # last points of a motion that must all be within that distance
 _SAMPLES = 8192  # of a cycle
-_APPROACH = 0.25  # share of a motion that does not recur which is its transient
+_APPROACH = 0.25  # fraction of a motion that does not recur which is its transient
 _SEVERAL = 32  # sections after which only a few motions go on for each pair of labels
 _FEW = 6
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they need longer
@@ -49,46 +52,27 @@ Array = NDArray[np.float64]
 Pair = tuple[int, int]
 
 
-def find_saddles(
-    classifier: BasinClassifier, basins: Basins, orbit_stepper: Stepper, rng: np.random.Generator, **limits: int
-) -> SaddleSearch:
-    """Return the finished search for the saddles on the boundaries between basins; parameters as for `SaddleSearch`."""
-    search = SaddleSearch(classifier, basins, orbit_stepper, **limits)
-    search.run(rng)
-    return search
-
-
+@dataclasses.dataclass(eq=False)
 class SaddleSearch:
     """Finds the saddles on the boundaries between basins by edge tracking; an interrupt leaves those found so far.
 
-    Parameters
-    ----------
-    classifier : BasinClassifier
-        Finds where states lead, and integrates those on the boundaries. One that uses a finished grid is fast; a
-        boundary on which it finds no saddle is followed again without the grid.
-    basins : Basins
-    orbit_stepper : Stepper
-        Of the variational equations, for the refinement.
-    trackers : int
-        Largest number of motions for each pair of basins that meet.
-    sections : int, optional
-        Sections after which a motion counts as one that does not repeat; by default 128, or 32 where states need more
-        than 5000 sections to settle, because each section on the boundary classifies several states.
+    The classifier finds where states lead, and integrates those on the boundaries. One that uses a finished grid is
+    fast; a boundary on which it finds no saddle is followed again without the grid. There are at most `trackers`
+    motions for each pair of basins that meet. A motion counts as one that does not repeat after `sections`; by default
+    128, or 32 where states need more than 5000 sections to settle, because each section on the boundary classifies
+    several states.
     """
 
-    def __init__(
-        self,
-        classifier: BasinClassifier,
-        basins: Basins,
-        orbit_stepper: Stepper,
-        *,
-        trackers: int = 9,
-        sections: int | None = None,
-    ) -> None:
-        self.osc, self.classifier, self.basins, self.orbit_stepper = classifier.osc, classifier, basins, orbit_stepper
-        self.trackers = trackers
-        self.sections = sections or (_LONG if classifier.budget <= _SLOW else _SHORT)
-        self.near = _NEAR * classifier.region.size
+    classifier: BasinClassifier
+    basins: Basins
+    orbit_stepper: Stepper
+    trackers: int = 9
+    sections: int = 0
+
+    def __post_init__(self) -> None:
+        self.osc = self.classifier.osc
+        self.sections = self.sections or (_LONG if self.classifier.budget <= _SLOW else _SHORT)
+        self.near = _NEAR * self.classifier.region.size
         self._found: list[Saddle] = []
         self._places: list[Array] = []
         self._explained: set[Pair] = set()
@@ -102,7 +86,7 @@ class SaddleSearch:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was found, and what was not."""
+        """Findings about the saddles, and about boundaries without one."""
         orbits = [saddle for saddle in self._found if saddle.kind != "chaotic"]
         found = [Finding.of(Code.SADDLES, count=len(orbits)), *self._findings]
         found += [_on_boundary(Code.BOUNDARY_LOST, pair) for pair in self._lost]
@@ -125,7 +109,7 @@ class SaddleSearch:
                 unexplained = pairs - self._explained
                 if unexplained:
                     each = max(2, min(self.trackers, most // len(unexplained)))
-                    straddles = Straddles.across(classifier, self.basins, each, rng, only=unexplained)
+                    straddles = Straddles(classifier, self.basins, each, rng, only=unexplained)
                     self._follow(straddles, tracked)
                     tracked += len(straddles.origins)
         self._lost = tuple(sorted(pairs - self._explained))
@@ -195,7 +179,7 @@ class SaddleSearch:
             return False
         if any(same_place(cycle.point[None], places, self.near) for places in self._places):
             return True
-        self._add(describe_unstable_cycle(self.osc, cycle, self.orbit_stepper, track.labels))
+        self._add(describe_unstable(self.osc, cycle, self.orbit_stepper, track.labels))
         spacing = cycle.duration / _SAMPLES
         self._places[-1] = record(self.osc, Flow.STATE, self.orbit_stepper, cycle.point, 0.0, spacing, _SAMPLES)
         return True
@@ -229,13 +213,13 @@ class SaddleSearch:
 
 
 def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:
-    """A finding about the boundary between two basins; if motion on one side leaves the region, that side is last."""
+    """Return a finding about the boundary between two basins; a side from which motion escapes is last."""
     first, second = pair if pair[0] >= 0 else pair[::-1]
     return Finding(code, first, second, values)
 
 
 def _chaotic(tracks: list[EdgeTrack], exponent: float) -> Saddle:
-    """The record of a set on which motions on a boundary never repeat."""
+    """Return the record of a set on which motions on a boundary never repeat."""
     return Saddle(
         kind="chaotic",
         period=0,

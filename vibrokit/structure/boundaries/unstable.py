@@ -1,6 +1,8 @@
-"""Unstable orbits, one by one: refined to rounding, described, with the limits of their unstable branches."""
+"""Unstable orbits: refined to rounding, described, with the limits of their unstable branches."""
 
 from __future__ import annotations
+
+import contextlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +12,9 @@ from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.cycles import Cycle, refine_cycle
-from vibrokit.structure.equilibria import equilibrium_exponents, refine_equilibrium
-from vibrokit.structure.orbits import Orbit, exponents_of, least_period, moved_by_tightening, refine_orbit, visited
+from vibrokit.structure.orbits import Orbit, exponents_of, least_period, refine_orbit, visited
 from vibrokit.symbolic.flow_kind import Flow
 
 _RESIDUAL = 1e-10
@@ -30,13 +31,8 @@ Array = NDArray[np.float64]
 def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
     """Refine an unstable orbit, or an equilibrium of an autonomous scene, to its least period.
 
-    The monodromy matrix of an equilibrium is that over a sixteenth of 2π/ω_n. A finer stepper is used where the
-    residual is too large.
-
-    Raises
-    ------
-    StructureError
-        Newton's method found no such orbit, or in an autonomous scene no equilibrium, near the guess.
+    A finer stepper is used where the residual is too large. A StructureError is raised if Newton's method finds no such
+    orbit near the guess, or in an autonomous scene no equilibrium.
     """
     if osc.autonomous:
         return refine_equilibrium(osc, guess)
@@ -48,55 +44,32 @@ def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper
 
 
 def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to: tuple[int, ...]) -> Saddle:
-    """Describe an unstable orbit from `refine_unstable`, from its point of least x on, checked with finer steppers."""
-    if osc.autonomous:  # an equilibrium, which does not depend on the stepper
-        points, duration, error = orbit.point[None], 0.0, 0.0
+    """Describe an unstable orbit or limit cycle, from its point of least x on, checked with finer steppers."""
+    points = visited(osc, orbit, stepper)
+    if orbit.period > 1:
+        orbit = refine_orbit(osc, points[np.argmin(points[:, 0])], orbit.period, stepper)
+        points = visited(osc, orbit, stepper)
+    if orbit.kind == "equilibrium":
         exponents = equilibrium_exponents(osc, orbit.point)
         multipliers = np.exp(exponents * osc.section_interval)
     else:
-        points, duration = visited(osc, orbit, stepper), orbit.period * osc.section_interval
-        if orbit.period > 1:
-            orbit = refine_orbit(osc, points[np.argmin(points[:, 0])], orbit.period, stepper)
-            points = visited(osc, orbit, stepper)
-        multipliers = sorted_multipliers(orbit.monodromy)
-        exponents = exponents_of(multipliers, duration)
-        error = moved_by_tightening(
-            orbit.point, lambda finer: refine_orbit(osc, orbit.point, orbit.period, finer).point, stepper, _TIGHTENED
-        )
+        multipliers = _sorted_multipliers(orbit.monodromy)
+        exponents = exponents_of(multipliers, orbit.duration)
     return Saddle(
-        kind=kind_of(multipliers),
+        # No direction in (x, v) leads to a cycle but its own.
+        kind="repeller" if orbit.kind == "limit cycle" else _kind_of(multipliers),
         period=orbit.period,
-        duration=duration,
+        duration=orbit.duration,
         points=points,
         multipliers=multipliers,
         exponents=exponents,
         leads_to=leads_to,
         residual=orbit.residual,
-        error=error,
+        error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
     )
 
 
-def describe_unstable_cycle(osc: Oscillator, cycle: Cycle, stepper: Stepper, leads_to: tuple[int, ...]) -> Saddle:
-    """Describe an unstable limit cycle of an autonomous scene; no direction in (x, v) but its own leads to it."""
-    multipliers = sorted_multipliers(cycle.monodromy)
-
-    def refined(finer: Stepper) -> Array:
-        return refine_cycle(osc, cycle.point, cycle.duration, finer).point
-
-    return Saddle(
-        kind="repeller",
-        period=1,
-        duration=cycle.duration,
-        points=cycle.point[None],
-        multipliers=multipliers,
-        exponents=exponents_of(multipliers, cycle.duration),
-        leads_to=leads_to,
-        residual=cycle.residual,
-        error=moved_by_tightening(cycle.point, refined, stepper, _TIGHTENED),
-    )
-
-
-def kind_of(multipliers: NDArray[np.complex128]) -> str:
+def _kind_of(multipliers: NDArray[np.complex128]) -> str:
     """Name an unstable orbit by its multipliers, the largest first."""
     growing = multipliers[np.abs(multipliers) > 1]
     if len(growing) > 1:
@@ -104,7 +77,7 @@ def kind_of(multipliers: NDArray[np.complex128]) -> str:
     return "flip saddle" if growing[0].real < 0 else "saddle"
 
 
-def sorted_multipliers(monodromy: Array) -> NDArray[np.complex128]:
+def _sorted_multipliers(monodromy: Array) -> NDArray[np.complex128]:
     """Return eigenvalues, the largest first; of a complex pair the one above the real axis first."""
     values = np.linalg.eigvals(monodromy).astype(complex)
     return values[np.lexsort((-values.imag, -np.abs(values).round(14)))]
@@ -117,14 +90,9 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     under the map. Two labels are returned, first that of the branch towards smaller x. If a branch winds between
     basins, its label is the most frequent one, or the next if both branches have the same one. A repeller has the
     labels of all directions.
-
-    Parameters
-    ----------
-    classifier : BasinClassifier
-    orbit : Orbit
-        From `refine_unstable`.
     """
-    orbit = _orbit_of_stepper(classifier, orbit)
+    with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
+        orbit = orbit.refined(classifier.osc, classifier.stepper)
     values, vectors = np.linalg.eig(orbit.monodromy)
     reach = classifier.region.size
     away = min(_LARGEST_DEPARTURE * reach, max(_DEPARTURE * reach, _CLEAR * _mismatch(classifier, orbit)))
@@ -139,21 +107,11 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     growth = np.clip(np.abs(values[largest]), 2.0, _LARGEST_DEPARTURE * reach / away)
     distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
     sides = [classifier.labels(orbit.point + side * distances[:, None] * direction) for side in (-1, 1)]
-    return _label_of_each(sides[0], sides[1])
-
-
-def _orbit_of_stepper(classifier: BasinClassifier, orbit: Orbit) -> Orbit:
-    """The same orbit of the classifier's slightly different map; the given one where Newton's method finds none."""
-    if classifier.osc.autonomous:  # an equilibrium is the same for every stepper
-        return orbit
-    try:
-        return refine_orbit(classifier.osc, orbit.point, orbit.period, classifier.stepper)
-    except (StepperError, StructureError):
-        return orbit
+    return _label_of_each(*sides)
 
 
 def _mismatch(classifier: BasinClassifier, orbit: Orbit) -> float:
-    """Distance between the point of an orbit and its image under the classifier's map."""
+    """Return the distance between the point of an orbit and its image under the classifier's map."""
     if classifier.osc.autonomous:
         return orbit.residual
     ended = run_ensemble(classifier.osc, Flow.STATE, classifier.stepper, orbit.point[None], orbit.period)
@@ -175,4 +133,4 @@ def _label_of_each(low: NDArray[np.int64], high: NDArray[np.int64]) -> tuple[int
 def _by_count(labels: NDArray[np.int64]) -> list[tuple[int, int]]:
     """(count, label), the most frequent first."""
     values, counts = np.unique(labels, return_counts=True)
-    return sorted(((int(count), int(value)) for value, count in zip(values, counts, strict=True)), reverse=True)
+    return sorted(zip(counts.tolist(), values.tolist(), strict=True), reverse=True)

@@ -21,42 +21,28 @@ FOLD, CROSSING = "fold", "pitchfork or transcritical"
 DOUBLING, TORUS, HOPF, GRAZING = "period doubling", "Neimark–Sacker", "Hopf", "grazing"
 
 _SAMPLES = 256  # in a forcing period or 2π/ω_n, whichever is shorter
-_FINER = 64  # samples that the stretch round a turn next to a stop is looked at with again
+_FINER = 64  # samples of the stretch around a turn next to a stop, which is integrated again
 _NEXT_TO = 1e-2  # depth, relative to the size of x, within which a turn counts as next to a stop
 _TOUCHES = 1e-6  # the same, within which an orbit at a supposed grazing must touch
 _BACK = 1e-3  # in units of the span: how far back an extrapolation begins
 _JUST_AHEAD = 1e-3  # the same: how far ahead it may end
-_CLOSER = 0.9  # share of what is left to grazing that is taken in one go
+_CLOSER = 0.9  # fraction of the distance to grazing that one step takes
 _APPROACHES = 8
-_SLOPE = 1e-4  # share of a step over which a test's slope is taken, for the error
-_SHARP = 1e-13  # share of a step that roots are found to
+_SLOPE = 1e-4  # fraction of a step over which a test's slope is taken, for the error
+_SHARP = 1e-13  # fraction of a step that roots are found to
 
 Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stage:
-    """A member of a family on the way along it.
-
-    Attributes
-    ----------
-    member : Member
-    slope : array (n,)
-        Derivative of its defect in the parameter.
-    tangent : array (n + 1,)
-        Of the family, in the direction of travel.
-    tests : dict of str to float
-        Functions that change their sign at the bifurcation they are named after.
-    depths : tuple of array
-        For each stop: how deep the orbit is at its turns towards it, the deepest first; negative short of it.
-    stable : bool
-    """
+    """A member of a family, with what is computed of it while the family is followed."""
 
     member: Member
-    slope: Array
-    tangent: Array
-    tests: dict[str, float]
-    depths: tuple[Array, ...]
+    slope: Array  # (n,), derivative of its defect in the parameter
+    tangent: Array  # (n + 1,), of the family, in the direction of travel
+    tests: dict[str, float]  # functions that change their sign at the bifurcation they are named after
+    depths: tuple[Array, ...]  # for each stop, at the turns towards it, the deepest first; negative short of it
     stable: bool
 
 
@@ -64,35 +50,21 @@ class Stage:
 class Located:
     """A bifurcation of a family.
 
-    Attributes
-    ----------
-    kind : str
-    value : float
-        Of the parameter.
-    error : float
-        How far it moves when the integration is tightened; where it is only known to lie between two members, half
-        their distance; where it can be approached from one side only, how far the nearest member is.
-    period : int
-        Of the orbit, in forcing periods; for a period doubling, of the orbit that doubles.
-    point : array (n,)
-        Of the orbit, on the section.
-    side : str
-        For grazing, of the stop.
-    bracketed : bool
-        Whether it is only known to lie between two members.
+    Its error is how far its value moves when the integration is tightened; where it is only known to lie between two
+    members, half their distance; where it can be approached from one side only, how far the nearest member is.
     """
 
     kind: str
-    value: float
+    value: float  # of the parameter
     error: float
-    period: int
-    point: Array
-    side: str = ""
-    bracketed: bool = False
+    period: int  # of the orbit, in forcing periods; for a period doubling, of the orbit that doubles
+    point: Array  # (n,), of the orbit, on the section
+    side: str = ""  # for grazing, of the stop
+    bracketed: bool = False  # whether it is only known to lie between two members
 
 
 def stage(family: Family, member: Member, ahead: Array) -> Stage:
-    """Look at a member; `ahead` is the direction of travel."""
+    """Evaluate a member; `ahead` is the direction of travel."""
     slope = family.slope(member)
     rates = _rates(family, member)
     stable = bool((rates.real < 0).all() if family.kind == "equilibrium" else (np.abs(rates) < 1).all())
@@ -103,26 +75,26 @@ def stage(family: Family, member: Member, ahead: Array) -> Stage:
 
 
 def bifurcations_between(family: Family, before: Stage, after: Stage) -> list[Located]:
-    """Locate what happens to a family of attractors between two members; nothing is said of unstable motion."""
+    """Locate the bifurcations of a family of attractors between two members; those of unstable motion are left out."""
     if not (before.stable or after.stable):
         return []
-    found = []
+    found, interval = [], _Interval(family, before, after)
     for name, value in before.tests.items():
         if value * after.tests[name] < 0:
-            found.append(_located(name, family, before, after, _test(name)))
+            found.append(interval.located(name, _test(name)))
     barriers = family.at(before.member.value).barriers
     for stop, (left, right) in enumerate(zip(before.depths, after.depths, strict=True)):
         counts = sorted((int(np.sum(left > 0)), int(np.sum(right > 0))))
         side = barriers[stop].side
-        found += [_located(GRAZING, family, before, after, _depth(stop, turn), side) for turn in range(*counts)]
+        found += [interval.located(GRAZING, _depth(stop, turn), side) for turn in range(*counts)]
     return [bifurcation for bifurcation in found if bifurcation is not None]
 
 
 def grazing_ahead(family: Family, here: Stage) -> list[Located]:
     """Locate grazing just beyond the last stage that a family could be followed to.
 
-    Beyond grazing with a stiff stop an orbit may be gone, or turn back too soon to be followed; short of it, all is
-    smooth. So the depth is extrapolated to 0, and ever closer from short of it.
+    Beyond grazing with a stiff stop an orbit may no longer exist, or turn back too soon to be followed; short of it,
+    the family is smooth. The depth is therefore extrapolated to 0, from members ever closer to it.
     """
     found = []
     if not here.stable:
@@ -139,26 +111,26 @@ def _extrapolated(
 ) -> Located | None:  # fmt: skip
     """Approach the root of a depth along the tangent from short of it; None if it does not lie just ahead."""
 
-    def member(way: float) -> Member:
-        return family.corrected(here.member.place + way * here.tangent, here.slope, here.tangent)
+    def member(distance: float) -> Member:
+        return family.corrected(here.member.place + distance * here.tangent, here.slope, here.tangent)
 
-    way, now, left = 0.0, here.member, math.inf
+    distance, now, remaining = 0.0, here.member, math.inf
     try:
         before, last, deep = -_BACK, depth(family, member(-_BACK)), depth(family, now)
         for _ in range(_APPROACHES):
-            left = -deep * (way - before) / (deep - last) if deep > last else math.inf
-            if not 0 <= left <= _JUST_AHEAD:
+            remaining = -deep * (distance - before) / (deep - last) if deep > last else math.inf
+            if not 0 <= remaining <= _JUST_AHEAD:
                 return None
-            nearer = member(way + _CLOSER * left)
+            nearer = member(distance + _CLOSER * remaining)
             new = depth(family, nearer)
             if not deep < new <= 0:
                 break
-            before, last, way, deep, now = way, deep, way + _CLOSER * left, new, nearer
+            before, last, distance, deep, now = distance, deep, distance + _CLOSER * remaining, new, nearer
     except VibrokitError:
-        pass  # as near as it goes
-    if not math.isfinite(left):
+        pass  # no nearer member exists
+    if not math.isfinite(remaining):
         return None
-    ahead = float(left * here.tangent[-1]) * family.span
+    ahead = float(remaining * here.tangent[-1]) * family.span
     error = abs(ahead) + 4 * float(np.spacing(abs(now.value)))
     return Located(GRAZING, now.value + ahead, error, family.period, now.point, side)
 
@@ -228,37 +200,51 @@ def _turns(path: Array, spacing: float, barrier: Barrier) -> list[tuple[int, flo
     return found
 
 
-def _between(family: Family, before: Stage, after: Stage, share: float) -> Member:
-    """The member that a share of the way leads to, on the plane across it."""
-    way = after.member.place - before.member.place
-    slope = before.slope + share * (after.slope - before.slope)
-    return family.corrected(before.member.place + share * way, slope, way / np.linalg.norm(way))
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Interval:
+    """Two neighbouring members of a family, between which bifurcations are located."""
 
+    family: Family
+    before: Stage
+    after: Stage
 
-def _located(
-    kind: str,
-    family: Family,
-    before: Stage,
-    after: Stage,
-    test: Callable[[Family, Member], float],
-    side: str = "",
-) -> Located | None:
-    """Locate the root of a test between two members; None if it is no bifurcation of that kind."""
+    def member(self, fraction: float) -> Member:
+        """Return the member at a fraction of the chord, on the plane across it."""
+        start, slope = self.before.member.place, self.before.slope
+        chord = self.after.member.place - start
+        slope = slope + fraction * (self.after.slope - slope)
+        return self.family.corrected(start + fraction * chord, slope, chord / np.linalg.norm(chord))
 
-    def tested(share: float, family: Family = family) -> float:
-        return test(family, _between(family, before, after, share))
+    def located(self, kind: str, test: Callable[[Family, Member], float], side: str = "") -> Located | None:
+        """Locate the root of a test; None if it is no bifurcation of that kind."""
+        if kind == FOLD and self.before.tangent[-1] * self.after.tangent[-1] > 0:
+            kind = CROSSING
+        try:
+            fraction = brentq(
+                lambda fraction: test(self.family, self.member(fraction)),
+                0.0, 1.0, xtol=_SHARP, rtol=8 * np.finfo(float).eps,
+            )  # fmt: skip
+            member = self.member(fraction)
+            if _spurious(kind, self.family, member, test):
+                return None
+            error = self._error(fraction, test)
+        except (VibrokitError, ValueError, FloatingPointError):  # Newton's method converged to another family
+            first, last = self.before.member, self.after.member
+            error = 0.5 * abs(last.value - first.value) + float(np.spacing(abs(first.value)))
+            value = 0.5 * (first.value + last.value)
+            return Located(kind, value, error, self.family.period, first.point, side, bracketed=True)
+        return Located(kind, member.value, error, self.family.period, member.point, side)
 
-    if kind == FOLD and before.tangent[-1] * after.tangent[-1] > 0:
-        kind = CROSSING
-    try:
-        share = brentq(tested, 0.0, 1.0, xtol=_SHARP, rtol=8 * np.finfo(float).eps)
-        member = _between(family, before, after, share)
-        if _spurious(kind, family, member, test):
-            return None
-        error = _error(family, before, after, share, tested)
-    except (VibrokitError, ValueError, FloatingPointError):  # between the two, Newton's method went elsewhere
-        return _bracketed(kind, family, before, after, side)
-    return Located(kind, member.value, error, family.period, member.point, side)
+    def _error(self, fraction: float, test: Callable[[Family, Member], float]) -> float:
+        """Return how far a root moves when the integration is tightened, in the parameter."""
+        family = dataclasses.replace(self.family, stepper=self.family.stepper.refined())
+        finer = dataclasses.replace(self, family=family)
+        low, high = max(fraction - _SLOPE, 0.0), min(fraction + _SLOPE, 1.0)
+        steepness = (test(self.family, self.member(high)) - test(self.family, self.member(low))) / (high - low)
+        moved = -test(family, finer.member(fraction)) / steepness
+        tight = finer.member(min(max(fraction + moved, 0.0), 1.0))
+        value = self.member(fraction).value
+        return abs(tight.value - value) + 4 * float(np.spacing(abs(value))) + _SHARP * family.span
 
 
 def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family, Member], float]) -> bool:
@@ -266,20 +252,3 @@ def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family,
     if kind in (TORUS, HOPF):
         return not (np.abs(_rates(family, member).imag) > 1e-9).any()
     return kind == GRAZING and not abs(test(family, member)) < _TOUCHES * family.sizes[0]
-
-
-def _error(family: Family, before: Stage, after: Stage, share: float, tested: Callable[..., float]) -> float:
-    """How far a root moves when the integration is tightened, in the parameter."""
-    finer = dataclasses.replace(family, stepper=family.stepper.refined())
-    low, high = max(share - _SLOPE, 0.0), min(share + _SLOPE, 1.0)
-    steepness = (tested(high) - tested(low)) / (high - low)
-    moved = -tested(share, finer) / steepness
-    tight = _between(finer, before, after, min(max(share + moved, 0.0), 1.0))
-    value = _between(family, before, after, share).value
-    return abs(tight.value - value) + 4 * float(np.spacing(abs(value))) + _SHARP * family.span
-
-
-def _bracketed(kind: str, family: Family, before: Stage, after: Stage, side: str = "") -> Located:
-    first, last = before.member.value, after.member.value
-    error = 0.5 * abs(last - first) + float(np.spacing(abs(first)))
-    return Located(kind, 0.5 * (first + last), error, family.period, before.member.point, side, bracketed=True)

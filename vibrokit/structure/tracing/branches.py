@@ -1,68 +1,66 @@
-"""Joins the steady states at neighbouring values of a parameter into branches."""
+"""Joins the steady states at neighbouring values of a parameter into branches, with names and bifurcations."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from vibrokit.errors import VibrokitError
+from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
-from vibrokit.structure.attractors.describe import describe_cycle, describe_orbit
-from vibrokit.structure.cycles import Cycle
+from vibrokit.results.bifurcation import Bifurcation
+from vibrokit.results.finding import Code, Finding
+from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.attractors.names import names_of
+from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.orbits import Orbit, refine_orbit, visited
-from vibrokit.structure.tracing.bifurcations import DOUBLING, Located
-from vibrokit.structure.tracing.families import Family, Member
-from vibrokit.structure.tracing.following import family_of, follow
+from vibrokit.structure.tracing.bifurcations import DOUBLING, GRAZING, Located
+from vibrokit.structure.tracing.families import Member
+from vibrokit.structure.tracing.following import follow
 
-_SAME = 1e-5  # share of the region's size within which two points are one
+_SAME = 1e-5  # fraction of the region's size within which two points are one
 _NEAR = 0.1  # the same, within which two sets of points may belong to one branch
 _CERTAIN = -1.0  # cost of a pair that one family joins
+_ORBIT_SAMPLES = 1024
+_SAME_POINT = 1e-3  # fraction of the region's size within which the points of two bifurcations are the same
+_SAME_VALUE = 1e-7  # fraction of the span of the values within which their values are
 
 Array = NDArray[np.float64]
 Place = tuple[int, int]
 """A value, by its index, and an attractor there, by its index."""
+Numbered = list[list[int]]
+"""The branch of every attractor, value by value."""
 
 
+@dataclasses.dataclass(eq=False)
 class Tracing:
-    """Steady states at each value, the links between neighbouring values, and the bifurcations between.
+    """Steady states at each value, the links between neighbouring values, and the bifurcations between."""
 
-    Parameters
-    ----------
-    osc : Oscillator
-    path : str
-        Of the parameter.
-    values : list of float
-        Those with steady states, ascending.
-    found : list of list of Attractor
-        Attractors at each. Those that the search missed are added, with basin fraction NaN.
-    size : array (2,)
-        Width of the region in x and in v.
-    stepper : Stepper
-    """
+    osc: Oscillator
+    path: str  # of the parameter
+    values: list[float]  # those with steady states, ascending
+    found: list[list[Attractor]]  # at each; those that the search missed are added, with basin fraction NaN
+    size: Array  # (2,), width of the region in x and in v
+    stepper: Stepper
 
-    def __init__(
-        self,
-        osc: Oscillator,
-        path: str,
-        values: list[float],
-        found: list[list[Attractor]],
-        size: Array,
-        stepper: Stepper,
-    ) -> None:
-        self.osc, self.path, self.values, self.found = osc, path, values, found
-        self.size, self.stepper = size, stepper
-        self.links: list[dict[int, int]] = [{} for _ in values[1:]]
+    def __post_init__(self) -> None:
+        self.links: list[dict[int, int]] = [{} for _ in self.values[1:]]
         self.located: list[tuple[Place, Located]] = []
         self.added = 0
         self._led_to: dict[tuple[int, int, int], Array] = {}
+
+    def at(self, value: float) -> Oscillator:
+        """Return the scene at a value of the parameter."""
+        return self.osc.replace({self.path: value})
 
     def run(self) -> None:
         """Follow every orbit to the next value, those that were not reached back, and pair the others by distance."""
@@ -106,52 +104,48 @@ class Tracing:
         if not attractor.repeats:
             return
         try:
-            family = family_of(self.osc, self.path, attractor, start, target, self.size, self.stepper)
-            followed = follow(family, attractor, start, target)
+            followed = follow(self.osc, self.path, attractor, start, target, self.size, self.stepper)
         except VibrokitError:  # it stays unlinked, and a finding says that its branch ends
             return
         self.located += [((at, index), bifurcation) for bifurcation in followed.bifurcations]
-        if followed.end is None:
+        end = followed.end
+        if end is None:
             return
-        other = self._known(family, followed.end, to)
+        other = self._known(attractor, end, to)
         if other is None and followed.stable:
-            other = self._add(family, followed.end, to)
+            other = self._add(attractor, end, to)
         if other is None:
-            self._led_to[at, index, to] = self._points(family, followed.end)
+            orbit = Orbit(end.point, attractor.period, end.duration, end.derivative, end.residual)
+            self._led_to[at, index, to] = visited(self.at(end.value), orbit, self.stepper)
             return
         first, second, pair = (index, other, at) if to > at else (other, index, to)
         if first not in self.links[pair] and second not in self.links[pair].values():
             self.links[pair][first] = second
 
-    def _known(self, family: Family, member: Member, at: int) -> int | None:
+    def _known(self, origin: Attractor, member: Member, at: int) -> int | None:
+        """Return the known attractor that a member of the family of an attractor is, if it is one."""
         for index, attractor in enumerate(self.found[at]):
-            if (attractor.kind, attractor.period) == (family.kind, family.period):
+            if (attractor.kind, attractor.period) == (origin.kind, origin.period):
                 away = np.abs(attractor.points[:, :2] - member.point[:2]) / self.size
                 if away.max(axis=1).min() < _SAME:
                     return index
         return None
 
-    def _add(self, family: Family, member: Member, at: int) -> int | None:
-        osc = family.at(self.values[at])
+    def _add(self, origin: Attractor, member: Member, at: int) -> int | None:
+        """Add a member of the family of an attractor; return its index, or None if it cannot be described."""
+        osc, period = self.at(self.values[at]), origin.period
         try:
-            if family.kind == "limit cycle":
-                cycle = Cycle(member.point, member.duration, member.derivative, member.residual)
-                attractor = describe_cycle(osc, cycle, self.stepper)
+            if origin.kind == "limit cycle":
+                orbit: Orbit = Cycle(member.point, 1, member.duration, member.derivative, member.residual)
             else:
-                found = linear_map(osc, member.point[None], self.stepper, intervals=family.period)
-                orbit = Orbit(member.point, family.period, found.derivatives[0], member.residual)
-                attractor = describe_orbit(osc, orbit, self.stepper)
+                (monodromy,) = linear_map(osc, member.point[None], self.stepper, intervals=period).derivatives
+                orbit = Orbit(member.point, period, period * osc.section_interval, monodromy, member.residual)
+            attractor = describe_orbit(osc, orbit, self.stepper)
         except VibrokitError:
             return None
         self.found[at].append(without_fraction(attractor))
         self.added += 1
         return len(self.found[at]) - 1
-
-    def _points(self, family: Family, member: Member) -> Array:
-        if family.kind != "periodic":
-            return member.point[None]
-        orbit = Orbit(member.point, family.period, member.derivative, member.residual)
-        return visited(family.at(member.value), orbit, self.stepper)
 
     def _pair_off(self, pair: int) -> None:
         """Join by the smallest sum of distances between the sets of points, except for those that are too far apart."""
@@ -182,10 +176,9 @@ class Tracing:
         while period > small.period and period % 2 == 0:
             try:
                 guess = large.points[::period].mean(axis=0)
-                orbit = refine_orbit(self.osc.replace({self.path: start}), guess, period, self.stepper)
+                orbit = refine_orbit(self.at(start), guess, period, self.stepper)
                 parent = dataclasses.replace(large, points=orbit.point[None], period=period)
-                family = family_of(self.osc, self.path, parent, start, target, self.size, self.stepper)
-                passed = follow(family, parent, start, target).bifurcations
+                passed = follow(self.osc, self.path, parent, start, target, self.size, self.stepper).bifurcations
             except VibrokitError:
                 return
             self.located += [(many, found) for found in passed if found.kind == DOUBLING]
@@ -204,3 +197,79 @@ def _apart(first: Array, second: Array, size: Array) -> float:
     """
     a, b = first[:, :2] / size, second[:, :2] / size
     return float(min(cKDTree(b).query(a)[0].max(), cKDTree(a).query(b)[0].max()))
+
+
+def thinned(attractor: Attractor) -> Attractor:
+    """Return an attractor with fewer samples along its orbit, which keeps its ends; a continuation has many."""
+    every = math.ceil((len(attractor.orbit) - 1) / _ORBIT_SAMPLES)
+    if every < 2:
+        return attractor
+    kept = np.append(np.arange(0, len(attractor.orbit) - 1, every), len(attractor.orbit) - 1)
+    return dataclasses.replace(attractor, orbit=attractor.orbit[kept])
+
+
+def branch_names(tracing: Tracing, numbered: Numbered) -> tuple[str, ...]:
+    """Return the names of the branches, from the first attractor of each."""
+    first: dict[int, Attractor] = {}
+    for attractors, branches in zip(tracing.found, numbered, strict=True):
+        for attractor, branch in zip(attractors, branches, strict=True):
+            first.setdefault(branch, attractor)
+    return names_of([first[branch] for branch in sorted(first)], has_stops=bool(tracing.osc.barriers))
+
+
+def bifurcations_of(tracing: Tracing, numbered: Numbered) -> tuple[Bifurcation, ...]:
+    """Return each bifurcation once, the most accurate if it was located from both sides."""
+    kept: list[tuple[Place, Located]] = []
+    for place, found in sorted(tracing.located, key=lambda one: one[1].error):
+        if not any(_same(tracing, found, known) for _, known in kept):
+            kept.append((place, found))
+    kept.sort(key=lambda one: (one[1].value, one[1].kind))
+    return tuple(
+        Bifurcation(found.kind, found.value, found.error, numbered[at][index], found.period, found.point, found.side)
+        for (at, index), found in kept
+    )
+
+
+def _same(tracing: Tracing, one: Located, other: Located) -> bool:
+    if (one.kind, one.period, one.side) != (other.kind, other.period, other.side):
+        return False
+    span = abs(tracing.values[-1] - tracing.values[0])
+    if abs(one.value - other.value) > _SAME_VALUE * span + one.error + other.error:
+        return False
+    points = other.point[None]
+    if other.period > 1:  # they may have different points of the orbit
+        osc = tracing.at(other.value)
+        try:
+            points = visited(osc, refine_orbit(osc, other.point, other.period, tracing.stepper), tracing.stepper)
+        except StructureError:
+            return True
+    away = np.abs(points[:, :2] - one.point[:2]) / tracing.size
+    return bool(away.max(axis=1).min() < _SAME_POINT) or one.bracketed or other.bracketed
+
+
+def branch_findings(
+    tracing: Tracing, numbered: Numbered, bifurcations: Sequence[Bifurcation], values: int
+) -> tuple[Finding, ...]:
+    """Return findings about the branches at some number of values."""
+    count = len({branch for branches in numbered for branch in branches})
+    found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=tracing.path)]
+    found += [
+        Finding.of(Code.BIFURCATION, one.branch, kind=one.kind, side=one.side, value=one.value, error=one.error)
+        for one in bifurcations
+    ]
+    found += _ends(tracing, numbered, bifurcations)
+    if tracing.added:
+        found.append(Finding.of(Code.FOUND_BY_NEIGHBOUR, count=tracing.added))
+    return tuple(found)
+
+
+def _ends(tracing: Tracing, numbered: Numbered, bifurcations: Sequence[Bifurcation]) -> Iterator[Finding]:
+    """Findings about branches that begin or end between two values without a located bifurcation."""
+    for pair, (low, high) in enumerate(zip(tracing.values, tracing.values[1:], strict=False)):
+        before, after = set(numbered[pair]), set(numbered[pair + 1])
+        for branch in sorted(before ^ after):
+            kinds = {one.kind for one in bifurcations if low <= one.value <= high and one.branch == branch}
+            if not kinds - {GRAZING}:
+                change = "ends" if branch in before else "begins"
+                located = "only grazing" if kinds else "no bifurcation"
+                yield Finding.of(Code.BRANCH_ENDS, branch, change=change, low=low, high=high, located=located)

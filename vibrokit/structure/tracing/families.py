@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.cycles import cycle_equations, turning_point
-from vibrokit.structure.equilibria import equilibrium_equations
+from vibrokit.structure.autonomous import cycle_equations, equilibrium_equations, turning_point
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import section_equations
 
 _ITERATIONS = 12
 _CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
-_NUDGE = 1e-4  # share of the span over which the difference for a derivative in the parameter is taken
+_NUDGE = 1e-4  # fraction of the span over which the difference for a derivative in the parameter is taken
 _ONE_ORBIT = 1e-5  # relative distance of an orbit from its image after a part of its period, if it repeats then
 _RESTING = 1e-2  # motion within the duration, relative to the sizes, below which there is no cycle
 
@@ -30,33 +29,15 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Member:
-    """One steady motion of a family.
+    """One steady motion of a family."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter.
-    place : array (n + 1,)
-        Unknowns in units of their sizes, then the value in units of the span.
-    point : array (n,)
-        On the section.
-    duration : float
-        Time after which it repeats (s); 0 for an equilibrium.
-    derivative : array (n, n)
-        Derivative of the flow over the duration; at an equilibrium, of the defect.
-    defect : array (n,)
-        Image of the point less the point; at an equilibrium, the rate of change times a sixteenth of 2π/ω_n.
-    jacobian : array (n, n)
-        Derivative of the defect in the unknowns, each in units of its size.
-    """
-
-    value: float
-    place: Array
-    point: Array
-    duration: float
-    derivative: Array
-    defect: Array
-    jacobian: Array
+    value: float  # of the parameter
+    place: Array  # (n + 1,), unknowns in units of their sizes, then the value in units of the span
+    point: Array  # (n,), on the section
+    duration: float  # time after which it repeats (s); 0 for an equilibrium
+    derivative: Array  # (n, n), of the flow over the duration; at an equilibrium, of the defect
+    defect: Array  # (n,), image less point; at an equilibrium, the rate of change times a sixteenth of 2π/ω_n
+    jacobian: Array  # (n, n), derivative of the defect in the unknowns, each in units of its size
 
     @property
     def residual(self) -> float:
@@ -66,32 +47,16 @@ class Member:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Family(ABC):
-    """Steady motions of one kind, as the solutions of defect(unknowns, value) = 0. Abstract.
-
-    Attributes
-    ----------
-    osc : Oscillator
-    path : str
-        Of the parameter.
-    period : int
-        In forcing periods, for periodic ones.
-    sizes : array (n,)
-        Units of the unknowns.
-    span : float
-        Unit of the parameter.
-    middle : float
-        A value amid those at which the family is evaluated.
-    stepper : Stepper
-    """
+    """Steady motions of one kind, as the solutions of defect(unknowns, value) = 0. Abstract."""
 
     kind: ClassVar[str]
 
     osc: Oscillator
-    path: str
-    period: int
-    sizes: Array
-    span: float
-    middle: float
+    path: str  # of the parameter
+    period: int  # in forcing periods, for periodic motions
+    sizes: Array  # (n,), units of the unknowns
+    span: float  # unit of the parameter
+    middle: float  # a value between those at which the family is evaluated
     stepper: Stepper
 
     def at(self, value: float) -> Oscillator:
@@ -118,20 +83,10 @@ class Family(ABC):
         return Member(value, place, *self.parted(osc, unknowns), derivative, defect, jacobian * self.sizes)
 
     def corrected(self, guess: Array, slope: Array, normal: Array) -> Member:
-        """Return the member on the plane through a guess, by Newton's method until the residual no longer falls.
+        """Return the member on the plane through a guess with a normal, by Newton's method until the residual stays.
 
-        Parameters
-        ----------
-        guess : array (n + 1,)
-        slope : array (n,)
-            Derivative of the defect in the parameter, in units of the span; it need not be exact.
-        normal : array (n + 1,)
-            Of the plane.
-
-        Raises
-        ------
-        StructureError
-            The iteration did not converge to a member.
+        The slope (n,), the derivative of the defect in the parameter in units of the span, need not be exact. A
+        StructureError is raised if the iteration does not converge to a member.
         """
 
         def evaluate(places: Array) -> Evaluation:
@@ -150,10 +105,7 @@ class Family(ABC):
     def slope(self, member: Member) -> Array:
         """Return the derivative of the defect in the parameter, in units of the span: a difference, inwards.
 
-        Raises
-        ------
-        StructureError
-            The motion goes out of range at the neighbouring value.
+        A StructureError is raised if the motion diverges at the neighbouring value.
         """
         step = np.copysign(_NUDGE, self.middle - member.value)
         nudged = self.equations(self.at(member.value + step * self.span))(member.place[None, :-1] * self.sizes)
@@ -163,7 +115,7 @@ class Family(ABC):
         return slope
 
     def closes_early(self, member: Member) -> bool:
-        """Whether an orbit repeats after a part of its period; then it belongs to another family, met by this one."""
+        """Whether an orbit repeats after a part of its period, so that it belongs to another family."""
         return False
 
     def tangent(self, member: Member, slope: Array, ahead: Array) -> Array:
@@ -186,7 +138,7 @@ class PeriodicFamily(Family):
         return unknowns, self.period * osc.section_interval
 
     def closes_early(self, member: Member) -> bool:
-        """Whether an orbit repeats after a part of its period; then it belongs to another family, met by this one."""
+        """Whether an orbit repeats after a part of its period, so that it belongs to another family."""
         osc = self.at(member.value)
         for period in (period for period in range(1, self.period) if self.period % period == 0):
             moved = section_equations(osc, period, self.stepper)(member.point[None]).residuals[0]

@@ -1,4 +1,4 @@
-"""Follows a family of steady motions from one value of a parameter to another, and notes what happens on the way."""
+"""Follows a family of steady motions from one value of a parameter to another, and records its bifurcations."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations
 from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
 _MOST_STEPS = 800
-_LONGEST = 0.01  # share of the region's size that a motion may move in one step
+_LONGEST = 0.01  # fraction of the region's size that a motion may move in one step
 _SHORTEST = 1e-6  # the same, below which a family counts as lost
-_ASTRAY = 0.3  # share of a step that Newton's method may correct
-_FAR = 0.01  # share of the region's size that it may correct, whatever the step
+_ASTRAY = 0.3  # fraction of a step that Newton's method may correct
+_FAR = 0.01  # fraction of the region's size that it may correct, whatever the step
 _NARROW = 1e-3  # length of a step in which a bifurcation may stay bracketed
 _STRAIGHT = 0.9  # least cosine of the angle between one tangent and the next
 
@@ -28,55 +28,27 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Followed:
-    """Where a family led.
-
-    Attributes
-    ----------
-    end : Member or None
-        At the value it was followed to; None if it does not reach it.
-    stable : bool
-        Whether the end is.
-    bifurcations : tuple of Located
-    """
+    """The bifurcations of a family, and its last member, if it reaches the target."""
 
     end: Member | None
     stable: bool
     bifurcations: tuple[Located, ...]
 
 
-def family_of(
+def follow(
     osc: Oscillator, path: str, attractor: Attractor, start: float, target: float, size: Array, stepper: Stepper
-) -> Family:
-    """Return the family that an attractor at a value of the parameter belongs to.
+) -> Followed:
+    """Follow the family of an attractor that repeats, until the parameter reaches the target or turns back.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    path : str
-    attractor : Attractor
-        One that repeats.
-    start, target : float
-        Its value of the parameter, and that to which it will be followed.
-    size : array (2,)
-        Width of the region in x and in v.
-    stepper : Stepper
-    """
-    point = attractor.points[0]
-    sizes = np.append(size, np.full(len(point) - 2, size[1]))
-    if attractor.kind == "limit cycle":
-        sizes[1] = attractor.duration
-    span, middle = abs(target - start), 0.5 * (start + target)
-    return FAMILIES[attractor.kind](osc, path, attractor.period, sizes, span, middle, stepper)
-
-
-def follow(family: Family, attractor: Attractor, start: float, target: float) -> Followed:
-    """Follow a family by pseudo-arclength continuation until the target, or until it turns back.
-
-    H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", 1977.
+    The method is pseudo-arclength continuation (H. B. Keller, "Numerical solution of bifurcation and nonlinear
+    eigenvalue problems", 1977). `size` is the width (2,) of the region in x and in v.
     """
     unknowns = attractor.points[0].copy()
-    if family.kind == "limit cycle":
-        unknowns[1] = attractor.duration
+    sizes = np.append(size, np.full(len(unknowns) - 2, size[1]))
+    if attractor.kind == "limit cycle":
+        unknowns[1] = sizes[1] = attractor.duration
+    span, middle = abs(target - start), 0.5 * (start + target)
+    family = FAMILIES[attractor.kind](osc, path, attractor.period, sizes, span, middle, stepper)
     ahead = np.append(np.zeros(len(unknowns)), math.copysign(1.0, target - start))
     across = np.abs(ahead)
     try:
@@ -107,7 +79,7 @@ def follow(family: Family, attractor: Attractor, start: float, target: float) ->
 
 
 def _predicted(here: Stage, length: float, target: float, across: Array) -> tuple[Array, Array, bool]:
-    """A guess along the tangent, the plane to look for the family in, and whether it is the plane of the target."""
+    """Return a guess along the tangent, the plane to search for the family in, and whether that is the target's."""
     place, tangent = here.member.place, here.tangent
     reach = min(length, _LONGEST / max(float(np.linalg.norm(tangent[:-1])), 1e-300))
     left = (target - place[-1]) / tangent[-1] if tangent[-1] else math.inf
@@ -119,7 +91,7 @@ def _predicted(here: Stage, length: float, target: float, across: Array) -> tupl
 
 
 def _step(family: Family, here: Stage, guess: Array, normal: Array) -> Stage | None:
-    """The next stage, or None if the step was too long for it."""
+    """Return the next stage, or None if the step was too long for it."""
     length = float(np.linalg.norm(guess - here.member.place))
     try:
         there = stage(family, family.corrected(guess, here.slope, normal), here.tangent)

@@ -1,12 +1,13 @@
-"""Limit cycles of scenes without periodic excitation, by Newton's method."""
+"""Equilibria and limit cycles of scenes without periodic excitation, by Newton's method."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
@@ -16,15 +17,16 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.equilibria import AT_REST, refuse_forcing
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton
-from vibrokit.structure.orbits import CONVERGED
+from vibrokit.structure.orbits import CONVERGED, Orbit
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are looked for
-_RECURRENCE = 1e-2  # of the extent of the motion: how close it comes to where it was, for Newton's method to begin
+_PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
+_AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
+_SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
+_RECURRENCE = 1e-2  # of the extent of the motion: distance between turning points from which Newton's method starts
 _MOST_TURNS = 256  # turning points in one cycle
 _MOST_TRIALS = 8  # recurrences from which Newton's method may fail
 _LONGEST_STEP = 0.25  # of the duration: what one Newton step may change in it
@@ -32,49 +34,94 @@ _LONGEST_STEP = 0.25  # of the duration: what one Newton step may change in it
 Array = NDArray[np.float64]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Cycle:
-    """A closed orbit of a scene without periodic excitation, with its linearisation.
+class Equilibrium(Orbit):
+    """An equilibrium of a scene without periodic excitation; its period is 1, its duration 0.
 
-    Attributes
-    ----------
-    point : array (n,)
-        A turning point on it, v = 0; from `find_cycle`, the one of greatest x.
-    duration : float
-        Time after which it repeats (s).
-    monodromy : array (n, n)
-        Derivative of the flow over that time. One eigenvalue is 1: that of a shift along the cycle.
-    residual : float
-        Distance between the point and its image.
+    Its monodromy matrix is that over a sixteenth of 2π/ω_n, in which deviations stay moderate, and its residual is the
+    distance that its rate of change would cover in that time.
     """
 
-    point: Array
-    duration: float
-    monodromy: Array
-    residual: float
+    kind: ClassVar[str] = "equilibrium"
+
+    def refined(self, osc: Oscillator, stepper: Stepper) -> Equilibrium:
+        """Return the equilibrium itself, which does not depend on the stepper."""
+        return self
+
+
+def equilibrium_equations(osc: Oscillator) -> Callable[[Array], Evaluation]:
+    """Return the equations of an equilibrium, b τ = 0 with τ a sixteenth of 2π/ω_n; attached is the Jacobian of b τ."""
+    field, time = VectorField(osc), osc.section_interval / _PARTS_OF_A_TURN
+
+    def evaluate(states: Array) -> Evaluation:
+        jacobians = time * field.jacobian(states)
+        return Evaluation(time * field.rate(states), jacobians, jacobians)
+
+    return evaluate
+
+
+def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
+    """Refine an equilibrium by Newton's method on the vector field until the residual no longer falls.
+
+    A StructureError is raised for a scene with periodic excitation, and if no equilibrium is near the guess.
+    """
+    refuse_forcing(osc)
+    (point,), (residual,), (jacobian,) = newton(equilibrium_equations(osc), guess[None])
+    if not residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(guess))):
+        raise StructureError(
+            f"Newton's method found no equilibrium near {tuple(np.round(guess, 6).tolist())}: the residual is "
+            f"{residual:.1e}; start nearer to one."
+        )
+    # Balanced: a stiff stop makes the rate of v huge in units of x, which would cost as many digits.
+    balanced, units = scipy.linalg.matrix_balance(jacobian, permute=False)
+    monodromy = units @ scipy.linalg.expm(balanced) @ np.linalg.inv(units)
+    return Equilibrium(point, 1, 0.0, monodromy, float(residual))
+
+
+def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex128]:
+    """Return the eigenvalues (s⁻¹) of the vector field's Jacobian at an equilibrium, the fastest growing first.
+
+    A StructureError is raised for a scene with periodic excitation, and for a point that is not at rest.
+    """
+    refuse_forcing(osc)
+    place, field = np.array(point, dtype=float), VectorField(osc)
+    exponents = np.linalg.eigvals(field.jacobian(place)).astype(complex)
+    speed = float(np.linalg.norm(field.rate(place)))
+    fastest = max(float(np.abs(exponents).max()), 1.0 / osc.time_unit)
+    if not speed <= _AT_REST * fastest * (size_of(osc) + float(np.linalg.norm(place))):
+        raise StructureError(
+            f"{tuple(np.round(place, 6).tolist())} is not an equilibrium: the state moves at {speed:.2e} per second "
+            "there; give a point at rest."
+        )
+    return exponents[np.argsort(-exponents.real, kind="stable")]
+
+
+def refuse_forcing(osc: Oscillator) -> None:
+    """Raise StructureError for a scene with periodic excitation."""
+    if not osc.autonomous:
+        raise StructureError(
+            f"the scene has periodic excitation (period {osc.section_interval:.6g} s), and only scenes without it "
+            "have cycles and equilibria; ask for its periodic orbits."
+        )
+
+
+class Cycle(Orbit):
+    """A closed orbit of a scene without periodic excitation, from a turning point (v = 0); its period is 1.
+
+    One eigenvalue of its monodromy matrix is 1: that of a shift along the cycle.
+    """
+
+    kind: ClassVar[str] = "limit cycle"
+
+    def refined(self, osc: Oscillator, stepper: Stepper) -> Cycle:
+        """Return the cycle that Newton's method finds from here with another stepper; may raise StructureError."""
+        return refine_cycle(osc, self.point, self.duration, stepper)
 
 
 def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Stepper) -> Cycle:
     """Refine a cycle by Newton's method on the turning point (v = 0) and the duration until the residual stays.
 
-    Parameters
-    ----------
-    osc : Oscillator
-        Without periodic excitation.
-    state : array (n,)
-        Near a turning point of the cycle; its v is set to 0.
-    duration : float
-        About the time after which the cycle repeats (s).
-    stepper : Stepper
-
-    Returns
-    -------
-    Cycle
-
-    Raises
-    ------
-    StructureError
-        A scene with periodic excitation, or no cycle so near that the iteration converges to it.
+    `state` is near a turning point of the cycle; its v is set to 0. A StructureError is raised for a scene with
+    periodic excitation, and if the iteration does not converge to a cycle.
     """
     refuse_forcing(osc)
     guess = np.array(state, dtype=float)
@@ -93,7 +140,7 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
             f"the residual is {residual:.1e}. The start is too far away, or the cycle is one of a family; follow the "
             "motion for longer, take a finer stepper, or give the scene damping."
         )
-    cycle = Cycle(turning_point(unknowns), float(unknowns[1]), monodromy, float(residual))
+    cycle = Cycle(turning_point(unknowns), 1, float(unknowns[1]), monodromy, float(residual))
     _check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
     return cycle
 
@@ -128,7 +175,7 @@ def _check_cycle(cycle: Cycle, rate: Array, size: float, stepper: Stepper) -> No
     """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself."""
     speed = float(np.linalg.norm(rate))
     place = tuple(np.round(cycle.point, 6).tolist())
-    if speed * cycle.duration < AT_REST * (size + float(np.linalg.norm(cycle.point))):
+    if speed * cycle.duration < _AT_REST * (size + float(np.linalg.norm(cycle.point))):
         raise StructureError(
             f"Newton's method converged to the equilibrium {place}, not to a cycle; start farther from it."
         )
@@ -143,25 +190,9 @@ def _check_cycle(cycle: Cycle, rate: Array, size: float, stepper: Stepper) -> No
 def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: float) -> Cycle:
     """Find the cycle that the motion from a state settles on, by the recurrence of its turning points.
 
-    Parameters
-    ----------
-    osc : Oscillator
-        Without periodic excitation.
-    state : array (n,)
-        On the cycle or near it.
-    stepper : Stepper
-    longest : float
-        Longest duration of a cycle to look for (s). The motion is followed for twice that time.
-
-    Returns
-    -------
-    Cycle
-        Its point is the turning point of greatest x.
-
-    Raises
-    ------
-    StructureError
-        A scene with periodic excitation, or motion that does not repeat within that time.
+    The motion is followed for twice `longest`, the longest duration of a cycle (s). The point of the cycle is the
+    turning point of greatest x. A StructureError is raised for a scene with periodic excitation, and for motion that
+    does not repeat within that time.
     """
     refuse_forcing(osc)
     spacing = osc.time_unit / _SAMPLES
