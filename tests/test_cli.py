@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 import signal
@@ -6,6 +7,7 @@ import sys
 import time
 from importlib.metadata import EntryPoint
 from types import SimpleNamespace
+from typing import Literal
 
 import pytest
 
@@ -32,11 +34,38 @@ def nothing_happens(problem):
     """What a toy analyzer does before it finds an energy."""
 
 
+@dataclasses.dataclass(frozen=True)
+class ToyPart:
+    """A part of an analyzer, with a setting of its own."""
+
+    depth: int = 1
+
+
+class ToyBox(vk.LeaveRegion):
+    """An exit with a setting."""
+
+    half: float = 1.0
+
+    def bounds(self, osc):
+        return [(-self.half, self.half), (-math.inf, math.inf)]
+
+
 class Toy(Analyzer):
     """Finds an energy for each attractor at once, unless something happens before."""
 
     happens = staticmethod(nothing_happens)
     scale: float = 1.0
+    count: int = 1
+    fast: bool = False
+    title: str = "toy"
+    sizes: tuple[float, ...] = ()
+    limit: float | None = None
+    form: Literal["round", "square"] = "round"
+    part: ToyPart = dataclasses.field(default_factory=ToyPart)
+
+    def __post_init__(self):
+        if self.scale + 0.0 < 0:  # a plug-in may calculate with its settings at once
+            raise ValueError("scale must not be negative.")
 
     def analyze(self, problem):
         with stage("toy", unit="steps", total=1):
@@ -62,14 +91,15 @@ def toys(well, monkeypatch, tmp_path):
     installed = registry._entry_points
 
     def entry_points(group):
-        if group != registry.Group.ANALYZERS:
-            return installed(group)
-        points = [EntryPoint(name, f"{__name__}:{cls}", group) for name, cls in [("toy", "Toy"), ("toy-2", "Toy2")]]
+        classes = {"vibrokit.analyzers": [("toy", "Toy"), ("toy-2", "Toy2")], "vibrokit.exits": [("toy-box", "ToyBox")]}
+        points = [EntryPoint(name, f"{__name__}:{cls}", group) for name, cls in classes.get(group, ())]
         for point in points:
             vars(point)["dist"] = SimpleNamespace(name="toys")
         return [*installed(group), *points]
 
-    monkeypatch.setitem(sys.modules, __name__, sys.modules.get(__name__) or SimpleNamespace(Toy=Toy, Toy2=Toy2))
+    monkeypatch.setitem(
+        sys.modules, __name__, sys.modules.get(__name__) or SimpleNamespace(Toy=Toy, Toy2=Toy2, ToyBox=ToyBox)
+    )
     monkeypatch.setattr(registry, "_entry_points", entry_points)
     monkeypatch.setattr("vibrokit.structure.find.find_structure", lambda osc, **options: well)
     monkeypatch.setattr(Toy, "happens", staticmethod(nothing_happens))
@@ -433,6 +463,71 @@ def test_mistakes_are_one_sentence_and_status_two(arguments, words, tmp_path, mo
     assert words in error
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([*TOY, "--set", "scale=abc"], ("Toy: scale", "'abc'", "a number")),
+        ([*TOY, "--set", "scale=1,2"], ("Toy: scale", "'1,2'", "a number")),
+        ([*TOY, "--set", "scale=none"], ("Toy: scale", "'none'", "a number")),
+        ([*TOY, "--set", "scale=true"], ("Toy: scale", "'true'", "a number")),
+        ([*TOY, "--set", "scale=-1"], ("Toy", "scale must not be negative.")),
+        ([*TOY, "--set", "count=2.5"], ("Toy: count", "'2.5'", "a whole number")),
+        ([*TOY, "--set", "fast=yes"], ("Toy: fast", "'yes'", "true or false")),
+        ([*TOY, "--set", "fast=1"], ("Toy: fast", "'1'", "true or false")),
+        ([*TOY, "--set", "sizes=1,x"], ("Toy: sizes", "'1,x'", "a number")),
+        ([*TOY, "--set", "limit=low"], ("Toy: limit", "'low'", "a number or none")),
+        ([*TOY, "--set", "form=flat"], ("Toy: form", "'flat'", "'round' or 'square'")),
+        ([*TOY, "--set", "part.depth=deep"], ("Toy: part.depth", "'deep'", "a whole number")),
+        ([*TOY, "toy-2", "--set", "scale=abc"], ("Toy: scale", "'abc'", "a number")),
+        ([*TOY, "--exit", "toy-box:wide"], ("ToyBox: half", "'wide'", "a number")),
+        ([*TOY, "--set", "exit=toy-box:wide"], ("ToyBox: half", "'wide'", "a number")),
+        (["run", "double-well", *PLOT, "--set", "points=many"], ("ActionPlot: points", "'many'", "a whole number")),
+        (["run", "double-well", *PLOT, "--set", "radius=abc"], ("ActionPlot: radius", "'abc'", "a number or none")),
+        (["run", "double-well", "--set", "orbits=2.5"], ("LeastAction: orbits", "'2.5'", "a whole number")),
+        (["run", "double-well", "--set", "graph.nodes=a,b"], ("LeastAction: graph.nodes", "'a,b'", "whole number")),
+        (["run", "double-well", "--set", "graph.nodes=3"], ("LeastAction: graph.nodes", "'3'", "2 values")),
+        (["run", "double-well", "--set", "shooting.tolerance=x"], ("LeastAction: shooting.tolerance", "'x'", "number")),
+    ],
+)
+def test_a_setting_of_another_type_is_refused_by_name(toys, capsys, arguments, words):
+    """The sentence has the setting, the value and what is allowed; the plug-in's own code is never reached with it."""
+    assert main(arguments) == 2
+    error = capsys.readouterr().err.strip()
+    assert error.startswith("vibrokit: ")
+    assert all(word in error for word in words)
+    assert error.count("\n") == 0
+    assert error.endswith(".")
+
+
+def test_settings_are_read_as_their_declared_types(toys, capsys):
+    typed = ("scale=2", "count=3", "fast=true", "title=12", "sizes=0.5", "limit=1e-3", "form=square", "part.depth=4")
+    assert main([*TOY, "--json", *(word for text in typed for word in ("--set", text))]) == 0
+    settings = json.loads(capsys.readouterr().out)["settings"]["toy"]
+    assert (settings["scale"], settings["count"], settings["fast"], settings["title"]) == (2, 3, True, "12")
+    assert (settings["sizes"], settings["limit"], settings["form"]) == ([0.5], 1e-3, "square")
+    assert settings["part"] == {"depth": 4}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"title": 12}, "title must be text, got 12"),
+        ({"fast": 0}, "true or false"),
+        ({"part.depth": 0.5}, "part.depth"),
+    ],
+)
+def test_settings_of_a_file_are_checked_too(given, words):
+    with pytest.raises(StructureError, match=words):
+        configured(Toy, given)
+
+
+def test_a_type_that_is_not_known_at_run_time_is_not_checked():
+    class Odd(Toy):
+        odd: "NoSuchName" = 1  # noqa: F821
+
+    assert configured(Odd, dict([setting("odd=abc")])).odd == "abc"
 
 
 def test_help_is_quick_and_light():

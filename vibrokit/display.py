@@ -19,12 +19,7 @@ _WIDTH = 80  # columns of a terminal that does not tell
 class Display:
     """A live line on a terminal; elsewhere one line for each stage that took a while, once it has ended.
 
-    Parameters
-    ----------
-    stream : text file, optional
-        By default standard error.
-    clock : callable
-        Returns the time (s).
+    The stream is by default standard error; the clock returns the time (s).
     """
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.perf_counter) -> None:

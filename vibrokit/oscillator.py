@@ -241,13 +241,7 @@ def seed_from(rng: int | np.random.Generator) -> int:
 
 
 def generator_from(rng: int | np.random.Generator) -> np.random.Generator:
-    """Return the generator of a seed, or the given generator.
-
-    Raises
-    ------
-    ParameterError
-        `rng` is neither a generator nor a whole number, at least 0.
-    """
+    """Return the generator of a seed, or the given generator; ParameterError for anything else."""
     try:
         if isinstance(rng, bool):
             raise TypeError("bool")

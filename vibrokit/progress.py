@@ -109,22 +109,15 @@ class _Stage:
         if self.total and self.done and elapsed >= _SETTLED:
             self.remaining = min(self.remaining, elapsed * max(0, self.total - self.done) / self.done)
         known = None if math.isinf(self.remaining) else self.remaining
-        return Update(
-            self.name, self.subject, self.done, self.total, self.unit, elapsed, known, compiling, finished
-        )  # fmt: skip
+        described = self.name, self.subject, self.done, self.total, self.unit
+        return Update(*described, elapsed, known, compiling, finished)
 
 
 class Work:
-    """One piece of work that a user asked for: its stages, its counts, its time limit.
+    """One piece of work that a user asked for: its stages, its counts, its time limit (s).
 
-    Parameters
-    ----------
-    listener : callable, optional
-        Called with an `Update` whenever something is done; by default that of the work around it.
-    time_limit : float, optional
-        Time after which `OutOfTime` is raised at the next report (s).
-    outer : Work, optional
-        The work that this one is a part of: its time limit stays in force, and what is counted here counts there too.
+    The listener is by default that of the work around it, `outer`. The time limit of that stays in force, and what is
+    counted here counts there too.
     """
 
     def __init__(
@@ -207,17 +200,9 @@ def working(progress: Progress = None, time_limit: float | None = None) -> Itera
 
 @contextlib.contextmanager
 def stage(name: str, *, subject: str = "", unit: str = "", total: int | None = None) -> Iterator[None]:
-    """Open a stage of the work under way.
+    """Open a stage of the work under way; arguments as for `Update`.
 
-    Parameters
-    ----------
-    name : str
-    subject : str
-        Name of the attractor that it is for; by default that of the stage around it.
-    unit : str
-        What is counted, in the plural.
-    total : int, optional
-        How many there are; None where that is not known beforehand.
+    The subject is by default that of the stage around it.
     """
     work = current()
     around = work.inside
@@ -249,8 +234,8 @@ def report(done: int, total: int | None = None) -> None:
     """Set what is done in the innermost stage, and how much there is."""
     work = current()
     if work.stages:
-        work.stages[-1].done = done
-        work.stages[-1].total = total if total is not None else work.stages[-1].total
+        own = work.stages[-1]
+        own.done, own.total = done, own.total if total is None else total
     work.tell()
 
 
@@ -290,6 +275,4 @@ def _listener(progress: Progress) -> Listener | None:
         return display
     if callable(progress):
         return progress
-    raise StructureError(
-        f"progress must be True, None or a function of one Update, got {shown(progress)}."
-    )  # fmt: skip
+    raise StructureError(f"progress must be True, None or a function of one Update, got {shown(progress)}.")

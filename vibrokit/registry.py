@@ -145,15 +145,11 @@ def _origin(entry: EntryPoint) -> str:
     return entry.dist.name if entry.dist is not None else "an unnamed distribution"
 
 
-def _rank(entry: EntryPoint) -> tuple[bool, str]:
-    origin = _origin(entry)
-    return origin != BUILT_IN, origin.lower()
-
-
 def _candidates(group: Group, only: str | None = None) -> dict[str, list[EntryPoint]]:
     """Entry points by name, in the order in which they are tried; warns if a name has several."""
     found: dict[str, list[EntryPoint]] = {}
-    for entry in sorted(_entry_points(group), key=lambda entry: (entry.name, _rank(entry))):
+    ranked = sorted(_entry_points(group), key=lambda e: (e.name, _origin(e) != BUILT_IN, _origin(e).lower()))
+    for entry in ranked:
         if only is None or entry.name == only:
             found.setdefault(entry.name, []).append(entry)
     for name, (first, *others) in found.items():

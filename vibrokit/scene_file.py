@@ -67,22 +67,15 @@ def _find(source: str | os.PathLike[str]) -> Path:
     if not isinstance(source, str | os.PathLike):
         raise SceneError(f"the scene must be the path of a TOML file or one of {_bundled()}, got {shown(source)}.")
     path = Path(source)
-    if str(source) in bundled_scenes() and not _is(path.is_file):
+    if str(source) in bundled_scenes() and not os.path.isfile(path):
         return _BUNDLED / f"{source}.toml"
-    if _is(path.is_dir):
+    if os.path.isdir(path):
         raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled()}.")
-    if not _is(path.exists):
+    if not os.path.exists(path):  # False too for text that cannot be the name of a file
         raise UnknownNameError(
             f"there is no file or bundled scene {shown(str(source))}{nearest(str(source), bundled_scenes())}"
         )
     return path
-
-
-def _is(question: Callable[[], bool]) -> bool:
-    try:
-        return question()
-    except (OSError, ValueError):  # not a possible file name
-        return False
 
 
 def _bundled() -> str:

@@ -15,7 +15,7 @@ import vibrokit as vk
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.source import scene_text
+from vibrokit.symbolic.source import SceneText
 from vibrokit.symbolic.symbols import parameter_symbols
 
 DIGITS = 160  # so that second differences are good to 50
@@ -272,7 +272,7 @@ def test_located(name, tmp_path):
     case, flow = CASES[name], Flow.HAMILTONIAN_VARIATIONAL
     if name == "hunt-crossley":
         case = dataclasses.replace(case, acceleration=with_stops(hunt_crossley, "right", "left"))
-    text = scene_text(case.scene, flow)
+    text = SceneText(case.scene, flow)
     path = tmp_path / f"located_{name.replace(' ', '_').replace('-', '_')}.py"
     path.write_text("\n\n".join([text.preamble, text.constants, text.forcing, text.rhs]))
     specification = importlib.util.spec_from_file_location(path.stem, path)

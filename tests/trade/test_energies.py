@@ -13,7 +13,7 @@ from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.cli import main
 from vibrokit.errors import SceneError, StructureError
 from vibrokit.trade.energies import GRAPHS, SHOOTINGS, measure_energies
-from vibrokit.trade.table import Trade, TradeRow
+from vibrokit.trade.steppers import Trade, TradeRow
 
 pytestmark = pytest.mark.slow
 

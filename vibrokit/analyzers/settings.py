@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from vibrokit.analyzers.exits import Exit
-from vibrokit.errors import SceneError, StructureError, UnknownNameError, nearest, shown
+from vibrokit.analyzers.setting_types import Typed, checked
+from vibrokit.errors import SceneError, StructureError, UnknownNameError, VibrokitError, nearest, shown
 from vibrokit.kernels.named import name_of as stepper_name
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -15,8 +16,6 @@ from vibrokit.registry import Group, load, name_of
 
 if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer
-
-_NONE = "none"
 
 
 def settings_of(analyzer: Analyzer) -> dict[str, Any]:
@@ -71,31 +70,39 @@ def configured(kind: type[Analyzer], settings: Mapping[str, Any]) -> Analyzer:
             nested[name] = value
         elif isinstance(nested.setdefault(part, {}), dict):
             nested[part][inner] = value
-    return _made(kind, nested)
+    return _made(kind, nested, f"{kind.__name__}: ")
 
 
-def _made(kind: type, settings: Mapping[str, Any]) -> Any:
+def _made(kind: type, settings: Mapping[str, Any], place: str) -> Any:
+    """Make an analyzer, a part of it or an exit; `place` names it before its settings in messages."""
     fields = {field.name: field for field in dataclasses.fields(kind)}
     for name in settings:
         if name not in fields:
             raise UnknownNameError(f"{kind.__name__} has no setting {name!r}{_where(fields, name)}")
-    return kind(**{name: _read(kind, fields[name], value) for name, value in settings.items()})
+    values = {name: _read(kind, fields[name], value, f"{place}{name}") for name, value in settings.items()}
+    try:
+        return kind(**values)
+    except VibrokitError:
+        raise
+    except ValueError as error:  # the way in which Python's own classes refuse a value
+        raise StructureError(f"{kind.__name__}: {error}") from error
 
 
-def _read(kind: type, field: dataclasses.Field[Any], value: Any) -> Any:
+def _read(kind: type, field: dataclasses.Field[Any], value: Any, place: str) -> Any:
     if field.name == "exit" and isinstance(value, dict):
         exit_kind = load(Group.EXITS, str(value.get("name")), Exit)
-        return _made(exit_kind, {name: entry for name, entry in value.items() if name != "name"})
-    if field.name == "exit" and isinstance(value, str):
-        return named_exit(value)
-    if field.name == "stepper" and isinstance(value, str):
-        return named_stepper(value)
+        return _made(exit_kind, {name: entry for name, entry in value.items() if name != "name"}, f"{place}.")
+    if isinstance(value, str) and value != "none":
+        if field.name == "exit":
+            return named_exit(value)
+        if field.name == "stepper":
+            return named_stepper(value)
     if isinstance(value, dict):
         part = _part_of(field)
         if part is None:
             raise UnknownNameError(f"{kind.__name__} has no part {field.name!r} with settings of its own.")
-        return _made(part, value)
-    return tuple(value) if isinstance(value, list) else value
+        return _made(part, value, f"{place}.")
+    return checked(place, kind, field, tuple(value) if isinstance(value, list) else value)
 
 
 def _part_of(field: dataclasses.Field[Any]) -> type | None:
@@ -111,8 +118,8 @@ def _where(fields: Mapping[str, dataclasses.Field[Any]], name: str) -> str:
     return f"; write {' or '.join(homes)}." if homes else nearest(name, fields)
 
 
-def setting(text: str) -> tuple[str, Any]:
-    """Read a setting from the command line, such as ``points=40000``, ``graph.nodes=240,240`` or ``graph=none``.
+def setting(text: str) -> tuple[str, Typed]:
+    """Split a setting from the command line, such as ``points=40000``, ``graph.nodes=240,240`` or ``graph=none``.
 
     Raises
     ------
@@ -125,19 +132,7 @@ def setting(text: str) -> tuple[str, Any]:
             f"setting {text!r}: write FIELD=VALUE, such as points=40000, graph.nodes=240,240, source=clear or "
             "graph=none."
         )
-    values = tuple(_value(word.strip()) for word in value.split(","))
-    return name, values[0] if len(values) == 1 else values
-
-
-def _value(word: str) -> int | float | str | None:
-    if word == _NONE:
-        return None
-    for read in (int, float):
-        try:
-            return read(word)
-        except ValueError:
-            continue
-    return word
+    return name, Typed(value)
 
 
 def named_exit(text: str) -> Exit:
@@ -153,7 +148,7 @@ def named_exit(text: str) -> Exit:
     name, colon, arguments = text.partition(":")
     kind = load(Group.EXITS, name, Exit)
     fields = dataclasses.fields(kind)
-    values = [_value(word) for word in arguments.split(",")] if colon else []
+    values = [Typed(word) for word in arguments.split(",")] if colon else []
     if len(values) > len(fields):
         raise StructureError(f"exit {shown(text)}: {name} takes {len(fields)} arguments, got {len(values)}.")
-    return kind(*values)
+    return _made(kind, {field.name: value for field, value in zip(fields, values, strict=False)}, f"{kind.__name__}: ")

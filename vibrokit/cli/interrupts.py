@@ -21,15 +21,10 @@ class Interrupts:
     that keeps its result. Here the first Ctrl-C raises nothing: it is remembered, and the work itself raises it at its
     next report. What was found is saved and printed in a second phase, which a Ctrl-C does not disturb. A second Ctrl-C
     in either phase raises KeyboardInterrupt at once.
-
-    Attributes
-    ----------
-    requested : bool
-        Whether Ctrl-C was pressed.
     """
 
     def __init__(self) -> None:
-        self.requested = False
+        self.requested = False  # whether Ctrl-C was pressed
         self._work: Work | None = None
         self._presses = 0  # in this phase
         self._finishing = False

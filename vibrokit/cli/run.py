@@ -9,7 +9,7 @@ import sys
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vibrokit.cli.interrupts import Interrupts
 from vibrokit.errors import VibrokitError
@@ -94,13 +94,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def planned(options: argparse.Namespace) -> Plan:
-    """Check what is asked for, and load what saves and prints: an import that Ctrl-C ends cannot be repeated.
-
-    Raises
-    ------
-    VibrokitError
-        Something that is asked for does not exist or is not allowed.
-    """
+    """Check what is asked for, and load what saves and prints: an import that Ctrl-C ends cannot be repeated."""
     import vibrokit.report.data
     import vibrokit.report.text
     import vibrokit.results.files  # noqa: F401 - loaded for later
@@ -122,13 +116,10 @@ def planned(options: argparse.Namespace) -> Plan:
     checked_time_limit(options.time_limit)
     osc = load_scene(options.scene)
     stepper = None if options.stepper is None else named_stepper(options.stepper)
-    given = {
-        "stepper": stepper,
-        "exit": None if options.exit is None else named_exit(options.exit),
-        "source": None if options.source is None else source_of(options.source),
-    }
-    settings = dict(setting(text) for text in options.set)
-    settings |= {name: value for name, value in given.items() if value is not None}
+    settings: dict[str, Any] = dict(setting(text) for text in options.set)
+    settings |= {} if stepper is None else {"stepper": stepper}
+    settings |= {} if options.exit is None else {"exit": named_exit(options.exit)}
+    settings |= {} if options.source is None else {"source": source_of(options.source)}
     kinds = {name: load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer}
     return Plan(osc, stepper, {name: configured(kind, settings) for name, kind in kinds.items()})
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.kernels.order8 import LocatedStepper
-from vibrokit.symbolic.scene_text import SceneText
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +27,6 @@ class FreeFlight(LocatedStepper):
 
     name: ClassVar[str] = "free_flight"
     templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "located", "free_flight", "sections")
-    flight: ClassVar[bool] = True
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, and the series of the flight."""

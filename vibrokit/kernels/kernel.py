@@ -111,9 +111,9 @@ def first_call(function: Any) -> contextlib.AbstractContextManager[None]:
 
 def write_source(scene: Scene, flow: Flow, stepper: Emitter) -> str:
     """Derive the equations and write the module, scene above and stepper below."""
-    from vibrokit.symbolic.source import scene_text  # only here is SymPy needed
+    from vibrokit.symbolic.source import SceneText  # only here is SymPy needed
 
-    text = scene_text(scene, flow, flight=stepper.flight)
+    text = SceneText(scene, flow)
     templates = [read_template(name) for name in stepper.templates_for(text)]
     imports = "\n".join(dict.fromkeys(line for template in templates for line in template.imports))
     body = "\n\n".join(template.body.strip("\n") + "\n" for template in templates)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from vibrokit.symbolic.scene_text import SceneText
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)

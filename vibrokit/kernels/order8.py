@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.scene_text import SceneText
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0

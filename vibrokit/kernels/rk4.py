@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.lanes import lane_step, tabulation
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
-from vibrokit.symbolic.scene_text import SceneText
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 _LARGEST = 10**7
 

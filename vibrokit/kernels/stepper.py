@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.scene_text import SceneText
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,7 +25,6 @@ class Emitter(ABC):
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
-    flight: ClassVar[bool] = False
 
     @abstractmethod
     def scene_part(self, text: SceneText) -> list[str]:

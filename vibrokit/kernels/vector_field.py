@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import types
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.scene_text import SceneText
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 Array = NDArray[np.float64]
 

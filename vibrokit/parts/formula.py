@@ -72,10 +72,7 @@ def check_parameter_names(names: Sequence[str], taken: Sequence[str]) -> None:
 def read(text: object, known: Collection[str]) -> tuple[str, ast.expr]:
     """Check a formula in `known` names; return it without outer spaces, and its syntax tree, which is arithmetic only.
 
-    Raises
-    ------
-    FormulaError
-        The text contains anything else; the message gives its value, its column and what is allowed.
+    The FormulaError for any other text gives its value, its column and what is allowed.
     """
     source = _checked_text(text)
     tree = _parsed(source)

@@ -21,18 +21,9 @@ _FAILURES = (ArithmeticError, AttributeError, NotImplementedError, RecursionErro
 
 
 def expression(text: object, values: Mapping[str, Any]) -> sympy.Expr:
-    """Check a formula and return it as a SymPy expression.
+    """Check a formula and return it as a SymPy expression, with `values` for the names that it may use.
 
-    Parameters
-    ----------
-    text : str
-    values : mapping of str to sympy.Expr
-        Real symbols, expressions or numbers for the names that the formula may use.
-
-    Raises
-    ------
-    FormulaError
-        The formula or a value is not allowed, or the expression is not finite and real.
+    FormulaError is raised if the formula or a value is not allowed, or the expression is not finite and real.
     """
     source, tree = read(text, values)
     symbols = {name: _value(name, value) for name, value in values.items()}

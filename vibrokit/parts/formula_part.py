@@ -21,6 +21,7 @@ class FormulaPart:
 
     formula: str
     constants: tuple[tuple[str, Any], ...]
+    _declared: ClassVar[tuple[Parameter, ...]]
 
     def _read(self, formula: str, constants: Mapping[str, Any]) -> None:
         """Check formula and constants and store them."""
@@ -35,7 +36,7 @@ class FormulaPart:
 
     def _own(self) -> tuple[Parameter, ...]:
         """Parameters that the class declares besides formula and constants."""
-        return ()
+        return tuple(declared for declared in self._declared if declared.attribute not in ("formula", "constants"))
 
     def declared(self) -> tuple[Parameter, ...]:
         """Parameters of this part: its own, the formula (structural), then each constant."""

@@ -14,7 +14,7 @@ from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour
 
 if TYPE_CHECKING:
-    from vibrokit.trade.table import TradeRow
+    from vibrokit.trade.steppers import TradeRow
 
 _FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axis
 
@@ -44,7 +44,7 @@ def work_precision(rows: Sequence[TradeRow], *, ax: Axes | None = None) -> Trade
     Parameters
     ----------
     rows : sequence of TradeRow
-        From coarse to fine; any objects with the attributes of `vibrokit.trade.table.TradeRow` will do.
+        From coarse to fine; any objects with the attributes of `vibrokit.trade.steppers.TradeRow` will do.
     ax : matplotlib Axes, optional
 
     Returns

@@ -78,11 +78,7 @@ def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
         if isinstance(node, sympy.Pow):
             if node.exp.is_Integer and node.exp.is_nonnegative:
                 continue
-            if variable in node.exp.free_symbols:
-                base_vanishes = node.base.subs(variable, 0).is_zero is not False
-            else:
-                base_vanishes = variable in node.base.free_symbols and node.base.subs(variable, 0).is_zero is not False
-            if base_vanishes:
+            if node.base.subs(variable, 0).is_zero is not False:  # the base vanishes
                 return False
         elif isinstance(node, (sympy.Add, sympy.Mul, sympy.Symbol, *_ANALYTIC)):
             continue
@@ -125,8 +121,6 @@ def _at_touch(expression: sympy.Expr) -> sympy.Expr | None:
 def _leading_power(law: sympy.Expr) -> sympy.Expr | None:
     terms = sympy.Add.make_args(sympy.expand(law))
     powers = [term.as_independent(DEPTH)[1].as_base_exp() for term in terms]
-    if all(base == DEPTH or base == 1 for base, _ in powers):
-        exponents = [exponent if base == DEPTH else sympy.Integer(0) for base, exponent in powers]
-        numbers = [exponent for exponent in exponents if exponent.is_number]
-        return min(numbers) if len(numbers) == len(exponents) else None
-    return None
+    exponents = [exponent if base == DEPTH else sympy.Integer(0) for base, exponent in powers]
+    known = all(base in (DEPTH, 1) for base, _ in powers) and all(exponent.is_number for exponent in exponents)
+    return min(exponents) if known else None

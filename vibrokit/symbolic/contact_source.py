@@ -14,13 +14,7 @@ _SIDE = sympy.Symbol("side")
 
 
 class ContactWriter:
-    """Writes the contact terms that a flow needs.
-
-    Parameters
-    ----------
-    model : Model
-    equations : FlowEquations
-    """
+    """Writes the contact terms that a flow needs."""
 
     def __init__(self, model: Model, equations: FlowEquations) -> None:
         self.model = model
@@ -52,7 +46,12 @@ class ContactWriter:
         if self.merged:
             second = {symbol for symbol, (stop, _, _) in self.needed.items() if stop == self.stops[1]}
             return self._merged_lines(), second
-        return [line for stop in self.stops for line in self._guarded_lines(stop)], set()
+        lines = []
+        for stop in self.stops:
+            depth, rate = self._depth_and_rate(stop)
+            side = sympy.Integer(self.model.scene.barriers[stop].sign)
+            lines += [f"    depth = {depth}", *self._guarded_terms(stop, side, rate, f"d{stop}_")]
+        return lines, set()
 
     def switched(self) -> list[str]:
         """Lines in which the caller switches each stop on or off by ``pushing``."""
@@ -81,35 +80,25 @@ class ContactWriter:
             return f"x - {position}", "v"
         return f"{position} - x", "-v"
 
-    def _guard(self, stop: int, terms: dict[str, sympy.Expr], rate: str) -> list[str]:
-        """Lines that set ``touching`` to whether the stop pushes, and make depth positive."""
-        clamped = self.model.contacts[stop].clamped
-        lines = ["    touching = depth > 0.0", "    depth = depth if touching else 1.0"]
-        if clamped or _uses_rate(terms):
-            lines.append(f"    rate = {rate}")
-        if clamped:
-            push = SourcePrinter().doprint(printable(self.model.contacts[stop].law))
-            lines.append(f"    touching = touching and {push} > 0.0")
-        return lines
-
-    def _guarded_lines(self, stop: int) -> list[str]:
-        depth, rate = self._depth_and_rate(stop)
-        terms = self._terms(stop, sympy.Integer(self.model.scene.barriers[stop].sign))
-        lines, texts = assignments(terms, f"d{stop}_")
-        guard = [f"    depth = {depth}", *self._guard(stop, terms, rate)]
+    def _guarded_terms(self, stop: int, side: sympy.Expr, rate: str, temporary: str) -> list[str]:
+        """Lines that compute the terms of a stop at ``depth``, and set them to zero where it does not push."""
+        terms, contact = self._terms(stop, side), self.model.contacts[stop]
+        guard = ["    touching = depth > 0.0", "    depth = depth if touching else 1.0"]
+        if contact.clamped or _uses_rate(terms):
+            guard.append(f"    rate = {rate}")
+        if contact.clamped:
+            guard.append(f"    touching = touching and {SourcePrinter().doprint(printable(contact.law))} > 0.0")
+        lines, texts = assignments(terms, temporary)
         return [*guard, *lines, *(f"    {name} = {text} if touching else 0.0" for name, text in texts.items())]
 
     def _merged_lines(self) -> list[str]:
         first, second = self.stops
-        terms = self._terms(first, _SIDE)
-        lines, texts = assignments(terms, "d")
         (near, _), (far, _) = self._depth_and_rate(first), self._depth_and_rate(second)
         sign = float(self.model.scene.barriers[first].sign)
         head = [f"    depth = {near}", f"    other = {far}", "    nearer = depth > other"]
         head += ["    depth = depth if nearer else other", f"    side = {sign} if nearer else {-sign}"]
         head += [f"    {one} = {one} if nearer else {other}" for one, other in self._partners()]
-        head += self._guard(first, terms, "side*v")
-        return [*head, *lines, *(f"    {name} = {text} if touching else 0.0" for name, text in texts.items())]
+        return [*head, *self._guarded_terms(first, _SIDE, "side*v", "d")]
 
     def _switched_lines(self, stop: int) -> list[str]:
         depth, rate = self._depth_and_rate(stop)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import sympy
 
 from vibrokit.errors import StepperError
@@ -16,17 +18,8 @@ class FlightWriter:
     """Writes `flight_rate` and `taylor` for a flow without contact.
 
     The Taylor series solves a linear system under sinusoidal forces: at order 22, a step of 1.5 divided by the largest
-    rate is exact to rounding, at any damping and at resonance.
-
-    Parameters
-    ----------
-    model : Model
-    equations : FlowEquations
-
-    Raises
-    ------
-    StepperError
-        The motion between stops is not linear, or a force is not a sum of sinusoids.
+    rate is exact to rounding, at any damping and at resonance. StepperError is raised where the motion between stops is
+    not linear, or a force is not a sum of sinusoids.
     """
 
     def __init__(self, model: Model, equations: FlowEquations) -> None:
@@ -35,24 +28,18 @@ class FlightWriter:
         no_contact = dict.fromkeys(equations.contacts, sympy.Integer(0))
         self.rates = [sympy.expand(rate.xreplace(no_contact)) for rate in equations.rates]
         self.waves = sinusoids(model)
-        self.polynomials = [
-            self._polynomial(variable, rate) for variable, rate in zip(self.variables, self.rates, strict=True)
-        ]
+        self.polynomials = [self._polynomial(*pair) for pair in zip(self.variables, self.rates, strict=True)]
 
     def _polynomial(self, variable: sympy.Symbol, rate: sympy.Expr) -> sympy.Poly:
         allowed = 2 if str(variable) == "S" else 1
-        try:
+        with contextlib.suppress(sympy.PolynomialError):
             polynomial = sympy.Poly(rate, *self.variables, FORCING)
-        except sympy.PolynomialError:
-            polynomial = None
-        if polynomial is None or polynomial.total_degree() > allowed or self._inexact(polynomial):
-            raise StepperError(
-                f"FreeFlight needs linear motion between the stops, got {variable}' = {rate}; use Order8 or RK4."
-            )
-        return polynomial
-
-    def _inexact(self, polynomial: sympy.Poly) -> bool:
-        return any(coefficient.free_symbols & {*self.variables, FORCING} for coefficient in polynomial.coeffs())
+            used = set().union(*(coefficient.free_symbols for coefficient in polynomial.coeffs()))
+            if polynomial.total_degree() <= allowed and used.isdisjoint((*self.variables, FORCING)):
+                return polynomial
+        raise StepperError(
+            f"FreeFlight needs linear motion between the stops, got {variable}' = {rate}; use Order8 or RK4."
+        )
 
     def text(self, places: dict[sympy.Symbol, int]) -> str:
         """Both functions; `places` has the index of each parameter in ``theta``."""
@@ -63,15 +50,14 @@ class FlightWriter:
         stiffness, damping = (sympy.diff(self.rates[1], variable) for variable in (x, v))
         bounds = [2 * sympy.sqrt(sympy.Abs(stiffness)) + sympy.Abs(damping)]
         bounds += [sympy.Abs(frequency) for frequency, _, _ in self.waves]
-        for row in range(2, 2 + len(extra)):
-            bounds.append(sum(sympy.Abs(sympy.diff(self.rates[row], variable)) for variable in self.model.state))
+        for rate in self.rates[2 : 2 + len(extra)]:
+            bounds.append(sum(sympy.Abs(sympy.diff(rate, variable)) for variable in self.model.state))
         # A covariance decays at the sum of two rates of the motion.
         pairs = [(v, rate) for v, rate in zip(self.variables, self.rates, strict=True) if str(v).startswith("W")]
         bounds += [sympy.Abs(own) for own in dict.fromkeys(sympy.diff(rate, v) for v, rate in pairs) if own != 0]
-        printer = SourcePrinter()
-        text = printer.doprint(bounds[0])
-        for bound in bounds[1:]:
-            text = f"max({text}, {printer.doprint(bound)})"
+        text, *others = map(SourcePrinter().doprint, bounds)
+        for other in others:
+            text = f"max({text}, {other})"
         lines = [*unpack(bounds, places), f"    return {text}", ""]
         return "\n".join(["@njit(**OPTIONS)", "def flight_rate(theta):", *lines])
 
@@ -113,13 +99,7 @@ class FlightWriter:
 
 
 def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
-    """Split the forcing into sinusoids: (ω, value, value shifted by a quarter period) of each, so that even′ = ω·odd.
-
-    Raises
-    ------
-    StepperError
-        The forcing is not a sum of sinusoids.
-    """
+    """Split the forcing into sinusoids: (ω, even, odd) of each, the value and its derivative divided by ω."""
     time = model.time
     forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing
     waves = []
@@ -127,7 +107,7 @@ def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
         if term == 0:
             continue
         factor, wave = term.as_independent(time)
-        if not isinstance(wave, sympy.cos | sympy.sin) or not _is_linear(wave.args[0], time):
+        if not isinstance(wave, sympy.cos | sympy.sin) or sympy.diff(wave.args[0], time, 2) != 0:
             raise StepperError(
                 f"FreeFlight needs excitations that are sums of sinusoids, got {term}; use Order8 or RK4."
             )
@@ -135,7 +115,3 @@ def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
         odd = -sympy.sin(angle) if isinstance(wave, sympy.cos) else sympy.cos(angle)
         waves.append((sympy.diff(angle, time), factor * wave, factor * odd))
     return waves
-
-
-def _is_linear(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
-    return sympy.diff(expression, variable, 2) == 0

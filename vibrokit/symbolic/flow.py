@@ -17,20 +17,11 @@ FORCING = sympy.Symbol("f", real=True)
 
 @dataclasses.dataclass(frozen=True)
 class FlowEquations:
-    """Rates of a flow, with one symbol per contact term.
-
-    Attributes
-    ----------
-    variables : tuple of Symbol
-    rates : tuple of Expr
-        In the variables, the parameters, FORCING and the symbols of `contacts`.
-    contacts : dict
-        Symbol → (stop index, orders of differentiation in x and in v) of each needed contact term.
-    """
+    """Rates of a flow, with one symbol per contact term."""
 
     variables: tuple[sympy.Symbol, ...]
-    rates: tuple[sympy.Expr, ...]
-    contacts: dict[sympy.Symbol, tuple[int, int, int]]
+    rates: tuple[sympy.Expr, ...]  # in the variables, the parameters, FORCING and the symbols of `contacts`
+    contacts: dict[sympy.Symbol, tuple[int, int, int]]  # stop, orders in x and in v of each needed contact term
 
 
 class ReversedModel(Model):
@@ -40,10 +31,6 @@ class ReversedModel(Model):
     integrate it and locate its contacts as for any scene. The symbols v and t of this model stand for w and s. A law
     is evaluated at the rate of the forward motion, which decides where it would pull. Forces that jump at first touch
     jump at release instead; x′ is continuous at both, so the backward motion is unique.
-
-    Parameters
-    ----------
-    scene : Scene
     """
 
     @cached_property
@@ -113,11 +100,9 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
 
 
 def _with_plain_contacts(
-    model: Model,
-    opaque: tuple[sympy.Expr, ...],
-    variables: tuple[sympy.Symbol, ...],
-    rates: list[sympy.Expr],
+    model: Model, opaque: tuple[sympy.Expr, ...], variables: tuple[sympy.Symbol, ...], rates: list[sympy.Expr]
 ) -> FlowEquations:
+    """Replace the force of each stop and its derivatives by one symbol each; what is always 0 is left out."""
     x, v = model.state[:2]
     contacts: dict[sympy.Symbol, tuple[int, int, int]] = {}
     replacements = {}

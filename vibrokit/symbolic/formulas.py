@@ -16,21 +16,10 @@ _LARGEST_DENOMINATOR = 64
 def derived_formula(
     part: Any, method: str, values: Mapping[str, sympy.Expr], arguments: tuple[sympy.Symbol, ...]
 ) -> sympy.Expr:
-    """Return the formula of `part` as an expression in `arguments` and the symbols of its parameters.
+    """Return what a formula method of `part` gives for `arguments` and the symbols `values` of its numeric parameters.
 
-    Parameters
-    ----------
-    part : Part
-    method : str
-        Name of the formula method.
-    values : mapping
-        Symbol of each numeric parameter; structural parameters keep their values.
-    arguments : tuple of Symbol
-
-    Raises
-    ------
-    DerivationError
-        The method failed for symbols, or the result is not an expression in the given symbols.
+    Structural parameters keep their values. DerivationError is raised if the method fails for symbols, or the result is
+    not an expression in the given symbols.
     """
     named = {d.name: values.get(d.name, exact(part.parameters[d.name])) for d in part.declared()}
     title = f"{type(part).__name__}.{method}"
@@ -49,7 +38,10 @@ def derived_formula(
             f"{title} uses {', '.join(sorted(map(str, strange)))}, neither an argument nor a parameter; declare it as "
             "a field with parameter(...)."
         )
-    return with_exact_exponents(answer)
+    return answer.replace(  # floating-point exponents, as in depth**1.5
+        lambda node: isinstance(node, sympy.Pow) and isinstance(node.exp, sympy.Float),
+        lambda power: sympy.Pow(power.base, exact(float(power.exp))),
+    )
 
 
 def exact(value: Any) -> Any:
@@ -60,16 +52,3 @@ def exact(value: Any) -> Any:
             return sympy.Rational(fraction.numerator, fraction.denominator)
         return sympy.Float(value, 17)
     return value
-
-
-def with_exact_exponents(expression: sympy.Expr) -> sympy.Expr:
-    """Replace floating-point exponents, as in ``depth**1.5``, by the result of `exact`."""
-
-    def is_float_power(node: sympy.Basic) -> bool:
-        return isinstance(node, sympy.Pow) and isinstance(node.exp, sympy.Float)
-
-    def exact_power(node: sympy.Basic) -> sympy.Expr:
-        base, exponent = node.args
-        return sympy.Pow(base, exact(float(exponent)))
-
-    return expression.replace(is_float_power, exact_power)

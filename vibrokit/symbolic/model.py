@@ -10,7 +10,7 @@ from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
 from vibrokit.symbolic.formulas import derived_formula
-from vibrokit.symbolic.reading import as_latex, as_text
+from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
 
 
@@ -36,12 +36,8 @@ class Model:
         self.state = tuple(sympy.Symbol(name, real=True) for name in ("x", "v", *extra))
 
     def _symbols_of(self, prefix: str) -> dict[str, sympy.Symbol]:
-        start = f"{prefix}." if prefix else ""
-        return {
-            path.removeprefix(start): symbol
-            for path, symbol in self.symbols.items()
-            if path.startswith(start) and "." not in path.removeprefix(start)
-        }
+        paths = (path for path in self.symbols if path.startswith(f"{prefix}."))
+        return {path.removeprefix(f"{prefix}."): self.symbols[path] for path in paths}
 
     @cached_property
     def contacts(self) -> tuple[DerivedContact, ...]:
@@ -51,26 +47,17 @@ class Model:
             for index, barrier in enumerate(self.scene.barriers)
         )
 
-    def depth(self, index: int) -> sympy.Expr:
-        """Depth at stop `index` as an expression in x; negative without contact."""
-        return self.scene.barriers[index].sign * (self.state[0] - self.symbols[f"barriers.{index}.position"])
-
-    def contact_force(self, index: int) -> sympy.Expr:
-        """Force of stop `index` on the mass during contact, as an expression in x and v."""
-        sign = self.scene.barriers[index].sign
-        return -sign * self.contacts[index].law.subs({DEPTH: self.depth(index), RATE: sign * self.state[1]})
-
     def guarded_force(self, index: int, in_x: int = 0, in_v: int = 0) -> sympy.Expr:
         """Force of stop `index` on the mass: zero without contact, and where a clamped law would pull.
 
         `in_x` and `in_v` are orders of differentiation in x and in v.
         """
         x, v = self.state[:2]
-        barrier, force = self.scene.barriers[index], self.contact_force(index)
-        position = self.symbols[f"barriers.{index}.position"]
-        touching = x > position if barrier.sign > 0 else x < position
+        sign, position = self.scene.barriers[index].sign, self.symbols[f"barriers.{index}.position"]
+        force = -sign * self.contacts[index].law.subs({DEPTH: sign * (x - position), RATE: sign * v})
+        touching = x > position if sign > 0 else x < position
         if self.contacts[index].clamped:
-            touching = sympy.And(touching, -barrier.sign * force > 0)
+            touching = sympy.And(touching, -sign * force > 0)
         return sympy.Piecewise((sympy.diff(force, (x, in_x), (v, in_v)), touching), (0, True))
 
     @cached_property
@@ -120,9 +107,7 @@ class Model:
     @cached_property
     def drift(self) -> sympy.Matrix:
         """Drift b(q, t) with stops as `Piecewise`, a column of length n."""
-        return self.drift_with(
-            self.forcing, tuple(self.guarded_force(index) for index in range(len(self.scene.barriers)))
-        )
+        return self.drift_with(self.forcing, tuple(map(self.guarded_force, range(len(self.scene.barriers)))))
 
     @cached_property
     def amplitude(self) -> sympy.Matrix:
@@ -148,8 +133,7 @@ class Model:
 
     def hamiltonian_with(self, drift: sympy.Matrix) -> sympy.Expr:
         """H for a given drift."""
-        p = sympy.Matrix(self.momenta)
-        return (p.T * drift)[0] + (p.T * self.diffusion * p)[0] / 2 if self.momenta else sympy.Integer(0)
+        return (sympy.Matrix(self.momenta).T * drift)[0] + self.action_rate if self.momenta else sympy.Integer(0)
 
     @cached_property
     def hamiltonian(self) -> sympy.Expr:

@@ -1,11 +1,14 @@
-"""Prints expressions as Python text that Numba compiles to fast code."""
+"""Prints expressions: as Python text that Numba compiles to fast code, and as text and LaTeX for people."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import sympy
+from sympy.printing.latex import LatexPrinter
 from sympy.printing.pycode import PythonCodePrinter
+from sympy.printing.str import StrPrinter
 
 _LARGEST_PRODUCT = 16
 
@@ -15,12 +18,8 @@ class SourcePrinter(PythonCodePrinter):
 
     Integer powers become products, and half-integer powers products with a square root: a call to ``pow`` prevents
     vectorisation and costs eight times as much. The compiler keeps the order of sums and products, so square roots
-    and the symbols whose values arrive last are written last, and other operations need not wait for them.
-
-    Parameters
-    ----------
-    arrival : dict, optional
-        Position of symbols in the order in which their values become known; 0 for the others.
+    and the symbols whose values arrive last are written last, and other operations need not wait for them: `arrival`
+    has the position of symbols in the order in which their values become known, 0 for the others.
     """
 
     def __init__(self, arrival: Mapping[sympy.Symbol, int] | None = None) -> None:
@@ -42,9 +41,6 @@ class SourcePrinter(PythonCodePrinter):
         text = self._print(others)
         return f"({text})*{product}" if others.is_Add else f"{text}*{product}"
 
-    def _print_Float(self, expression: sympy.Float) -> str:
-        return repr(float(expression))
-
     def _print_Integer(self, expression: sympy.Integer) -> str:
         return f"{int(expression)}.0"
 
@@ -54,23 +50,19 @@ class SourcePrinter(PythonCodePrinter):
             return repr(numerator / denominator)
         return f"({numerator}.0/{denominator}.0)"
 
-    def _print_NumberSymbol(self, expression: sympy.NumberSymbol) -> str:
+    def _print_number(self, expression: sympy.Expr) -> str:
         return repr(float(expression))
 
-    _print_Pi = _print_Exp1 = _print_NumberSymbol
+    _print_Float = _print_NumberSymbol = _print_Pi = _print_Exp1 = _print_number
 
     def _print_Pow(self, expression: sympy.Pow, rational: bool = False) -> str:
         base, exponent = expression.args
         if exponent.is_Rational and exponent.q in (1, 2) and abs(exponent) <= _LARGEST_PRODUCT:
-            return self._product(base, exponent)
+            product = "*".join(self._factors(base, exponent))
+            if exponent < 0:
+                return f"(1.0/({product}))"
+            return product if exponent == sympy.S.Half else f"({product})"
         return f"({self._print(base)})**({self._print(exponent)})"
-
-    def _product(self, base: sympy.Expr, exponent: sympy.Rational) -> str:
-        factors = self._factors(base, exponent)
-        product = "*".join(factors)
-        if exponent < 0:
-            return f"(1.0/({product}))"
-        return product if exponent == sympy.S.Half else f"({product})"
 
     def _factors(self, base: sympy.Expr, exponent: sympy.Rational) -> list[str]:
         factor = f"({self._print(base)})" if not base.is_Symbol else self._print(base)
@@ -128,12 +120,8 @@ def assignments(
 ) -> tuple[list[str], dict[str, str]]:
     """Print expressions after common subexpression elimination.
 
-    Returns
-    -------
-    lines : list of str
-        Assignments of the common subexpressions, to names made of an underscore, `temporary` and a number.
-    texts : dict of str
-        Text of each target in terms of these names.
+    Returns the assignments of the common subexpressions, to names made of an underscore, `temporary` and a number, and
+    the text of each target in terms of these names.
     """
     printer = SourcePrinter(arrival)
     names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))  # no parameter begins with "_"
@@ -141,3 +129,39 @@ def assignments(
     lines = [f"{indent}{name} = {printer.doprint(value)}" for name, value in shared]
     texts = {name: printer.doprint(value) for name, value in zip(targets, reduced, strict=True)}
     return lines, texts
+
+
+class _Reading:
+    """Positive terms come first in sums, ``x - b`` for SymPy's ``-b + x``, and the variable in conditions."""
+
+    def _as_ordered_terms(self, expression: sympy.Expr, order: Any = None) -> list[sympy.Expr]:
+        terms = super()._as_ordered_terms(expression, order=order)  # type: ignore[misc]
+        return sorted(terms, key=lambda term: term.could_extract_minus_sign())
+
+    def _print_Relational(self, expression: Any) -> str:
+        if expression.rhs.is_Symbol and str(expression.rhs) == "x":
+            expression = expression.reversed
+        return super()._print_Relational(expression)  # type: ignore[misc]
+
+
+class _Text(_Reading, StrPrinter):
+    def _print_Piecewise(self, expression: sympy.Piecewise) -> str:
+        (value, condition), *others = expression.args
+        if condition == sympy.true:
+            return self._print(value)
+        rest = self._print(sympy.Piecewise(*others, evaluate=False)) if others else "0"
+        return f"({self._print(value)} if {self._print(condition)} else {rest})"
+
+
+class _Latex(_Reading, LatexPrinter):
+    pass
+
+
+def as_text(expression: sympy.Expr) -> str:
+    """Return an expression as one line of text, cases as ``(force if x > b else 0)``."""
+    return _Text().doprint(expression)
+
+
+def as_latex(expression: sympy.Expr) -> str:
+    """Return an expression as LaTeX."""
+    return _Latex().doprint(expression)

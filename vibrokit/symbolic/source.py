@@ -7,17 +7,16 @@ as branch-free guards) and `rhs` for steppers that locate every contact (arrays,
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 
 import sympy
 
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact_source import ContactWriter
 from vibrokit.symbolic.flight import FlightWriter
-from vibrokit.symbolic.flow import FlowEquations, derive_flow, model_for
+from vibrokit.symbolic.flow import derive_flow, model_for
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import assignments, unpack
-from vibrokit.symbolic.scene_text import SceneText
 
 _PREAMBLE = '''"""{title}
 
@@ -37,78 +36,67 @@ INLINED = {{**OPTIONS, "forceinline": True}}
 '''
 
 
-def scene_text(scene: Scene, flow: Flow, *, flight: bool = False) -> SceneText:
-    """Derive the equations of one flow of a scene and write them as text, with the series of free flight if `flight`.
+class SceneText:
+    """The scene part of a kernel as text; a piece that the scene does not need is empty.
 
-    Raises
-    ------
-    StepperError
-        `flight` is true and the motion between stops is not linear.
-    """
-    writer = _SceneWriter(model_for(scene, flow), flow)
-    amplitude, slope = writer.noise() if flow is Flow.NOISY else ("", "")
-    return SceneText(
-        flow=flow,
-        variables=tuple(writer.variables),
-        parameters=writer.parameters(),
-        states=len(writer.model.state),
-        forced=writer.forced,
-        jumps=any(contact.jumps for contact in writer.model.contacts),
-        breaks=writer.breaks,
-        preamble=writer.preamble(f"The {flow.value} flow of a scene."),
-        constants=writer.constants(),
-        forcing=writer.forcing(),
-        excitations=writer.excitations(),
-        derivative=writer.derivative(),
-        rhs=writer.rhs(),
-        stops=writer.stops(),
-        flight=writer.flight() if flight else "",
-        amplitude=amplitude,
-        slope=slope,
-    )
-
-
-class _SceneWriter:
-    """Writes the pieces of a scene part for one flow.
-
-    Parameters
-    ----------
-    model : Model
-    flow : Flow
+    `variables` are the names of the integrated variables, and the first `states` of them belong to the state q. The
+    forcing depends on time if `forced`, and a contact force jumps at first touch if `jumps`.
     """
 
-    def __init__(self, model: Model, flow: Flow) -> None:
-        self.model = model
+    def __init__(self, scene: Scene, flow: Flow) -> None:
         self.flow = flow
-        self.equations: FlowEquations = derive_flow(model, Flow.STATE if flow is Flow.NOISY else flow)
-        self.contacts = ContactWriter(model, self.equations)
-        self.index = {symbol: index for index, symbol in enumerate(model.symbols.values())}
-        self.variables = [str(variable) for variable in self.equations.variables]
+        self._model = model_for(scene, flow)
+        self._equations = derive_flow(self._model, Flow.STATE if flow is Flow.NOISY else flow)
+        self._contacts = ContactWriter(self._model, self._equations)
+        self._index = {symbol: index for index, symbol in enumerate(self._model.symbols.values())}
+        self.variables = tuple(str(variable) for variable in self._equations.variables)
+        self.states = len(self._model.state)
+        self.forced = bool(self._model.forcing != 0)
+        self.jumps = any(contact.jumps for contact in self._model.contacts)
 
-    def preamble(self, title: str) -> str:
+    @cached_property
+    def parameters(self) -> dict[str, int]:
+        """Parameters of the right-hand side by name, with their indices in `theta`."""
+        used = self._contacts.used().union(*(rate.free_symbols for rate in self._equations.rates))
+        return {str(symbol): place for symbol, place in self._index.items() if symbol in used}
+
+    @property
+    def breaks(self) -> bool:
+        """Whether an integrated variable jumps at an event.
+
+        Derivatives, covariances and momenta jump where a contact force does, derivatives of momenta where its
+        derivatives do.
+        """
+        if self.flow is Flow.HAMILTONIAN_VARIATIONAL:
+            return any(contact.bends for contact in self._model.contacts)
+        return self.jumps and self.flow not in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY)
+
+    @property
+    def preamble(self) -> str:
         """Module docstring, imports and compiler options."""
-        legend = "\n".join(
-            f"    theta[{index}] = {path} ({symbol})" for index, (path, symbol) in enumerate(self.model.symbols.items())
-        )
-        return _PREAMBLE.format(title=title, legend=legend)
+        symbols = enumerate(self._model.symbols.items())
+        legend = "\n".join(f"    theta[{index}] = {path} ({symbol})" for index, (path, symbol) in symbols)
+        return _PREAMBLE.format(title=f"The {self.flow.value} flow of a scene.", legend=legend)
 
+    @property
     def constants(self) -> str:
         """Sizes, and properties of each stop."""
-        contacts = self.model.contacts
-        rows = {
-            "STATES": len(self.model.state),
-            "MOMENTA": len(self.model.state) if self.flow.has_momenta else 0,
+        contacts = self._model.contacts
+        rows: dict[str, object] = {
+            "STATES": self.states,
+            "MOMENTA": self.states if self.flow.has_momenta else 0,
             "EQUATIONS": len(self.variables),
             "BARRIERS": len(contacts),
-            "SIDES": tuple(float(barrier.sign) for barrier in self.model.scene.barriers),
-            "CLAMPED": tuple(contact.clamped for contact in contacts),
-            "ROOTED": tuple(contact.rooted for contact in contacts),
-            "JUMPS": tuple(contact.jumps for contact in contacts),
-            "FORCED": self.forced,
         }
-        if not contacts:
-            rows = {name: value for name, value in rows.items() if name not in ("SIDES", "CLAMPED", "ROOTED", "JUMPS")}
-        elif self.flow is Flow.HAMILTONIAN_VARIATIONAL:
+        if contacts:
+            rows |= {
+                "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
+                "CLAMPED": tuple(contact.clamped for contact in contacts),
+                "ROOTED": tuple(contact.rooted for contact in contacts),
+                "JUMPS": tuple(contact.jumps for contact in contacts),
+            }
+        rows["FORCED"] = self.forced
+        if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
         elif self.breaks and not self.flow.has_momenta:  # where M and the triangle of C begin; 0 for none
             rows |= {"DERIVATIVES": self._place_of("m_00"), "COVARIANCE": self._place_of("W00")}
@@ -118,97 +106,86 @@ class _SceneWriter:
         return self.variables.index(variable) if variable in self.variables else 0
 
     @property
-    def forced(self) -> bool:
-        """Whether the forcing depends on time."""
-        return bool(self.model.forcing != 0)
-
-    @property
-    def breaks(self) -> bool:
-        """Whether an integrated variable jumps at an event."""
-        if self.flow is Flow.HAMILTONIAN_VARIATIONAL:
-            return any(contact.bends for contact in self.model.contacts)
-        follows = self.flow not in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY)
-        return follows and any(contact.jumps for contact in self.model.contacts)
-
     def forcing(self) -> str:
         """Function `forcing(t, theta)`; empty for an autonomous scene."""
-        if not self.forced:
-            return ""
-        return self._function("forcing", "t", self.model.forcing)
+        return self._function("forcing", "t", self._model.forcing) if self.forced else ""
 
+    @property
     def excitations(self) -> str:
         """Function `excitation(i, t, theta)`: the force of one excitation; empty for a scene without any."""
-        if not self.model.excitations:
+        if not self._model.excitations:
             return ""
         lines = ["@njit(**OPTIONS)", "def excitation(i, t, theta):"]
-        for index, force in enumerate(self.model.excitations):
+        for index, force in enumerate(self._model.excitations):
             shared, texts = assignments({"force": force}, "c", indent="        ")
-            values = unpack([force], self.index, indent="        ")
+            values = unpack([force], self._index, indent="        ")
             lines += [f"    if i == {index}:", *values, *shared, f"        return {texts['force']}"]
         return "\n".join([*lines, "    return np.nan", ""])
 
+    @property
     def derivative(self) -> str:
         """Function `derivative(x, v, …, f, parameters…)`."""
-        contact_lines, zero = self.contacts.guarded()
+        contact_lines, zero = self._contacts.guarded()
         lines, texts = self._rates(zero)
-        arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameters()]
+        arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameters]
         head = f"def derivative({', '.join(arguments)}):"
         values = ", ".join(texts[name] for name in self.variables)
         return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
 
+    @property
     def rhs(self) -> str:
         """Function `rhs(t, z, pushing, theta, out)`."""
         lines, texts = self._rates()
-        body = [f"    {name} = z[{index}]" for index, name in enumerate(self.variables) if self._uses(name)]
+        read = set().union(*(rate.free_symbols for rate in self._equations.rates))
+        read.update(self._model.state[:2] if self._contacts.stops else ())
+        body = [f"    {one} = z[{index}]" for index, one in enumerate(self._equations.variables) if one in read]
         body += ["    f = forcing(t, theta)"] if self.forced else []
-        body += self.contacts.switched()
+        body += self._contacts.switched()
         body += [*lines, *(f"    out[{index}] = {texts[name]}" for index, name in enumerate(self.variables))]
-        head = [f"    {name} = theta[{place}]" for name, place in self.parameters().items()]
+        head = [f"    {name} = theta[{place}]" for name, place in self.parameters.items()]
         return "\n".join(["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", *head, *body, ""])
 
+    @property
     def stops(self) -> str:
         """Functions `stop(i, theta)` and `law(i, depth, rate, theta)`; empty for a scene without stops."""
-        if not self.model.contacts:
+        if not self._model.contacts:
             return ""
         stop, law = ["@njit(**OPTIONS)", "def stop(i, theta):"], ["@njit(**OPTIONS)", "def law(i, depth, rate, theta):"]
-        for index, contact in enumerate(self.model.contacts):
-            position = self.model.symbols[f"barriers.{index}.position"]
-            stop += [f"    if i == {index}:", f"        return theta[{self.index[position]}]"]
+        for index, contact in enumerate(self._model.contacts):
+            position = self._model.symbols[f"barriers.{index}.position"]
+            stop += [f"    if i == {index}:", f"        return theta[{self._index[position]}]"]
             lines, texts = assignments({"force": contact.law}, "c", indent="        ")
-            lines = [*unpack([contact.law], self.index, indent="        "), *lines]
+            lines = [*unpack([contact.law], self._index, indent="        "), *lines]
             law += [f"    if i == {index}:", *lines, f"        return {texts['force']}"]
         nowhere = "    return np.nan"
         return "\n".join([*stop, nowhere, "", "", *law, nowhere, ""])
 
+    @property
     def flight(self) -> str:
         """Functions `flight_rate(theta)` and `taylor(t, z, theta, c)`."""
-        return FlightWriter(self.model, self.equations).text(self.index)
+        return FlightWriter(self._model, self._equations).text(self._index)
 
-    def noise(self) -> tuple[str, str]:
-        """Functions `amplitude` = √D g(x, v), and `slope`, its derivative in the driven state, unless that is 0."""
-        driven = self.model.state[-1]
-        intensity = self.model.symbols["noise.intensity"]
-        size = sympy.sqrt(intensity) * self.model.amplitude[len(self.model.state) - 1]
-        slope = sympy.diff(size, driven)
-        return self._function("amplitude", "x, v", size), "" if slope == 0 else self._function("slope", "x, v", slope)
+    @property
+    def amplitude(self) -> str:
+        """Function `amplitude` = √D g(x, v), for the flow with noise."""
+        return self._function("amplitude", "x, v", self._amplitude()) if self.flow is Flow.NOISY else ""
+
+    @property
+    def slope(self) -> str:
+        """Function `slope`: the derivative of `amplitude` in the driven state; empty where that is 0."""
+        slope = sympy.diff(self._amplitude(), self._model.state[-1]) if self.flow is Flow.NOISY else 0
+        return "" if slope == 0 else self._function("slope", "x, v", slope)
+
+    def _amplitude(self) -> sympy.Expr:
+        return sympy.sqrt(self._model.symbols["noise.intensity"]) * self._model.amplitude[self.states - 1]
 
     def _function(self, name: str, arguments: str, value: sympy.Expr) -> str:
         lines, texts = assignments({name: value}, "c")
-        body = [*unpack([value], self.index), *lines, f"    return {texts[name]}"]
+        body = [*unpack([value], self._index), *lines, f"    return {texts[name]}"]
         return "\n".join(["@njit(**INLINED)", f"def {name}({arguments}, theta):", *body, ""])
-
-    def parameters(self) -> dict[str, int]:
-        """Parameters of the right-hand side by name, with their indices in `theta`."""
-        used = self.contacts.used().union(*(rate.free_symbols for rate in self.equations.rates))
-        return {str(symbol): place for symbol, place in self.index.items() if symbol in used}
 
     def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:
         zeros = dict.fromkeys(zero, sympy.Integer(0))
-        rates = [rate.xreplace(zeros) for rate in self.equations.rates]
-        arrival = {**dict.fromkeys(self.equations.variables, 1), **dict.fromkeys(self.equations.contacts, 2)}
+        rates = [rate.xreplace(zeros) for rate in self._equations.rates]
+        arrival = {**dict.fromkeys(self._equations.variables, 1), **dict.fromkeys(self._equations.contacts, 2)}
         return assignments(dict(zip(self.variables, rates, strict=True)), "c", arrival=arrival)
-
-    def _uses(self, name: str) -> bool:
-        symbol = next(variable for variable in self.equations.variables if str(variable) == name)
-        in_contact = bool(self.contacts.stops) and name in ("x", "v")
-        return in_contact or any(symbol in rate.free_symbols for rate in self.equations.rates)

@@ -51,8 +51,9 @@ def _suffix(scene: Scene, entry: Entry) -> str:
 
 
 def _symbol(name: str, entry: Entry) -> sympy.Symbol:
-    low = entry.declared.above if entry.declared.above is not None else entry.declared.minimum
-    if low is not None and low >= 0:
-        positive = entry.declared.above is not None
-        return sympy.Symbol(name, positive=True) if positive else sympy.Symbol(name, nonnegative=True)
+    above, minimum = entry.declared.above, entry.declared.minimum
+    if above is not None and above >= 0:
+        return sympy.Symbol(name, positive=True)
+    if above is None and minimum is not None and minimum >= 0:
+        return sympy.Symbol(name, nonnegative=True)
     return sympy.Symbol(name, real=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,8 +14,10 @@ from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.scene_text import SceneText
 from vibrokit.testing.report import ConformanceError
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,13 +32,7 @@ class _Pieces(Emitter):
 
 
 class Compiled:
-    """Compiled pieces of one flow of one scene.
-
-    Parameters
-    ----------
-    scene : Oscillator
-    flow : Flow
-    """
+    """Compiled pieces of one flow of one scene."""
 
     def __init__(self, scene: Oscillator, flow: Flow) -> None:
         self._module = _guarded(lambda: kernel_for(scene, flow, _Pieces()).module)
@@ -67,9 +63,16 @@ class Compiled:
         return out
 
 
-# Index of the rate of the variational Hamiltonian flow at `hamiltonian_start` that equals a derivative of the force of
-# some orders in x and v: p′, and the lower left of the matrix.
-ENTRIES = {(1, 0): 2, (0, 1): 3, (2, 0): 13, (1, 1): 14, (0, 2): 18}
+# Where the rates of the variational Hamiltonian flow hold the force on the mass and its derivatives, by their orders in
+# x and v: index, momentum of `hamiltonian_start`, and factor. They are v′, p′ and the lower left of the matrix.
+ENTRIES = {
+    (0, 0): (1, 0.0, 1),
+    (1, 0): (2, 1.0, -1),
+    (0, 1): (3, 1.0, -1),
+    (2, 0): (13, 1.0, -1),
+    (1, 1): (14, 1.0, -1),
+    (0, 2): (18, 1.0, -1),
+}
 
 
 def hamiltonian_start(states: tuple[float, ...], momentum: float) -> Any:

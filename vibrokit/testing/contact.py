@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import mpmath
@@ -18,9 +18,8 @@ from vibrokit.registry import Group
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
-from vibrokit.testing.derivatives import ORDERS, Reference, derivative
 from vibrokit.testing.part_checks import PartChecks
-from vibrokit.testing.precise import Function
+from vibrokit.testing.precise import Function, derivative
 from vibrokit.testing.report import Check, ConformanceError
 
 _SIDES = (("right", 1), ("left", -1))
@@ -57,9 +56,6 @@ class ContactLawChecks(PartChecks[ContactLaw]):
             barriers=(Barrier(part, 0.1, "right"),),
             excitations=(Harmonic(0.2, 0.9),),
         )
-
-    def part_in(self, scene: Oscillator) -> ContactLaw:
-        return scene.barriers[0].law
 
     def points(self) -> list[tuple[float, ...]]:
         """Depths from 1e-9 to 1 at random rates."""
@@ -197,38 +193,23 @@ class ContactLawChecks(PartChecks[ContactLaw]):
         for side, sign in _SIDES:
             code, points = Compiled(_bare(part, side), Flow.HAMILTONIAN_VARIATIONAL), self.points()
             references = {
-                orders: self.reference(part, derivative(formula, self.arguments, orders))
-                for orders in ((0, 0), *ORDERS)
+                orders: self.reference(part, derivative(formula, self.arguments, orders)) for orders in ENTRIES
             }
             law = references[0, 0]
             for point in points:
                 yield law.check(f"the force of {part!r}", point, code.call("law", 0, *point))
-                force = law.exact(*point)
+                force, state = law.exact(*point), (sign * point[0], sign * point[1])
                 variants: list[tuple[Callable[[Any], Any], bool]]
                 variants = [(functools.partial(code.rhs, pushing=(on,)), on) for on in (True, False)]
                 if not clamped or abs(force) > law.bound(*point):  # otherwise rounding decides whether it pushes
                     variants.append((code.derivative, not clamped or force > 0))
                 for rates, pushing in variants:
-                    yield from _rates_distances(part, references, sign, point, rates, pushing=pushing)
-
-
-def _rates_distances(
-    part: ContactLaw,
-    references: Mapping[tuple[int, int], Reference],
-    sign: int,
-    point: tuple[float, ...],
-    rates: Callable[[Any], Any],
-    *,
-    pushing: bool,
-) -> Iterator[float]:
-    state = (sign * point[0], sign * point[1])
-    without, with_momentum = (rates(hamiltonian_start(state, momentum)) for momentum in (0.0, 1.0))
-    for orders, reference in references.items():
-        # The force on the mass is −sign · law; p′ and the lower half of the matrix hold minus its derivatives.
-        index, found, minus = (ENTRIES[orders], with_momentum, 1) if any(orders) else (1, without, -1)
-        factor = minus * sign ** (1 + sum(orders)) if pushing else 0
-        what = f"the derivative of orders {orders} of {part!r}"
-        yield reference.check(what, point, found[index], factor)
+                    found = {momentum: rates(hamiltonian_start(state, momentum)) for momentum in (0.0, 1.0)}
+                    for orders, (index, momentum, minus) in ENTRIES.items():
+                        # The force on the mass is −sign · law.
+                        factor = -minus * sign ** (1 + sum(orders)) if pushing else 0
+                        what = f"the derivative of orders {orders} of {part!r}"
+                        yield references[orders].check(what, point, found[momentum][index], factor)
 
 
 def _bare(part: ContactLaw, side: Any) -> Oscillator:

@@ -41,9 +41,6 @@ class ExcitationChecks(PartChecks[Excitation]):
     def scene(self, part: Excitation) -> Oscillator:
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(part,))
 
-    def part_in(self, scene: Oscillator) -> Excitation:
-        return scene.excitations[0]
-
     def period(self) -> str:
         """The force repeats after a finite `period`, and is constant if it is None."""
         periods = []
@@ -52,7 +49,7 @@ class ExcitationChecks(PartChecks[Excitation]):
             periods.append("constant" if period is None else f"{period:.6g} s")
             if period == math.inf:
                 continue
-            force = self.precise(part)
+            force = self.reference(part).exact
             shift = math.pi if period is None else period
             times = [mpmath.mpf(k) * shift / 37 for k in range(-37, 37 * _PERIODS, 11)]
             size = max(abs(force(t)) for t in times)

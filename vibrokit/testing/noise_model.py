@@ -20,8 +20,8 @@ from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import printable
 from vibrokit.testing.compiled import Compiled
-from vibrokit.testing.derivatives import Reference, derivative
 from vibrokit.testing.part_checks import PartChecks
+from vibrokit.testing.precise import Reference, derivative
 from vibrokit.testing.report import Check, ConformanceError
 
 _TAKEN = ("x", "v", "t", "S")
@@ -48,10 +48,6 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
 
     def scene(self, part: NoiseModel) -> Oscillator:
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, noise=part, excitations=(Harmonic(0.2, 0.9),))
-
-    def part_in(self, scene: Oscillator) -> NoiseModel:
-        assert scene.noise is not None
-        return scene.noise
 
     def intensity(self) -> str:
         """The model has an intensity, which may be 0 but not negative."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import itertools
 import keyword
 import pickle
 import tempfile
@@ -22,26 +23,20 @@ from vibrokit.parts.part import Part
 from vibrokit.registry import Group, name_of
 from vibrokit.scene_file import load_scene, save_scene
 from vibrokit.symbolic.formulas import derived_formula
-from vibrokit.testing.derivatives import ORDERS, Reference, check_derivatives, derivative
 from vibrokit.testing.other_process import outcome, outcomes_in_other_process
-from vibrokit.testing.precise import DIGITS, Function, function
-from vibrokit.testing.ranges import check_inside, check_refused, outside
+from vibrokit.testing.precise import CLOSE, DIGITS, Function, Reference, derivative, difference, relative_distance
 from vibrokit.testing.report import Check, ConformanceError, guarded
-from vibrokit.testing.samples import samples
+from vibrokit.testing.samples import check_inside, check_refused, outside, samples
 
 P = TypeVar("P", bound=Part)
 Rng = int | np.random.Generator | None
 
+ORDERS = ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # of the derivatives that kernels use, in two arguments
+_NEGLIGIBLE = 1e-18  # relative to the scale of a derivative: the error of a finite difference
+
 
 class PartChecks(ABC, Generic[P]):
-    """The checks of one part.
-
-    Parameters
-    ----------
-    part : Part, or a class of parts
-    rng : int or numpy.random.Generator, optional
-        For random parameter values and points.
-    """
+    """The checks of one part or class of parts; `rng` draws parameter values and points."""
 
     kind: ClassVar[type[Part]]
     group: ClassVar[Group]
@@ -86,18 +81,13 @@ class PartChecks(ABC, Generic[P]):
         """A small scene that contains the part."""
 
     @abstractmethod
-    def part_in(self, scene: Oscillator) -> P:
-        """The checked part of a scene."""
-
-    @abstractmethod
     def compiled_distances(self, part: P) -> Iterator[float]:
         """Compare compiled code with the formula; yield relative distances."""
 
     def points(self) -> list[tuple[float, ...]]:
         """Random arguments of the formula."""
-        return [
-            tuple(map(float, p)) for p in self.rng.uniform(-self.reach, self.reach, (self.count, len(self.arguments)))
-        ]
+        places = self.rng.uniform(-self.reach, self.reach, (self.count, len(self.arguments)))
+        return [tuple(place) for place in places.tolist()]
 
     @cached_property
     def samples(self) -> tuple[P, ...]:
@@ -119,18 +109,14 @@ class PartChecks(ABC, Generic[P]):
         """The formula of a part."""
         return derived_formula(part, self.method, self.symbols(part), self.arguments)
 
-    def precise(self, part: P, formula: sympy.Expr | None = None) -> Function:
-        """The formula of a part, or another in its symbols, as a function at sixty digits."""
-        return function(self.expression(part) if formula is None else formula, self.arguments, self.values(part))
-
     def reference(self, part: P, formula: sympy.Expr | None = None) -> Reference:
-        """As `precise`, with a bound on rounding errors."""
+        """The formula of a part, or another in its symbols."""
         return Reference(self.expression(part) if formula is None else formula, self.arguments, self.values(part))
 
     def each(self) -> Iterator[tuple[P, Function]]:
-        """Each sample with its formula."""
+        """Each sample with its formula as a function at sixty digits."""
         for part in self.samples:
-            yield part, self.precise(part)
+            yield part, self.reference(part).exact
 
     # -- checks of every part -------------------------------------------------------------------------------------
 
@@ -178,7 +164,7 @@ class PartChecks(ABC, Generic[P]):
             values = {d.name: _as_number(part.parameters[d.name]) for d in part.declared()}
             reference = self.reference(part)
             for point in self.points():
-                given = [sympy.Float(number, DIGITS) for number in point]
+                given = (sympy.Float(number, DIGITS) for number in point)
                 found = sympy.sympify(getattr(part.twin(values), self.method)(*given)).evalf(DIGITS)
                 distance, accepted = reference.compare(point, mpmath.mpmathify(found))
                 worst = max(worst, distance)
@@ -193,7 +179,10 @@ class PartChecks(ABC, Generic[P]):
     def frozen(self) -> str:
         """A part cannot be changed, and equal parts have the same hash."""
         for part in self.samples:
-            twin = type(part)(**part.parameters) if self._remakes(part) else copy.copy(part)
+            try:
+                twin = type(part)(**part.parameters)
+            except Exception:  # `round_trip` reports it
+                twin = copy.copy(part)
             for field in dataclasses.fields(part):  # type: ignore[arg-type]
                 try:
                     setattr(twin, field.name, None)
@@ -209,14 +198,6 @@ class PartChecks(ABC, Generic[P]):
                     f"A copy of {part!r} is not equal to it or has another hash; do not define __eq__ or __hash__."
                 )
         return ""
-
-    @staticmethod
-    def _remakes(part: Part) -> bool:
-        try:
-            type(part)(**part.parameters)
-        except Exception:
-            return False
-        return True
 
     def pickled(self) -> str:
         """Pickling preserves a part."""
@@ -262,16 +243,16 @@ class PartChecks(ABC, Generic[P]):
         """Another process derives the same code from the part, and computes the same bits."""
         if self.cls.__module__ == "__main__":
             return "not checked: another process cannot import a class that is defined in the main script"
+        for part in self.samples:
+            self.expression(part)
         scenes = [self.scene(part) for part in self.samples]
-        for scene in scenes:
-            self.expression(self.part_in(scene))
-        for scene, there in zip(scenes, outcomes_in_other_process(scenes), strict=True):
+        for part, scene, there in zip(self.samples, scenes, outcomes_in_other_process(scenes), strict=True):
             here = outcome(scene)
             if here != there:
                 what = "numbers" if here[0] == there[0] else "code"
                 raise ConformanceError(
-                    f"Another process has other {what} for {self.part_in(scene)!r}; let its formula depend only on its "
-                    "fields, not on the hash of a text, the time or the process."
+                    f"Another process has other {what} for {part!r}; let its formula depend only on its fields, not on "
+                    "the hash of a text, the time or the process."
                 )
         return f"{len(scenes)} scenes, same bits"
 
@@ -289,8 +270,22 @@ class PartChecks(ABC, Generic[P]):
         worst = 0.0
         for part, value in self.each():
             formula = self.expression(part)
-            derived = [(orders, self.precise(part, derivative(formula, self.arguments, orders))) for orders in ORDERS]
-            worst = max(worst, check_derivatives(part, value, derived, self.points()))
+            derived = [(orders, self.reference(part, derivative(formula, self.arguments, orders))) for orders in ORDERS]
+            points = self.points()
+            for (orders, reference), point in itertools.product(derived, points):
+                scale = abs(value(*point))
+                for order, size in zip(orders, point, strict=True):
+                    scale /= mpmath.mpf(abs(size)) ** order
+                by_formula, by_difference = reference.exact(*point), difference(value, point, orders)
+                if max(abs(by_formula), abs(by_difference)) <= _NEGLIGIBLE * scale:
+                    continue
+                distance = relative_distance(by_formula, by_difference)
+                worst = max(worst, distance)
+                if distance > CLOSE:
+                    raise ConformanceError(
+                        f"The derivative of orders {orders} of {part!r} at {point} is {mpmath.nstr(by_formula, 15)} by "
+                        f"its formula, but {mpmath.nstr(by_difference, 15)} by finite differences."
+                    )
         return f"within {worst:.1g} of differences at 60 digits"
 
     def compiled(self) -> str:

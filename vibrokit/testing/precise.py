@@ -1,14 +1,16 @@
-"""Formulas and finite differences at sixty digits, as references for derivatives and compiled code."""
+"""Formulas, derivatives and finite differences at sixty digits, as references for compiled code."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import mpmath
 import sympy
 
+from vibrokit.symbolic.printer import printable
 from vibrokit.testing.report import ConformanceError
 
 DIGITS = 60
@@ -22,19 +24,9 @@ Function = Callable[..., Any]
 
 
 def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Mapping[sympy.Symbol, float]) -> Function:
-    """Return a formula as a function of numbers, evaluated at sixty digits.
+    """Return a formula as a function of numbers, evaluated at sixty digits; `values` are those of the parameters.
 
-    Parameters
-    ----------
-    formula : Expr
-    arguments : sequence of Symbol
-    values : mapping of Symbol to float
-        Values of the parameters.
-
-    Returns
-    -------
-    callable
-        Returns an mpmath number, and raises ConformanceError where the formula has no finite real value.
+    It returns an mpmath number, and raises ConformanceError where the formula has no finite real value.
     """
     raw = sympy.lambdify([*arguments, *values], formula, modules=[_FUNCTIONS, "mpmath"])
 
@@ -59,22 +51,22 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
     return evaluated
 
 
-def difference(of: Function, point: Sequence[float], orders: Sequence[int], sizes: Sequence[float]) -> Any:
-    """Return a partial derivative by central differences.
+def derivative(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], orders: Sequence[int]) -> sympy.Expr:
+    """Return a derivative in the form that is printed into kernels."""
+    derived = printable(sympy.diff(formula, *zip(arguments, orders, strict=True)))
+    if derived.has(sympy.Derivative, sympy.Subs):
+        raise ConformanceError(
+            f"SymPy cannot differentiate {formula}, it returns {derived}; use functions that have derivatives."
+        )
+    return derived
 
-    Parameters
-    ----------
-    of : callable
-    point : sequence of float
-    orders : sequence of int
-        Order of differentiation in each argument, 0 to 2.
-    sizes : sequence of float
-        Scale of each argument; steps are 1e-10 times it.
-    """
+
+def difference(of: Function, point: Sequence[float], orders: Sequence[int]) -> Any:
+    """Return a partial derivative of orders 0 to 2 by central differences, with steps of 1e-10 times the argument."""
     with mpmath.workdps(DIGITS):
         weights: list[tuple[Any, list[Any]]] = [(mpmath.mpf(1), [])]
-        for place, order, size in zip(point, orders, sizes, strict=True):
-            h, x = _STEP * mpmath.mpf(size), mpmath.mpf(place)
+        for place, order in zip(point, orders, strict=True):
+            h, x = _STEP * mpmath.mpf(abs(place)), mpmath.mpf(place)
             stencil = {
                 0: [(1, x)],
                 1: [(1 / (2 * h), x + h), (-1 / (2 * h), x - h)],
@@ -84,15 +76,11 @@ def difference(of: Function, point: Sequence[float], orders: Sequence[int], size
         return mpmath.fsum(w * of(*at) for w, at in weights)
 
 
-def rounding(formula: sympy.Expr) -> sympy.Expr:
-    """Return a first-order bound on the error of evaluating a formula in double precision, as a formula.
+def _in_roundings(node: sympy.Expr) -> sympy.Expr:
+    """Return a first-order bound on the error of a formula in double precision, in units of one rounding, as a formula.
 
     Every operation rounds and propagates the errors of its operands, so cancellation is included.
     """
-    return sympy.Float(_ROUNDINGS * _EPSILON) * _in_roundings(formula)
-
-
-def _in_roundings(node: sympy.Expr) -> sympy.Expr:
     if node.is_Symbol:
         return sympy.Integer(0)
     if not node.args:
@@ -124,3 +112,34 @@ def relative_distance(found: Any, exact: Any) -> float:
         found = mpmath.mpf(found)
         size = max(abs(exact), abs(found))
         return 0.0 if size < 1e-300 else float(abs(found - exact) / size)
+
+
+class Reference:
+    """A formula at sixty digits, and the rounding error that double precision may add to it."""
+
+    def __init__(
+        self, formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Mapping[sympy.Symbol, float]
+    ) -> None:
+        self.exact = function(formula, arguments, values)
+        self._formula, self._arguments, self._values = formula, arguments, values
+
+    @cached_property
+    def bound(self) -> Function:
+        """The largest rounding error."""
+        allowed = sympy.Float(_ROUNDINGS * _EPSILON) * _in_roundings(self._formula)
+        return function(allowed, self._arguments, self._values)
+
+    def compare(self, point: Sequence[float], found: Any, factor: int = 1) -> tuple[float, bool]:
+        """Return the relative distance of a value from `factor` times the formula, and whether it is acceptable."""
+        expected = factor * self.exact(*point)
+        distance = relative_distance(found, expected)
+        return distance, distance <= CLOSE or abs(mpmath.mpf(found) - expected) <= self.bound(*point)
+
+    def check(self, what: str, point: Sequence[float], found: Any, factor: int = 1) -> float:
+        """Compare a compiled value; return its relative distance, or raise ConformanceError."""
+        distance, accepted = self.compare(point, float(found), factor)
+        if not accepted:
+            expected = mpmath.nstr(factor * self.exact(*point), 17)
+            place = tuple(map(float, point))
+            raise ConformanceError(f"Compiled, {what} is {float(found)!r} at {place}; its formula gives {expected}.")
+        return distance

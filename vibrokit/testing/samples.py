@@ -1,10 +1,11 @@
-"""Random instances of a part, with values from the declared ranges of its parameters."""
+"""Random instances of a part, with values from the declared ranges of its parameters; checks of these ranges."""
 
 from __future__ import annotations
 
 import inspect
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -34,12 +35,7 @@ def samples(part: Part | type[Part], rng: np.random.Generator) -> tuple[Part, ..
 
     For a class: several, with random parameter values, the first with its default values. For an instance: itself, then
     copies with random values of the parameters that declare a range; for others, only its own values are known to be
-    meaningful.
-
-    Raises
-    ------
-    ConformanceError
-        The class refuses values in its declared ranges.
+    meaningful. ConformanceError is raised if the class refuses values in its declared ranges.
     """
     if isinstance(part, type):
         if part in REPRESENTATIVES:
@@ -112,4 +108,36 @@ def _drawn(
     raise ConformanceError(
         f"{cls.__name__} refused {_ATTEMPTS} random sets of values in its declared ranges, the last with: {refusal} "
         "Declare narrower ranges."
+    )
+
+
+def check_inside(owner: str, declared: Parameter, value: Any) -> None:
+    """Raise ConformanceError if a part holds a value outside the range of its parameter."""
+    try:
+        declared.checked(owner, value)
+    except VibrokitError as error:
+        raise ConformanceError(f"{error} The constructor accepted it; call super().__post_init__().") from error
+
+
+def outside(declared: Parameter) -> list[Any]:
+    """Values outside the range of a parameter."""
+    wrong: list[Any] = [math.nan, math.inf, "1", None]
+    wrong += [] if declared.minimum is None else [declared.minimum - 1.0]
+    wrong += [] if declared.above is None else [declared.above]
+    return wrong + ([] if declared.maximum is None else [declared.maximum + 1.0])
+
+
+def check_refused(part: Part, declared: Parameter, wrong: Any) -> None:
+    """Raise ConformanceError unless the constructor refuses a value with an error of the toolkit."""
+    try:
+        made = type(part)(**(part.parameters | {declared.name: wrong}))
+    except VibrokitError:
+        return
+    except Exception as error:
+        raise ConformanceError(
+            f"{type(part).__name__} with {declared.name} = {wrong!r} raises {type(error).__name__}: {error}; check the "
+            "range first, so that a ParameterError is raised."
+        ) from error
+    raise ConformanceError(
+        f"The constructor must refuse {declared.name} = {wrong!r} (allowed: {declared.allowed}), but made {made!r}."
     )

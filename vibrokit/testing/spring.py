@@ -14,8 +14,8 @@ from vibrokit.parts.spring.spring import Spring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
-from vibrokit.testing.derivatives import ORDERS, derivative
 from vibrokit.testing.part_checks import PartChecks
+from vibrokit.testing.precise import derivative
 from vibrokit.testing.report import Check
 
 
@@ -37,18 +37,13 @@ class SpringChecks(PartChecks[Spring]):
     def scene(self, part: Spring) -> Oscillator:
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=part, excitations=(Harmonic(0.2, 0.9),))
 
-    def part_in(self, scene: Oscillator) -> Spring:
-        assert scene.spring is not None
-        return scene.spring
-
     def compiled_distances(self, part: Spring) -> Iterator[float]:
         scene = Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=part, noise=WhiteNoise(intensity=1.0))
         code = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL)
         formula = self.expression(part)
-        for orders in ((0, 0), *ORDERS):
+        for orders, (index, momentum, factor) in ENTRIES.items():
             reference = self.reference(part, derivative(formula, self.arguments, orders))
-            index, sign, momentum = (1, -1, 0.0) if orders == (0, 0) else (ENTRIES[orders], 1, 1.0)
             for point in self.points():
-                for rates in (code.derivative, code.rhs):
+                for rates in (code.derivative, code.rhs):  # the force on the mass is minus that of the spring
                     found = rates(hamiltonian_start(point, momentum))[index]
-                    yield reference.check(f"the derivative of orders {orders} of {part!r}", point, found, sign)
+                    yield reference.check(f"the derivative of orders {orders} of {part!r}", point, found, -factor)

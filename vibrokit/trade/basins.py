@@ -28,44 +28,19 @@ _DEFAULT_MARGIN = 2
 
 @dataclasses.dataclass(frozen=True)
 class BasinRow:
-    """One setting of a basin grid.
-
-    Attributes
-    ----------
-    stepper : str
-        What integrated the cells.
-    margin : int or None
-        Cells on every side that must agree before a cell decides for what enters it; None: every cell is followed.
-    wrong : float
-        Share of the cells whose label differs from the reference's.
-    shift : float
-        Largest change of a basin's share of the region.
-    seconds : float
-        Time per cell on all threads (s).
-    default : bool
-        Whether this is what `find_structure` does.
-    """
+    """One setting of a basin grid."""
 
     stepper: str
-    margin: int | None
-    wrong: float
-    shift: float
-    seconds: float
-    default: bool
+    margin: int | None  # cells that must agree around one that decides for what enters it; None: each is followed
+    wrong: float  # share of the cells whose label differs from the reference's
+    shift: float  # largest change of a basin's share of the region
+    seconds: float  # per cell, on all threads
+    default: bool  # whether this is what `find_structure` does
 
 
 @dataclasses.dataclass(frozen=True)
 class BasinTrade:
-    """Work and precision of basin grids.
-
-    Attributes
-    ----------
-    rows : tuple of BasinRow
-        Coarse to fine.
-    cells : (int, int)
-    reference : str
-        What the labels are compared with: twice refined steps, every cell followed.
-    """
+    """Work and precision of basin grids, coarse to fine; the reference has twice refined steps, every cell followed."""
 
     rows: tuple[BasinRow, ...]
     cells: tuple[int, int]
@@ -95,22 +70,7 @@ def measure_basins(
 ) -> BasinTrade:
     """Measure time and error of the basin grid over steps and margins, for the attractors that the scene has.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    cells : (int, int)
-    margins : tuple of int or None
-        Given to `find_structure` as `margin`.
-    progress : bool or callable, optional
-
-    Returns
-    -------
-    BasinTrade
-
-    Raises
-    ------
-    StructureError
-        The scene has no attractors.
+    `margins` are given to `find_structure`. StructureError is raised if the scene has no attractors.
     """
     with working(progress), warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose

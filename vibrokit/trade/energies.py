@@ -54,58 +54,26 @@ _SAME = 1e-3  # relative difference below which two steppers found the same path
 
 @dataclasses.dataclass(frozen=True)
 class EnergyRow:
-    """One setting of one step.
+    """One setting of one step; numbers that are not known are NaN."""
 
-    Attributes
-    ----------
-    setting : str
-        As it is typed.
-    value : float
-        Least action found; NaN where no exit was found.
-    error : float
-        Relative distance of the value from the reference.
-    estimated : float
-        Relative error that the step itself estimates; NaN where it estimates none.
-    seconds : float
-        Time on all threads, without compilation.
-    default : bool
-        Whether this is the default of `LeastAction`.
-    failure : str
-        Why there is no value.
-    """
-
-    setting: str
-    value: float
-    error: float
-    estimated: float
-    seconds: float
-    default: bool
-    failure: str = ""
+    setting: str  # as it is typed
+    value: float  # least action found
+    error: float  # relative distance of the value from the reference
+    estimated: float  # relative error that the step itself estimates
+    seconds: float  # on all threads, without compilation
+    default: bool  # whether this is the default of `LeastAction`
+    failure: str = ""  # why there is no value
 
 
 @dataclasses.dataclass(frozen=True)
 class EnergyTrade:
-    """Work and precision of each step of `LeastAction`, for the cheapest exit of one attractor.
+    """Work and precision of each step of `LeastAction`, for the cheapest exit of one attractor."""
 
-    Attributes
-    ----------
-    exit : str
-        From where to where it leads, by name.
-    reference : float
-        The certified action that all are compared with; NaN where no path was polished.
-    reference_from : str
-        The stepper that it was polished with.
-    residual : float
-        Of the reference's path.
-    steps : dict of str to tuple of EnergyRow
-        The settings of ``"shooting"``, ``"graph"`` and ``"polishing"``, coarse to fine.
-    """
-
-    exit: str
-    reference: float
-    reference_from: str
-    residual: float
-    steps: dict[str, tuple[EnergyRow, ...]]
+    exit: str  # from where to where it leads, by name
+    reference: float  # the certified action that all are compared with; NaN where no path was polished
+    reference_from: str  # the stepper that it was polished with
+    residual: float  # of the reference's path
+    steps: dict[str, tuple[EnergyRow, ...]]  # settings of "shooting", "graph" and "polishing", coarse to fine
 
     def __str__(self) -> str:
         if math.isfinite(self.reference):
@@ -166,29 +134,10 @@ def measure_energies(
     ones, are all polished. The least action found is polished once more with the finest tolerance, from the candidate
     that the other steppers start from too. All others are compared with it.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    structure : Structure, optional
-    source : int or str, optional
-        Label or name of the attractor to leave; by default the first that is an orbit or an equilibrium.
-    shootings : tuple of Shooting
-    graphs : tuple of GraphSearch
-        Coarse to fine; either may be empty.
-    steppers : tuple of Stepper, optional
-        For polishing; by default fixed steps, then located contacts from coarse to fine.
-    progress : bool or callable, optional
-
-    Returns
-    -------
-    EnergyTrade
-
-    Raises
-    ------
-    SceneError
-        The scene has no noise.
-    StructureError
-        It has only one attractor, or none that is an orbit, or no exit path was found again.
+    The exits are those from `source`, by default the first attractor that is an orbit or an equilibrium. `shootings`
+    and `graphs` are coarse to fine, and either may be empty. `steppers` polish; by default they are fixed steps, then
+    located contacts from coarse to fine. SceneError is raised if the scene has no noise, StructureError if it has only
+    one attractor, or none that is an orbit, or no exit path was found again.
     """
     if osc.noise is None:
         raise SceneError("the scene has no noise, so nothing leaves an attractor; energies were not measured.")

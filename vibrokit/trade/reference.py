@@ -31,23 +31,8 @@ def reference_map(
 ) -> Array:
     """Map states from section to section, slowly and independently of every stepper.
 
-    Parameters
-    ----------
-    scene : Scene
-    states : array (count, equations)
-    periods : int
-    flow : Flow
-    tolerance : float
-        Relative tolerance of DOP853; the absolute one is a tenth of it.
-
-    Returns
-    -------
-    array (count, equations)
-
-    Raises
-    ------
-    IntegrationError
-        DOP853 failed.
+    `states` has shape (count, equations), and the absolute tolerance of DOP853 is a tenth of the relative one.
+    IntegrationError is raised if DOP853 fails.
     """
     motion = _Motion(scene, flow, tolerance)
     ends = [np.array(state, dtype=float) for state in states]
@@ -57,14 +42,7 @@ def reference_map(
 
 
 class _Motion:
-    """The motion of one scene, with each stop switched on or off between steps.
-
-    Parameters
-    ----------
-    scene : Scene
-    flow : Flow
-    tolerance : float
-    """
+    """The motion of one scene, with each stop switched on or off between steps."""
 
     def __init__(self, scene: Scene, flow: Flow, tolerance: float) -> None:
         self.module: types.ModuleType = kernel_for(scene, flow, Order8()).module

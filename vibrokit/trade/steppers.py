@@ -8,7 +8,7 @@ import statistics
 import time
 import tracemalloc
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,8 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, report, stage, working
 from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.text_table import text_table
 from vibrokit.trade.reference import TIGHTEST, reference_map
-from vibrokit.trade.table import FirstCall, Trade, TradeRow, fitted_order
 
 STEPS = tuple(2**k for k in range(5, 13))
 TOLERANCES = tuple(10.0**-k for k in range(4, 15, 2))
@@ -41,8 +41,81 @@ _FEW = 256
 _MEASURED = 1024  # trajectories whose arrays are measured
 _LEAST_REPEATS = 5
 _ALONE = 8  # trajectories that are timed one by one
+_HEADINGS = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "arrays (B)", "")
+_ABOVE_FLOOR = 30.0  # an error this far above the smallest of all is not rounding or the reference's own
+_ASYMPTOTIC = 0.02  # distances below this are small enough to show an order
 
 Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class TradeRow:
+    """One setting of one stepper. Errors are distances in (x, v) to the reference, over the starts."""
+
+    name: str  # the stepper
+    stepper: str  # with its setting, as it is typed
+    cost: float  # steps, or 1/tolerance: grows from coarse to fine
+    error_median: float
+    error_90: float  # 90 % quantile
+    seconds: float  # per trajectory and period, in an ensemble, all threads at work
+    seconds_alone: float  # per period of trajectories that are integrated one by one
+    memory: float  # peak of the arrays that Python held, per trajectory (bytes); not a kernel's own few kilobytes
+    default: bool = False  # whether this is what the scene is given, for ensembles or for single trajectories
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstCall:
+    """What the first call of a stepper took (s), and whether it was compiled then or came from disk."""
+
+    name: str
+    seconds: float
+    compiled: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Trade:
+    """Work and precision of the steppers on one scene."""
+
+    rows: tuple[TradeRow, ...]  # by stepper, coarse to fine
+    first_calls: tuple[FirstCall, ...]
+    references: Mapping[str, str]  # what the errors of each stepper are distances to
+    orders: Mapping[str, float]  # exponent of the error, in the step for RK4, in the tolerance for the others, or NaN
+    refused: Mapping[str, str]  # steppers that cannot integrate this scene, with the reason
+    checked: float  # median distance of the finest stepper to DOP853, which shares only the right-hand side with it
+    starts: int
+    periods: int
+    threads: int
+
+    def __str__(self) -> str:
+        lines = [
+            f"Error: distance in (x, v) from a finer reference after {self.periods} periods, of {self.starts} starts.",
+            f"Time per trajectory and period: in an ensemble on {self.threads} threads, and one trajectory alone.",
+            "Arrays: peak that Python holds per trajectory (tracemalloc); the kernels' own few kB are not in it.",
+            "",
+            *text_table([_HEADINGS, *(self._line(row) for row in self.rows)]),
+            "",
+        ]
+        for call in self.first_calls:
+            source = "compiled" if call.compiled else "from disk"
+            lines.append(
+                f"{call.name}: {self._order(call.name)}, against {self.references[call.name]}; "
+                f"first call {call.seconds:.1f} s ({source})."
+            )
+        lines += [f"{name}: not used. {reason}" for name, reason in self.refused.items()]
+        lines.append(f"The reference of RK4 and SciPy's DOP853 at its finest differ by {self.checked:.1e} (median).")
+        return "\n".join(lines)
+
+    @staticmethod
+    def _line(row: TradeRow) -> tuple[str, ...]:
+        errors = f"{row.error_median:.2e}", f"{row.error_90:.2e}"
+        times = f"{1e6 * row.seconds:.4g}", f"{1e6 * row.seconds_alone:.4g}"
+        return (row.stepper, *errors, *times, f"{row.memory:.0f}", "← default" if row.default else "")
+
+    def _order(self, name: str) -> str:
+        order = self.orders[name]
+        if not np.isfinite(order):
+            return "no range of settings shows an order"
+        return f"error ∝ step^{order:.1f}" if name == "RK4" else f"error ∝ tolerance^{order:.2f}"
 
 
 def measure_steppers(
@@ -62,31 +135,9 @@ def measure_steppers(
     steps in contact, is checked by SciPy's DOP853, restarted at every change of contact. Where FreeFlight cannot
     integrate the scene, DOP853 is the reference of Order8.
 
-    Parameters
-    ----------
-    osc : Oscillator
-    ladders : tuple of tuples of Stepper
-        The settings of each stepper, coarse to fine.
-    starts : int
-        Random starts between the stops.
-    periods : int
-        Sections from start to end.
-    seconds : float
-        Time that each setting is timed for.
-    rng : int or numpy.random.Generator
-        Chooses the starts.
-    progress : bool or callable, optional
-
-    Returns
-    -------
-    Trade
-
-    Raises
-    ------
-    NoSectionError
-        The excitations have no common period.
-    IntegrationError
-        A reference ran out of range.
+    Each of `ladders` has the settings of one stepper, coarse to fine, each timed for some `seconds`. The `starts` lie
+    at random between the stops. NoSectionError is raised if the excitations have no common period, IntegrationError if
+    a reference ran out of range.
     """
     states = starts_between_stops(osc, starts, np.random.default_rng(rng))
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
@@ -95,63 +146,35 @@ def measure_steppers(
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose
         calls, refused = _first_calls(osc, ladders, states[:1])
         taken = [stepper for ladder in ladders for stepper in ladder if type(stepper).__name__ in calls]
-        references = References(osc, states, periods)
+        references = _references(osc, states, periods)
         for done, stepper in enumerate(taken):
             report(1 + done, 1 + len(taken))
-            row = _row(osc, stepper, states, periods, references.ends_for(type(stepper).__name__), seconds)
+            row = _row(osc, stepper, states, periods, references[type(stepper).__name__][1], seconds)
             rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
         report(1 + len(taken))
+    checked = reference_map(osc, states[:_CHECKED], periods, tolerance=TIGHTEST)
     return Trade(
         rows=tuple(rows),
         first_calls=tuple(calls.values()),
-        references={name: references.title_for(name) for name in calls},
-        orders={name: fitted_order([row for row in rows if row.name == name], rows) for name in calls},
+        references={name: references[name][0] for name in calls},
+        orders={name: _fitted_order([row for row in rows if row.name == name], rows) for name in calls},
         refused=refused,
-        checked=references.check(_CHECKED),
+        checked=float(np.median(np.linalg.norm(references["RK4"][1][:_CHECKED] - checked, axis=1))),
         starts=starts,
         periods=periods,
         threads=os.cpu_count() or 1,
     )
 
 
-class References:
-    """Where the starts end, by the finest steppers, each found by another method than what it is compared with.
-
-    Parameters
-    ----------
-    osc : Oscillator
-    states : array (count, n)
-    periods : int
-    """
-
-    def __init__(self, osc: Oscillator, states: Array, periods: int) -> None:
-        self.osc, self.states, self.periods = osc, states, periods
-        order8 = osc.section_map(states, periods, stepper=Order8(_FINEST))
-        self.ends = {"Order8": order8}
-        try:
-            self.ends["FreeFlight"] = osc.section_map(states, periods, stepper=FreeFlight(_FINEST))
-        except StepperError:
-            self.ends["DOP853"] = reference_map(osc, states, periods, tolerance=TIGHTEST)
-
-    def _source(self, name: str) -> str:
-        flown = "FreeFlight" in self.ends
-        if name == "Order8":
-            return "FreeFlight" if flown else "DOP853"
-        return "FreeFlight" if flown and name != "FreeFlight" else "Order8"
-
-    def title_for(self, name: str) -> str:
-        """What a stepper is compared with."""
-        source = self._source(name)
-        return f"{source} at {TIGHTEST if source == 'DOP853' else _FINEST:g}"
-
-    def ends_for(self, name: str) -> Array:
-        """Ends that a stepper is compared with."""
-        return self.ends[self._source(name)]
-
-    def check(self, count: int) -> float:
-        """Median distance of the finest steppers to DOP853."""
-        own = reference_map(self.osc, self.states[:count], self.periods, tolerance=TIGHTEST)
-        return float(np.median(np.linalg.norm(self.ends_for("RK4")[:count] - own, axis=1)))
+def _references(osc: Oscillator, states: Array, periods: int) -> dict[str, tuple[str, Array]]:
+    """What each stepper is compared with: a finer one of another method, and where it ends."""
+    order8 = f"Order8 at {_FINEST:g}", osc.section_map(states, periods, stepper=Order8(_FINEST))
+    try:
+        flown = f"FreeFlight at {_FINEST:g}", osc.section_map(states, periods, stepper=FreeFlight(_FINEST))
+    except StepperError:
+        own = f"DOP853 at {TIGHTEST:g}", reference_map(osc, states, periods, tolerance=TIGHTEST)
+        return {"RK4": order8, "Order8": own}
+    return {"RK4": flown, "Order8": flown, "FreeFlight": order8}
 
 
 def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) -> Array:
@@ -238,3 +261,14 @@ def _peak_of_arrays(work: Callable[[], object]) -> float:
         return float(tracemalloc.get_traced_memory()[1])
     finally:
         tracemalloc.stop()
+
+
+def _fitted_order(rows: Sequence[TradeRow], all_rows: Sequence[TradeRow]) -> float:
+    """Fit the exponent with which the median error falls as cost rises; NaN with too few settings above the floor."""
+    floor = _ABOVE_FLOOR * min(row.error_median for row in all_rows)
+    errors = np.array([row.error_median for row in rows])
+    costs = np.array([row.cost for row in rows])
+    kept = (errors > floor) & (errors < _ASYMPTOTIC)
+    if kept.sum() < 3:
+        return float("nan")
+    return float(-np.polyfit(np.log(costs[kept]), np.log(errors[kept]), 1)[0])

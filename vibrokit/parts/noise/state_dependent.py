@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.noise.noise_model import NoiseModel
-from vibrokit.parts.parameter import Parameter
 
 
 class StateDependentNoise(FormulaPart, NoiseModel):
@@ -37,9 +36,6 @@ class StateDependentNoise(FormulaPart, NoiseModel):
         (declared,) = self._own()
         object.__setattr__(self, "intensity", declared.checked(type(self).__name__, intensity))
         self._read(amplitude, constants)
-
-    def _own(self) -> tuple[Parameter, ...]:
-        return self._declared[:1]
 
     def amplitude(self, x: Any, v: Any) -> Any:
         """Factor of √D dW: the formula."""
