@@ -22,20 +22,8 @@ def combined(
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0.
 
-    Parameters
-    ----------
-    attractor : Attractor
-    branches : sequence of ActivationEnergy
-        Polished paths, the cheapest first.
-    estimates : iterable of ActivationEnergy
-        The graph's, one for each target.
-
-    Returns
-    -------
-    energies : tuple of ActivationEnergy
-        One for each target.
-    findings : tuple of Finding
-        One for each target.
+    Given are the polished paths, the cheapest first, and the graph's estimates, one for each target. Returns an energy
+    and a finding for each target.
     """
     paths: dict[int, ActivationEnergy] = {}
     for branch in branches:

@@ -16,6 +16,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import NOT_FOLLOWED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Code, Finding, check_findings
 from vibrokit.results.result import Result
@@ -178,9 +179,34 @@ class Analyzer(ABC):
         except (StructureError, StepperError) as error:
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
-        if not isinstance(found, Analysis):
-            raise TypeError(f"{type(self).__name__}.analyze must return an Analysis, got {shown(found)}.")
+        self._check_returned(found, problem)
         return found
+
+    def _check_returned(self, found: Any, problem: ExitProblem) -> None:
+        """Refuse what no method may return, here where the class that returned it is known."""
+        method, attractors = f"{type(self).__name__}.analyze", problem.structure.attractors
+        if not isinstance(found, Analysis):
+            raise TypeError(f"{method} must return an Analysis, got {shown(found)}.")
+        for energy in (*found.estimates, *found.branches):
+            if not isinstance(energy, ActivationEnergy):
+                raise TypeError(f"{method} must return an ActivationEnergy for each exit, got {shown(energy)}.")
+            if energy.source != problem.source:
+                raise ValueError(
+                    f"{method} returned the source {shown(energy.source)}; it must be {problem.source}, the label of "
+                    "the attractor that it was given."
+                )
+            if energy.target not in range(NOT_FOLLOWED, len(attractors)):
+                raise ValueError(
+                    f"{method} returned the target {shown(energy.target)}; it must be the label of an attractor, 0 to "
+                    f"{len(attractors) - 1}, or -1 for an exit that is no attractor."
+                )
+            if not energy.value >= 0:
+                raise ValueError(f"{method} returned the energy {shown(energy.value)}; it must be 0 or positive.")
+            if not energy.lower <= energy.value <= energy.upper:
+                raise ValueError(
+                    f"{method} returned the bounds {shown(energy.lower)} to {shown(energy.upper)}, which do not "
+                    f"contain the energy {shown(energy.value)}; where nothing is known they are 0 and inf."
+                )
 
 
 def _strength(osc: Oscillator, analyses: dict[int, Analysis]) -> list[Finding]:

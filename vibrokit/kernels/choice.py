@@ -40,15 +40,6 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     Measured on ``hertz-0.570``, two periods, two threads, as ``vibrokit trade hertz-0.570`` prints it: RK4(256) has a
     median error of 9e-5 at 1.2 µs per trajectory and period; twice the steps, 2e-5 at 1.8 µs. The cheapest located
     setting, FreeFlight(1e-4), has 1e-4 at 18 µs. So RK4 is the default unless it needs more steps than that ratio.
-
-    Parameters
-    ----------
-    scene : Scene
-    flow : Flow
-
-    Returns
-    -------
-    Stepper
     """
     try:
         steps = _power_of_two(_steps_needed(scene, flow))
@@ -63,17 +54,7 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
 
 
 def single_stepper(scene: Scene, flow: Flow) -> Stepper:
-    """Choose the stepper for one trajectory: FreeFlight where it applies, otherwise Order8; RK4 with noise.
-
-    Parameters
-    ----------
-    scene : Scene
-    flow : Flow
-
-    Returns
-    -------
-    Stepper
-    """
+    """Choose the stepper for one trajectory: FreeFlight where it applies, otherwise Order8; RK4 with noise."""
     if flow is Flow.NOISY:
         return ensemble_stepper(scene, flow)
     return FreeFlight(_TOLERANCE) if _flies(scene, flow) else Order8(_TOLERANCE)

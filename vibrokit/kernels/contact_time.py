@@ -24,18 +24,10 @@ _LONGEST_REACH = 10.0  # stops limit a resonance to about this many times their 
 
 
 class ContactTime(NamedTuple):
-    """Duration of a typical contact, and how sharply it begins.
+    """Duration of a typical contact, and how sharply it begins."""
 
-    Attributes
-    ----------
-    duration : float
-        From touch to release (s).
-    exponent : float
-        Power of the depth that the force follows near touch: 3/2 for Hertz, 1 for linear stops, 0 for a jump.
-    """
-
-    duration: float
-    exponent: float
+    duration: float  # from touch to release (s)
+    exponent: float  # power of the depth in the force near touch: 3/2 for Hertz, 1 for linear stops, 0 for a jump
 
 
 @functools.lru_cache(maxsize=64)
@@ -43,12 +35,8 @@ def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
     """Estimate the contact with each stop at a typical impact speed; very soft stops are left out.
 
     The greatest depth follows from the energy, ½v² = ∫ F dδ, and the duration is close to π·depth/v for every power.
-    The law is that of the kernel for lanes, which an ensemble needs anyway.
-
-    Raises
-    ------
-    StepperError
-        RK4 cannot integrate this flow of this scene.
+    The law is that of the kernel for lanes, which an ensemble needs anyway. Raises StepperError if RK4 cannot integrate
+    this flow of this scene.
     """
     if not scene.barriers:
         return ()

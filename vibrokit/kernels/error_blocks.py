@@ -5,21 +5,13 @@ from numpy.typing import NDArray
 
 
 def error_blocks(states: int, momenta: int, equations: int) -> NDArray[np.int64]:
-    """Return the block of each component.
+    """Return the block of each component of a flow with n states, n or no momenta, and their derivatives.
 
     Each state has its own scale. Momenta share one, the action has its own, and so does each block of derivatives:
     final states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 where states are
     1, and their error must be small relative to them. The same holds for each entry of a covariance, because the
-    entries grow with different powers of a short time.
-
-    Parameters
-    ----------
-    states : int
-        Components of the state, n.
-    momenta : int
-        Components of the momentum: n or 0.
-    equations : int
-        Components of the flow: n, n + n² or n + n(n + 1)/2 without momenta, 2n + 1 or 2n + 1 + (2n)² with them.
+    entries grow with different powers of a short time. There are n, n + n² or n + n(n + 1)/2 equations without momenta,
+    2n + 1 or 2n + 1 + (2n)² with them.
     """
     state = list(range(states))
     if momenta == 0 and equations == states + states**2:

@@ -37,17 +37,9 @@ _CONDITION = re.compile(r"  # (forced|unforced|noisy|breaking|unbroken|bending|u
 
 @dataclasses.dataclass(frozen=True)
 class Kernel:
-    """Generated source and the module compiled from it. Travels to other processes as text.
+    """Generated source and the module compiled from it. Travels to other processes as text."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the module, made of what decides its code.
-    source : str
-        Its text.
-    """
-
-    name: str
+    name: str  # of the module, made of what decides its code
     source: str
 
     @property
@@ -59,12 +51,8 @@ class Kernel:
 def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
     """Return the kernel for a flow of a scene: read from disk if one with the same code exists, else derived.
 
-    Raises
-    ------
-    SceneError
-        The scene has no noise, and the flow is one of noise or of momenta.
-    StepperError
-        The stepper cannot integrate this flow of this scene.
+    Raises SceneError if the flow is one of noise or of momenta and the scene has no noise, and StepperError if the
+    stepper cannot integrate this flow of this scene.
     """
     if scene.noise is None and flow in _NEED_NOISE:
         raise SceneError(

@@ -25,10 +25,7 @@ def name_of(stepper: Stepper) -> str:
 def named_stepper(text: str) -> Stepper:
     """Read a stepper from its name and its number: ``rk4:512``, ``order8:1e-10``, ``free-flight``.
 
-    Raises
-    ------
-    StepperError
-        An unknown name, or a number that the stepper does not take.
+    Raises StepperError for an unknown name, and for a number that the stepper does not take.
     """
     name, colon, number = text.partition(":")
     if name not in _KINDS:

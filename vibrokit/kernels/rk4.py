@@ -56,10 +56,8 @@ class RK4(Stepper):
     def scene_part(self, text: SceneText) -> list[str]:
         """The lane-packed step, and what it calls; and the laws of the stops.
 
-        Raises
-        ------
-        StepperError
-            Momenta or derivatives under a force that jumps: they jump too, and steps across the jump miss that.
+        Raises StepperError for momenta or derivatives under a force that jumps: they jump too, and steps across the
+        jump miss that.
         """
         if text.jumps and text.breaks:
             what = "momenta" if text.flow.has_momenta else "derivatives of the motion"

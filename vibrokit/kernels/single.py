@@ -18,34 +18,17 @@ def record(
     scene: Scene,
     flow: Flow,
     stepper: Stepper,
-    state: NDArray[np.float64],
+    state: NDArray[np.float64],  # (equations,), in the layout of the flow
     start_time: float,
-    spacing: float,
-    count: int,
+    spacing: float,  # time from sample to sample (s)
+    count: int,  # samples after the start
     *,
-    seed: int | None = None,
-    normals: NDArray[np.float64] | None = None,
+    seed: int | None = None,  # of the noise, for the noisy flow
+    normals: NDArray[np.float64] | None = None,  # (steps, 2), in place of those drawn, for coupled paths
 ) -> NDArray[np.float64]:
-    """Integrate one trajectory of any flow.
+    """Integrate one trajectory of any flow; return its samples (≤ count + 1, equations).
 
-    Parameters
-    ----------
-    scene, flow, stepper
-    state : array (equations,)
-        Start, in the layout of the flow.
-    start_time, spacing : float
-        Time of the start, and from sample to sample (s).
-    count : int
-        Samples after the start.
-    seed : int, optional
-        Of the noise, for the noisy flow.
-    normals : array (steps, 2), optional
-        Standard normals to use in place of drawn ones, for coupled paths.
-
-    Returns
-    -------
-    array (≤ count + 1, equations)
-        Shorter if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
+    They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
     module = kernel_for(scene, flow, stepper).module
     warn_of_coarse_steps(scene, flow, stepper)

@@ -17,37 +17,14 @@ GRAZED = 6  # the contact with a stop whose force jumps was too slow to determin
 def section_status(
     x: float,
     v: float,
-    region: NDArray[np.float64],
-    labels: NDArray[np.int8],
-    home: int,
-    points: NDArray[np.float64],
-    point_labels: NDArray[np.int64],
-    tolerance: float,
+    region: NDArray[np.float64],  # (2, 2): bounds of x and of v; infinite ones switch the test off
+    labels: NDArray[np.int8],  # attractor that each cell of the region leads to, negative where unknown; empty: no test
+    home: int,  # label of the basin that the trajectory started in
+    points: NDArray[np.float64],  # (K, 2): known points of the section
+    point_labels: NDArray[np.int64],  # (K,)
+    tolerance: float,  # distance at which a known point counts as reached
 ) -> tuple[int, int]:
-    """Decide whether a trajectory stops at this section, and with which label.
-
-    Parameters
-    ----------
-    x, v : float
-        State at the section.
-    region : array (2, 2)
-        Least and largest x, least and largest v; infinite bounds switch the test off.
-    labels : array (cells in x, cells in v)
-        Label of the attractor that each cell of the region leads to, negative where unknown. An empty array switches
-        the test off.
-    home : int
-        Label of the basin that the trajectory started in.
-    points : array (K, 2)
-        Known points of the section; none switches the test off.
-    point_labels : array (K,)
-    tolerance : float
-        Distance at which a known point counts as reached.
-
-    Returns
-    -------
-    status, label : int
-        `COMPLETED` and −1 if nothing stops it.
-    """
+    """Return how a trajectory ends at this section, and with which label: `COMPLETED` and −1 if it goes on."""
     if not (np.isfinite(x) and np.isfinite(v)):
         return DIVERGED, -1
     if x < region[0, 0] or x > region[0, 1] or v < region[1, 0] or v > region[1, 1]:

@@ -103,13 +103,8 @@ def seed_lane(state: _Words, lane: int, seed: int | _Word, index: int | _Word) -
     the key, and so do the last two. The state is never all zero, which xoshiro could not leave. Two of N
     streams of n draws each overlap with probability about N^2 n / 2^256.
 
-    Parameters
-    ----------
-    state : uint64[4, LANES]
-        States of the block; column `lane` is overwritten.
-    lane : int
-    seed, index : int
-        The key. 64 bits each; signed numbers are read as their bits.
+    Of the block's states, uint64[4, LANES], the column `lane` is overwritten. The key has twice 64 bits; signed numbers
+    are read as their bits.
     """
     a = _mix(_U(seed) + _GOLDEN)
     b = _mix(_U(index) ^ a)
@@ -186,12 +181,8 @@ def _normals(radius_word: _Word, angle_word: _Word) -> tuple[float, float]:
 def normal_pairs(state: _Words, first: NDArray[np.float64], second: NDArray[np.float64]) -> None:
     """Draw two independent standard normals for every lane.
 
-    Parameters
-    ----------
-    state : uint64[4, LANES]
-        States of the block, advanced by two draws each.
-    first, second : float64[LANES]
-        Receive the normals. They reach |z| = 9.4, beyond which a normal falls with probability 5e-21.
+    The block's states, uint64[4, LANES], advance by two draws each. Normals reach |z| = 9.4, beyond which one falls
+    with probability 5e-21.
     """
     for lane in range(state.shape[1]):
         s0, s1, s2, s3 = state[0, lane], state[1, lane], state[2, lane], state[3, lane]

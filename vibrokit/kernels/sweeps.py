@@ -122,55 +122,26 @@ def best_node(before: Array, centre: Array, root: Array, most: float, reach: int
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def sweep_rows(
-    before: Array,
-    after: Array,
-    centres: Array,
-    roots: Array,
-    predecessors: Array,
-    uphill: Array,
-    ceilings: Array,
-    fixed: Flags,
-    active: Flags,
-    changed: Flags,
+    before: Array,  # (n, m): V on the grid before
+    after: Array,  # (n, m): V on the grid after
+    centres: Array,  # (n, m, 2): b of each node of the grid after; NaN where there is none
+    roots: Array,  # (n, m, 3): R as (ss, st, tt)
+    predecessors: Array,  # (n, m, 2): best x known of each node; improved
+    uphill: Array,  # (n, m, 2): points that are always tried
+    ceilings: Array,  # (n, m): upper bounds of V
+    fixed: Flags,  # (n, m): nodes whose V is given
+    active: Flags,  # (n, m): nodes of the grid before near which V has changed
+    changed: Flags,  # (n, m): set for nodes of the grid after whose V changed by more than the tolerance, else cleared
     first: int,
-    last: int,
-    order: int,
-    reach: int,
-    tolerance: float,
+    last: int,  # rows to do: first ≤ i < last
+    order: int,  # 1 from the first row and column to the last, −1 the other way round
+    reach: int,  # nodes to each side of b among which a cheaper predecessor is searched; 0 to improve known ones only
+    tolerance: float,  # relative
 ) -> None:
     """Improve some rows of nodes of the grid after, in place.
 
-    Parameters
-    ----------
-    before, after : array (n, m)
-        V on the two grids.
-    centres : array (n, m, 2)
-        b of each node of the grid after; NaN where there is none.
-    roots : array (n, m, 3)
-        R as (ss, st, tt).
-    predecessors : array (n, m, 2)
-        Best x known of each node; improved.
-    uphill : array (n, m, 2)
-        Points that are always tried.
-    ceilings : array (n, m)
-        Upper bounds of V.
-    fixed : uint8 array (n, m)
-        Nodes whose V is given.
-    active : uint8 array (n, m)
-        Nodes of the grid before near which V has changed. If reach is 0, only nodes with predecessors there are
-        evaluated.
-    changed : uint8 array (n, m)
-        Set for nodes of the grid after whose V changed by more than the tolerance, else cleared.
-    first, last : int
-        Rows to do: first ≤ i < last. Predecessors are taken over from neighbours in these rows only, so that the
-        result does not depend on who does the others.
-    order : int
-        1 from the first row and column to the last, −1 the other way round. The predecessors of the two neighbours
-        done before are tried.
-    reach : int
-        Nodes to each side of b among which a cheaper predecessor is searched; 0 to improve known ones only.
-    tolerance : float
-        Relative.
+    If reach is 0, only nodes with predecessors in active places are evaluated. The predecessors of the two neighbours
+    done before are tried, within these rows only, so that the result does not depend on who does the others.
     """
     n, m = before.shape
     for row in range(last - first):
@@ -228,22 +199,10 @@ def interpolate_all(values: Array, points: Array) -> Array:
 def descend_all(before: Array, starts: Array, centres: Array, roots: Array, step_weight: float) -> tuple[Array, Array]:
     """Return the least cost of reaching some points, and the predecessors.
 
-    Parameters
-    ----------
-    before : array (n, m)
-    starts : array (count, tries, 2)
-        Points from which each descent begins; the best result is kept.
-    centres : array (count, 2)
-    roots : array (count, 3)
-    step_weight : float
-        Of the step's cost against V in the choice of the predecessor. Below 1, those from which V falls faster are
-        preferred.
-
-    Returns
-    -------
-    costs : array (count,)
-        Not weighted; infinite where there is no b.
-    predecessors : array (count, 2)
+    Descents begin at starts (count, tries, 2), and the best result is kept, for centres (count, 2) and roots
+    (count, 3). In the choice of the predecessor the step's cost has a weight against V: below 1, those from which V
+    falls faster are preferred. Costs (count,) are not weighted, and infinite where there is no b; predecessors have
+    shape (count, 2).
     """
     n, m = before.shape
     costs, predecessors = np.full(len(starts), math.inf), np.ones((len(starts), 2))

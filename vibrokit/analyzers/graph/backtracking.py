@@ -23,14 +23,8 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
 
     The costs of steps are computed anew for each state, not taken from the nodes.
 
-    Returns
-    -------
-    states : array (count, 2)
-        In the order of time, a step apart, the first on the section.
-    value : float
-        V at the first of them.
-
-    None if the path does not reach the attractor.
+    Returns the states (count, 2) in the order of time, a step apart, the first on the section, and V at the first of
+    them; None if the path does not reach the attractor.
     """
     grids = potential.grids
     states = [end]

@@ -28,17 +28,10 @@ class FaceTarget(ExitTarget):
 
     A path may reach the face between two phases and between two nodes: V is advanced from each phase by parts of a
     step, to states on the face.
-
-    Attributes
-    ----------
-    model : StepModel
-    axis : int
-        0 for a level of x, 1 for a level of v.
-    level : float
     """
 
     model: StepModel
-    axis: int
+    axis: int  # 0 for a level of x, 1 for a level of v
     level: float
 
     def evaluate(self, potential: Potential) -> Arrival:

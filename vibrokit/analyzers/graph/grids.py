@@ -18,21 +18,11 @@ Mask = NDArray[np.bool_]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Grids:
-    """A grid of nodes (x, v) for each phase, all with the same number of nodes.
+    """A grid of nodes (x, v) for each phase, all with the same number of nodes."""
 
-    Attributes
-    ----------
-    boxes : array (phases, 2, 2)
-        Bounds of x and of v; the outermost nodes lie on them.
-    shape : (int, int)
-        Nodes in x and in v.
-    step : float
-        Time from phase to phase (s).
-    """
-
-    boxes: Array
-    shape: tuple[int, int]
-    step: float
+    boxes: Array  # (phases, 2, 2): bounds of x and of v; the outermost nodes lie on them
+    shape: tuple[int, int]  # nodes in x and in v
+    step: float  # time from phase to phase (s)
 
     @property
     def phases(self) -> int:

@@ -37,38 +37,20 @@ Mask = NDArray[np.bool_]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TargetEstimate:
-    """What reaching an exit target costs.
-
-    Attributes
-    ----------
-    value, error : float
-        Infinite if the target was not reached.
-    candidates : tuple of Candidate
-        Distinct paths, the cheapest first; their last states lie beyond the exit.
-    """
+    """What reaching an exit target costs."""
 
     value: float
-    error: float
-    candidates: tuple[Candidate, ...]
+    error: float  # both are infinite if the target was not reached
+    candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CoarseGrids:
-    """The potential on half as many nodes along each side.
+    """The potential on half as many nodes along each side."""
 
-    Attributes
-    ----------
-    whole : SolvedGrid
-        On all that the region covers.
-    coarse : SolvedGrid
-        On what can be reached for little more than the costliest exit.
-    long : SolvedGrid
-        The same with steps twice as long.
-    """
-
-    whole: SolvedGrid
-    coarse: SolvedGrid
-    long: SolvedGrid
+    whole: SolvedGrid  # on all that the region covers
+    coarse: SolvedGrid  # on what can be reached for little more than the costliest exit
+    long: SolvedGrid  # the same with steps twice as long
 
     def linearization_error(self, targets: Sequence[ExitTarget]) -> float:
         """Largest relative change of an exit's cost by linearization over a step."""
@@ -82,13 +64,7 @@ class CoarseGrids:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GridHierarchy:
-    """The potential on the nodes that were asked for, and on fewer.
-
-    Attributes
-    ----------
-    fine : SolvedGrid
-    coarser : CoarseGrids
-    """
+    """The potential on the nodes that were asked for, and on fewer."""
 
     fine: SolvedGrid
     coarser: CoarseGrids
@@ -117,30 +93,17 @@ class GridHierarchy:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HierarchySearch:
-    """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    model : StepModel
-    shape : (int, int)
-        Nodes in x and in v.
-    steps_per_period : tuple of int
-        To be tried in turn.
-    """
+    """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs."""
 
     problem: ExitProblem
     model: StepModel
-    shape: tuple[int, int]
-    steps_per_period: tuple[int, ...]
+    shape: tuple[int, int]  # nodes in x and in v
+    steps_per_period: tuple[int, ...]  # to be tried in turn
 
     def estimates(self, targets: Sequence[ExitTarget]) -> tuple[dict[ExitTarget, TargetEstimate], Potential]:
         """Return what some targets cost, and the potential on the finest grid that covers them.
 
-        Raises
-        ------
-        StructureError
-            No target was reached, or the attractor is not hyperbolic.
+        Raises StructureError if no target was reached, or if the attractor is not hyperbolic.
         """
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
             hierarchy = self._hierarchy(targets)

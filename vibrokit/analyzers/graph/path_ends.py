@@ -24,13 +24,7 @@ Array = NDArray[np.float64]
 
 
 def exit_targets(problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
-    """Return the exit targets of a problem.
-
-    Raises
-    ------
-    StructureError
-        The exit has a kind of path end that the graph does not know, or none that it can reach.
-    """
+    """Return the exit targets of a problem; raises StructureError if the graph can reach none of its path ends."""
     targets = [target for end in problem.path_ends for target in targets_at(end, problem, model)]
     if not targets:
         raise StructureError(
@@ -42,13 +36,7 @@ def exit_targets(problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
 
 @functools.singledispatch
 def targets_at(end: PathEnd, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
-    """Return the exit targets that stand for a path end.
-
-    Raises
-    ------
-    StructureError
-        The graph does not know this kind of path end.
-    """
+    """Return the exit targets that stand for a path end; raises StructureError if the graph does not know its kind."""
     raise StructureError(
         f"the graph cannot search paths that end at {end}; it knows AtSaddle, InBasin and AtFace. Use another method."
     )

@@ -34,30 +34,14 @@ Flags = NDArray[np.uint8]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Potential:
-    """Least action V from an attractor to every node of every phase.
-
-    Attributes
-    ----------
-    grids : Grids
-    values : list of array (nx, nv)
-        By phase; `ceiling` where no cheaper path is known.
-    predecessors : list of array (nx, nv, 2)
-        By phase of the start of the step: where the best step to each node of the next phase starts, in fractional
-        indices.
-    seeded : bool array (nx, nv)
-        Nodes of the section whose V is known beforehand.
-    orbit : array (count, 2)
-        States of the attractor from phase to phase if it is an orbit; else empty.
-    ceiling : float
-        V up to which paths are searched.
-    """
+    """Least action V from an attractor to every node of every phase."""
 
     grids: Grids
-    values: list[Array]
-    predecessors: list[Array]
-    seeded: NDArray[np.bool_]
-    orbit: Array
-    ceiling: float
+    values: list[Array]  # (nx, nv) for each phase; `ceiling` where no cheaper path is known
+    predecessors: list[Array]  # (nx, nv, 2) for each phase: where the best step to a node of the next starts, as index
+    seeded: NDArray[np.bool_]  # (nx, nv): nodes of the section whose V is known beforehand
+    orbit: Array  # (count, 2): states of the attractor from phase to phase if it is an orbit; else empty
+    ceiling: float  # V up to which paths are searched
 
     def at(self, phase: int, states: Array) -> Array:
         """Return V at states (count, ≥ 2); NaN outside the grid."""
@@ -81,10 +65,7 @@ class Potential:
 def quasi_potential(model: StepModel, attractor: Attractor, grids: Grids, ceiling: float) -> Potential:
     """Return the least action from an attractor to the nodes of some grids, as far as it is below a ceiling.
 
-    Raises
-    ------
-    StructureError
-        The attractor is not hyperbolic.
+    Raises StructureError if the attractor is not hyperbolic.
     """
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
         return _Iteration(model, attractor, grids, ceiling, executor).run()

@@ -24,18 +24,10 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Seeds:
-    """What is known of the potential beforehand.
+    """What is known of the potential beforehand."""
 
-    Attributes
-    ----------
-    values : list of array (nx, nv)
-        By phase; infinite at nodes where the potential is not known.
-    orbit : array (count, 2)
-        The orbit from phase to phase, where paths may start; empty for a set.
-    """
-
-    values: list[Array]
-    orbit: Array
+    values: list[Array]  # (nx, nv) for each phase; infinite at nodes where the potential is not known
+    orbit: Array  # (count, 2): the orbit from phase to phase, where paths may start; empty for a set
 
 
 def seeds(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
@@ -43,12 +35,7 @@ def seeds(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
 
     Near the points of an orbit or of an equilibrium the potential is ½ δqᵀ Σ⁻¹ δq, with Σ carried from phase to phase
     by M Σ Mᵀ + C, as far as the motion is linear there. An attractor that meets the section in a curve or a cloud has
-    the potential 0 at the nodes next to it.
-
-    Raises
-    ------
-    StructureError
-        The attractor is not hyperbolic.
+    the potential 0 at the nodes next to it. Raises StructureError if the attractor is not hyperbolic.
     """
     if attractor.is_fixed:
         return _around_orbit(model, attractor, grids)

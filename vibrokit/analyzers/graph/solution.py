@@ -24,25 +24,14 @@ _CLOSER = 3  # of these grids, at most, one after the other
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GraphSolution:
-    """Least actions of the exits of an attractor, on a grid.
+    """Least actions of the exits of an attractor, on a grid."""
 
-    Attributes
-    ----------
-    source : int
-        Label of the attractor.
-    energies : tuple of ActivationEnergy
-        Of each place where paths may end, the cheapest first.
-    candidates : tuple of Candidate
-        Distinct paths to these places, in the same order; their last states lie beyond the exit.
-    potential : Potential
-        On the grid that reaches farthest.
-    findings : tuple of Finding
-    """
-
-    source: int
-    energies: tuple[ActivationEnergy, ...]
-    candidates: tuple[Candidate, ...]
-    potential: Potential
+    source: int  # label of the attractor
+    energies: tuple[ActivationEnergy, ...]  # of each place where paths may end, the cheapest first
+    candidates: tuple[
+        Candidate, ...
+    ]  # distinct paths to them, in the same order; their last states lie beyond the exit
+    potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
 
     @property

@@ -24,22 +24,13 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StepCosts:
-    """Costs ½ |R (x − b)|² of steps from a state x to each of some states, all in units of a grid's nodes.
+    """Costs ½ |R (x − b)|² of steps from a state x to each of some states, all in units of a grid's nodes."""
 
-    Attributes
-    ----------
-    centres : array (count, 2)
-        b: the state that the noise-free step starts from, or would if the motion were linear; NaN where there is none.
-    roots : array (count, 3)
-        R as (00, 01, 11), upper triangular. RᵀR itself would lose its small eigenvalue to rounding where the form is
-        long and thin, as in a stiff stop.
-    uphill : array (count, 2)
-        Where a path that climbs against the damping would start.
-    """
-
-    centres: Array
-    roots: Array
-    uphill: Array
+    centres: Array  # (count, 2): b, where the noise-free step starts, or would if the motion were linear; NaN for none
+    # R as (00, 01, 11), upper triangular. RᵀR itself would lose its small eigenvalue to rounding where the form is long
+    # and thin, as in a stiff stop.
+    roots: Array  # (count, 3)
+    uphill: Array  # (count, 2): where a path that climbs against the damping would start
 
     def cost(self, starts: Array) -> Array:
         """Return the costs of steps from some states, one for all or one for each."""
@@ -51,13 +42,7 @@ class StepCosts:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StepModel:
-    """The motion over short times.
-
-    Attributes
-    ----------
-    scene : Oscillator
-    stepper : Stepper
-    """
+    """The motion over short times."""
 
     scene: Oscillator
     stepper: Stepper
@@ -77,15 +62,7 @@ class StepModel:
         that noise adds along the step. The motion is linearized along the step that ends at y and starts at b without
         noise: e = M (b − x), and RᵀR = Mᵀ C⁻¹ M is the inverse of that covariance of the motion backwards in time.
         Where b lies outside the grid, as it does when damping is strong, the motion is linearized along the step that
-        starts uphill.
-
-        Parameters
-        ----------
-        states : array (count, 2)
-        grids : Grids
-        phase : int
-        duration : float, optional
-            Of the step (s); by default that of the grids.
+        starts uphill. By default a step takes the time between two grids.
         """
         step = grids.step if duration is None else duration
         start, box = grids.time(phase), grids.boxes[phase]

@@ -17,56 +17,29 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TraceStart:
-    """A state that a path is traced back from.
+    """A state that a path is traced back from."""
 
-    Attributes
-    ----------
-    state : array (2,)
-    phase : int
-    beyond : array (count, 2)
-        States that the path goes on to, one in each step of time.
-    """
-
-    state: Array
+    state: Array  # (2,)
     phase: int = 0
-    beyond: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
+    beyond: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))  # states that follow, one in each step
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Arrival:
-    """An exit target on one potential.
+    """An exit target on one potential."""
 
-    Attributes
-    ----------
-    value : float
-        Least V of the target; infinite if the grid does not reach it.
-    error : float
-        What the place of the target alone contributes to the error of the value.
-    starts : tuple of TraceStart
-    """
-
-    value: float
-    error: float = 0.0
+    value: float  # least V of the target; infinite if the grid does not reach it
+    error: float = 0.0  # what the place of the target alone contributes to the error of the value
     starts: tuple[TraceStart, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExitTarget(ABC):
-    """A set of states that an exit path ends on. Abstract.
+    """A set of states that an exit path ends on. Abstract."""
 
-    Attributes
-    ----------
-    label : int
-        Label of the attractor that is reached from there; −1 for an exit that is no attractor.
-    saddle : int
-        Which of the structure's saddles it is; −1 for none.
-    scale : float
-        Rough cost of a straight path, from which the search for the ceiling of V starts.
-    """
-
-    label: int
-    saddle: int
-    scale: float
+    label: int  # label of the attractor that is reached from there; −1 for an exit that is no attractor
+    saddle: int  # which of the structure's saddles it is; −1 for none
+    scale: float  # rough cost of a straight path, from which the search for the ceiling of V starts
 
     @abstractmethod
     def evaluate(self, potential: Potential) -> Arrival:
@@ -75,20 +48,11 @@ class ExitTarget(ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StateTarget(ExitTarget):
-    """Any of some states on the section.
+    """Any of some states on the section."""
 
-    Attributes
-    ----------
-    states : array (count, 2)
-    direction : array (2,), optional
-        Of the unstable manifold at the first state, if that is a saddle.
-    depth : array (2,), optional
-        How far the states lie behind the basin boundary, in x and in v; None if they lie on it.
-    """
-
-    states: Array
-    direction: Array | None = None
-    depth: Array | None = None
+    states: Array  # (count, 2)
+    direction: Array | None = None  # (2,): of the unstable manifold at the first state, if that is a saddle
+    depth: Array | None = None  # (2,): how far, in x and in v, the states lie behind the basin boundary; None: on it
 
     def evaluate(self, potential: Potential) -> Arrival:
         """The cheapest state.

@@ -26,19 +26,10 @@ _SAME = 1e-4  # relative difference of the actions of paths that count as one
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedPath:
-    """A path to an exit target, relaxed to a local minimum of the action.
+    """A path to an exit target, relaxed to a local minimum of the action."""
 
-    Attributes
-    ----------
-    candidate : Candidate
-        Its action is that of Hamilton's equations. Except for the quadratic form that it starts in, it bounds the least
-        action from above.
-    quadratic : float
-        Its cost as the graph computes it, with linearized steps.
-    """
-
-    candidate: Candidate
-    quadratic: float
+    candidate: Candidate  # priced by Hamilton's equations, except for the quadratic form that it starts in
+    quadratic: float  # its cost as the graph computes it, with linearized steps
 
     @property
     def linearization_error(self) -> float:

@@ -35,12 +35,12 @@ class _Evaluation:
 
 def descend_action(
     propagator: SegmentPropagator,
-    first: int,
-    points: Array,
+    first: int,  # phase of the first node, in pieces since the section
+    points: Array,  # (nodes, 2n): guess of (q, p)
     *,
-    last: float | None = None,
-    free: NDArray[np.bool_] | None = None,
-    closing: Closing | None = None,
+    last: float | None = None,  # duration of the last piece (s), if it differs from the others
+    free: NDArray[np.bool_] | None = None,  # (n,): coordinates of the last state that may change; by default none
+    closing: Closing | None = None,  # action after the last node, all of whose coordinates may change
 ) -> tuple[Array, float]:
     """Bring a path to a local minimum of the action, with extremal segments and its first state held.
 
@@ -48,26 +48,8 @@ def descend_action(
     of the variational equations as its second derivatives: Newton's method on the sum has a banded matrix, and is
     damped where a step would not descend. It converges from farther away than multiple shooting, and to minima only.
 
-    Parameters
-    ----------
-    propagator : SegmentPropagator
-    first : int
-        Phase of the first node, in pieces since the section.
-    points : array (nodes, 2n)
-        Guess of (q, p).
-    last : float, optional
-        Duration of the last piece (s), if it differs from the others.
-    free : bool array (n,), optional
-        Which coordinates of the last state may change; by default none, or all of them with `closing`.
-    closing : (array (n,), array (n, n)), optional
-        State and quadratic form of the action after the last node; by default the path ends there.
-
-    Returns
-    -------
-    points : array (nodes, 2n)
-        The guess itself where no extremal segments through its states were found.
-    action : float
-        NaN there.
+    Returns the points (nodes, 2n) and the action: the guess and NaN where no extremal segments through its states were
+    found.
     """
     n = propagator.size
     path = _Descent(propagator, first, last, free, closing)

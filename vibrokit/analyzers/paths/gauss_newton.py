@@ -36,10 +36,10 @@ class _Evaluation:
 
 def gauss_newton(
     propagator: SegmentPropagator,
-    first: int,
-    states: Array,
-    last: float | None = None,
-    free: NDArray[np.bool_] | None = None,
+    first: int,  # phase of the first node, in pieces since the section
+    states: Array,  # (nodes, n): the guess, a piece apart, three nodes or more; the first state is held
+    last: float | None = None,  # duration of the last piece (s), if it differs from the others
+    free: NDArray[np.bool_] | None = None,  # (n,): coordinates of the last state that may change; by default none
 ) -> tuple[Array, float]:
     """Minimize ½ Σ eᵀC⁻¹e over the states between the first and the last node, by the Levenberg–Marquardt method.
 
@@ -47,28 +47,7 @@ def gauss_newton(
     segment. Over an eighth of a period the quadratic action is within about 0.2 % of the least action between two
     nodes. Because it is a sum of squares, the method converges from very poor guesses.
 
-    Parameters
-    ----------
-    propagator : SegmentPropagator
-    first : int
-        Phase of the first node, in pieces since the section.
-    states : array (nodes, n)
-        The guess, a piece apart, three nodes or more. The first state is held.
-    last : float, optional
-        Duration of the last piece (s), if it differs from the others.
-    free : bool array (n,), optional
-        Which coordinates of the last state may change; by default none.
-
-    Returns
-    -------
-    points : array (nodes, 2n)
-        (q, p) at each node.
-    action : float
-
-    Raises
-    ------
-    StructureError
-        The guess diverges.
+    Returns (q, p) at each node (nodes, 2n), and the action. Raises StructureError if the guess diverges.
     """
     current = _evaluate(propagator, first, states, last)
     if current is None:

@@ -47,24 +47,12 @@ class LocalPotential:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Phase:
-    """The quadratic form at one time of an orbit, and what leads to it from the time before.
+    """The quadratic form at one time of an orbit, and what leads to it from the time before."""
 
-    Attributes
-    ----------
-    time : float
-        Since the section that the orbit starts on (s).
-    point : array (n,)
-        Of the orbit.
-    covariance : array (n, n)
-        Σ at that time.
-    monodromy : array (n, n)
-        M, derivative of the flow from the phase before to this one.
-    """
-
-    time: float
-    point: Array
-    covariance: Array
-    monodromy: Array
+    time: float  # since the section that the orbit starts on (s)
+    point: Array  # (n,): of the orbit
+    covariance: Array  # (n, n): Σ at that time
+    monodromy: Array  # (n, n): M, derivative of the flow from the phase before to this one
 
 
 def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPotential:
@@ -82,12 +70,8 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
 def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> tuple[Phase, ...]:
     """Return the quadratic form at 16 times of each section interval of a stable orbit, the first the orbit's start.
 
-    From phase to phase Σ' = M Σ Mᵀ + C; the monodromy of the first phase leads to it from the last.
-
-    Raises
-    ------
-    StructureError
-        The orbit is not stable.
+    From phase to phase Σ' = M Σ Mᵀ + C; the monodromy of the first phase leads to it from the last. Raises
+    StructureError if the orbit is not stable.
     """
     nodes, pieces = gaussian_pieces(osc, orbit.point, stepper, _PIECES, _PIECES * orbit.period)
     covariance = _stationary(orbit, *pieces.composed()).covariance

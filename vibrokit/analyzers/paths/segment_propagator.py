@@ -20,19 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SegmentPropagator:
-    """Maps nodes of a path, which lie at whole multiples of a piece of the section interval.
-
-    Attributes
-    ----------
-    osc : Oscillator
-    stepper : Stepper
-    pieces : int
-        Number of pieces in a section interval.
-    """
+    """Maps nodes of a path, which lie at whole multiples of a piece of the section interval."""
 
     osc: Oscillator
     stepper: Stepper
-    pieces: int = 8
+    pieces: int = 8  # number of pieces in a section interval
 
     @property
     def piece(self) -> float:
@@ -57,15 +49,9 @@ class SegmentPropagator:
         return 1 if self.osc.autonomous else self.pieces
 
     def linear(self, states: Array, first: int, last: float | None = None) -> GaussianMap:
-        """Map consecutive nodes over one piece each without noise, with the covariance that noise adds.
+        """Map consecutive nodes (count, n) over one piece each without noise, with the covariance that noise adds.
 
-        Parameters
-        ----------
-        states : array (count, n)
-        first : int
-            Phase of the first node, in pieces since the section.
-        last : float, optional
-            Duration of the last piece (s), if it differs from the others.
+        The phase of the first node is in pieces since the section; the last piece may have another duration (s).
         """
         return self._by_phase(gaussian_map, states, first, last)
 

@@ -27,10 +27,6 @@ class FaceEnding(Ending):
     With forcing, the time at which the face is reached is free, so that H = 0 there. Without forcing H = 0 along every
     path that leaves an equilibrium; it is not a condition. On a bound of x, H = p₁v, and v = 0 takes its place: the
     path turns around on the face.
-
-    Attributes
-    ----------
-    face : AtFace
     """
 
     face: AtFace

@@ -23,17 +23,10 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SaddleEnding(Ending):
-    """The last point lies in the stable space of an orbit.
-
-    Attributes
-    ----------
-    orbit : LinearizedOrbit
-    phase : int
-        Of the last point, in pieces from node 0 of the orbit.
-    """
+    """The last point lies in the stable space of an orbit."""
 
     orbit: LinearizedOrbit
-    phase: int = 0
+    phase: int = 0  # of the last point, in pieces from node 0 of the orbit
 
     def distance(self, candidate: ResampledCandidate) -> float:
         return self._closest(candidate)[0]

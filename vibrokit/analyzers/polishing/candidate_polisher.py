@@ -59,17 +59,7 @@ class Solved:
 class CandidatePolisher:
     """Polishes candidates that leave one orbit, and keeps each path once.
 
-    Attributes
-    ----------
-    solved : list of Solved
-    skipped : int
-        Candidates that cost too much.
-    findings : list of Finding
-
-    Raises
-    ------
-    StructureError
-        The orbit is not hyperbolic.
+    Raises StructureError if the orbit is not hyperbolic.
     """
 
     def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], point: np.ndarray, period: int) -> None:
@@ -79,7 +69,7 @@ class CandidatePolisher:
         source(_PIECES[0])
         self.problem, self.ends = problem, ends
         self.solved: list[Solved] = []
-        self.skipped = 0
+        self.skipped = 0  # candidates that cost too much
         self.findings: list[Finding] = []
         self._solver = functools.cache(lambda end, pieces: PathSolver(propagators[pieces], source(pieces)))
         self._ending = functools.cache(lambda end, pieces: ending_at(end, problem, propagators[pieces]))

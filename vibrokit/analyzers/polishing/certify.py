@@ -20,10 +20,7 @@ Array = NDArray[np.float64]
 def certify(propagator: SegmentPropagator, found: ExtremalPath) -> Certificate:
     """Solve again from ten times as far, with two more periods at either end, and with a tightened integration.
 
-    Raises
-    ------
-    StructureError
-        One of these has no solution nearby.
+    Raises StructureError if one of these has no solution nearby.
     """
     nearer = solved_again(propagator, found, -_dropped(found), 0)
     before, after = len(found.source.states), found.ending.period_nodes

@@ -19,20 +19,11 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cut:
-    """A candidate that is cut to end where it must.
+    """A candidate that is cut to end where it must."""
 
-    Attributes
-    ----------
-    states : array (nodes, n)
-        A piece apart, except the last.
-    ending : Ending
-    last : float
-        Duration of the last piece (s).
-    """
-
-    states: Array
+    states: Array  # (nodes, n): a piece apart, except the last
     ending: Ending
-    last: float
+    last: float  # duration of the last piece (s)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -40,10 +31,6 @@ class Ending(ABC):
     """Where an exit path must end: n conditions on its last point, and one more if the time of that is free. Abstract.
 
     The methods with a body answer for paths that take a finite time.
-
-    Attributes
-    ----------
-    propagator : SegmentPropagator
     """
 
     propagator: SegmentPropagator

@@ -23,27 +23,14 @@ class LinearizedOrbit:
     """A hyperbolic orbit at p = 0, and the linear spaces in which extremal paths leave and approach it.
 
     Over a time the linearized equations are E = [[M, C M⁻ᵀ], [0, M⁻ᵀ]]. Both spaces have n of the 2n dimensions.
-
-    Attributes
-    ----------
-    states : array (nodes, n)
-        The orbit at each node, from the section on.
-    linear : GaussianMap
-        M and C of the pieces that begin at the nodes.
-    unstable, stable : array (nodes, 2n, n)
-        Bases of the unstable and of the stable space of (δq, p).
-    multipliers : complex array (n,)
-        Of the orbit.
-    start_on_orbit : bool
-        Whether paths start on the orbit itself, at p ≠ 0, instead of in the unstable space.
     """
 
-    states: Array
-    linear: GaussianMap
-    unstable: Array
-    stable: Array
-    multipliers: NDArray[np.complex128]
-    start_on_orbit: bool = False
+    states: Array  # (nodes, n): the orbit at each node, from the section on
+    linear: GaussianMap  # M and C of the pieces that begin at the nodes
+    unstable: Array  # (nodes, 2n, n): bases of the unstable space of (δq, p)
+    stable: Array  # (nodes, 2n, n): bases of the stable space
+    multipliers: NDArray[np.complex128]  # (n,)
+    start_on_orbit: bool = False  # whether paths start on the orbit itself, at p ≠ 0, instead of in the unstable space
 
     def with_start_on_orbit(self) -> LinearizedOrbit:
         """Return the same orbit, left by paths that start on it.
@@ -73,16 +60,9 @@ class LinearizedOrbit:
         return self.states[(first + np.arange(count)) % len(self.states)]
 
     def continued(self, point: Array, phase: int, count: int) -> Array:
-        """Return (q, p) at the nodes that continue a path, in the order of time.
+        """Return (q, p) at `count` nodes that continue a path after a point, or before it if negative.
 
-        Parameters
-        ----------
-        point : array (2n,)
-            In the stable space to continue after it, in the unstable space to continue before it.
-        phase : int
-            Of the point.
-        count : int
-            Nodes after it; negative: nodes before it.
+        The point (2n,) is in the stable space to continue after it, in the unstable space to continue before it.
         """
         sign = 1 if count > 0 else -1
         offset, nodes = point - self.point(phase), []
@@ -101,17 +81,8 @@ class LinearizedOrbit:
     def missing(self, points: Array, phase: int, sign: int, radius: float, grain: int) -> int:
         """Return how many nodes to add for a path to start or end within a radius in (x, v); negative: to drop.
 
-        Parameters
-        ----------
-        points : array (nodes, 2n)
-            From that end of the path on.
-        phase : int
-            Of the first of them.
-        sign : int
-            −1 for the start of the path, 1 for its end.
-        radius : float
-        grain : int
-            Number of nodes that are added or dropped at once.
+        The points (nodes, 2n) run from that end of the path, the start (sign −1) or the end (1); the phase is that of
+        the first of them. Nodes are added or dropped `grain` at once.
         """
         orbit = self.states[(phase - sign * np.arange(0, len(points), grain)) % len(self.states)]
         outside = np.linalg.norm(points[::grain, :2] - orbit[:, :2], axis=1) > radius
@@ -136,18 +107,8 @@ def linearized_orbit(propagator: SegmentPropagator, point: Array, period: int) -
     (Σ, 1). The stable space is spanned by (V_s, 0) and (V_u y, L_u) with the same equation for u. From the section they
     are carried to the other nodes, the one forward and the other backward: in these directions they attract.
 
-    Parameters
-    ----------
-    propagator : SegmentPropagator
-    point : array (n,)
-        A point of the orbit on the section; it is refined.
-    period : int
-        In section intervals.
-
-    Raises
-    ------
-    StructureError
-        There is no orbit, or it is not hyperbolic: a multiplier has size 1.
+    The point (n,) on the section is refined; the period is in section intervals. Raises StructureError if there is no
+    orbit, or if it is not hyperbolic.
     """
     orbit = refine_orbit(propagator.osc, point, period, propagator.stepper)
     nodes = period * propagator.pieces

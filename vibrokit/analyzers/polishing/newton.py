@@ -29,43 +29,21 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExtremalPath:
-    """A path that solves Hamilton's equations between an orbit and an ending.
+    """A path that solves Hamilton's equations between an orbit and an ending."""
 
-    Attributes
-    ----------
-    source : LinearizedOrbit
-        The orbit that it leaves.
-    first : int
-        Phase of the first node, in pieces from node 0 of that orbit.
-    ending : Ending
-    points : array (nodes, 2n)
-        (q, p), a piece apart, except the last.
-    last : float
-        Duration of the last piece (s).
-    slopes : array (nodes − 1, 2n, 2n)
-        Derivatives of the pieces.
-    actions : array (nodes − 1,)
-        Action of each piece.
-    residual : float
-        Largest misfit, relative to the size of what is matched.
-    slack : float
-        Without forcing H is constant along the path, so that one condition follows from the others, and a path between
-        two equilibria may be shifted in time. The time is fixed, and the path may jump at one node in the direction of
-        ∇H by this much, relative to its size. The jump is as small as the errors of the linearized ends.
-    scale : array (2n,)
-        That size.
-    """
-
-    source: LinearizedOrbit
-    first: int
+    source: LinearizedOrbit  # the orbit that it leaves
+    first: int  # phase of the first node, in pieces from node 0 of that orbit
     ending: Ending
-    points: Array
-    last: float
-    slopes: Array
-    actions: Array
-    residual: float
-    slack: float
-    scale: Array
+    points: Array  # (nodes, 2n): (q, p), a piece apart, except the last
+    last: float  # duration of the last piece (s)
+    slopes: Array  # (nodes − 1, 2n, 2n): derivatives of the pieces
+    actions: Array  # (nodes − 1,): action of each piece
+    residual: float  # largest misfit, relative to the size of what is matched
+    # Without forcing H is constant along the path, so that one condition follows from the others, and a path between
+    # two equilibria may be shifted in time. The time is fixed, and the path may jump at one node in the direction of
+    # ∇H. The jump is as small as the errors of the linearized ends.
+    slack: float  # of that jump, relative to the path's size
+    scale: Array  # (2n,): that size
 
     @property
     def action(self) -> float:
@@ -94,12 +72,12 @@ class ExtremalPath:
 def extremal_path(
     propagator: SegmentPropagator,
     source: LinearizedOrbit,
-    first: int,
+    first: int,  # phase of the first node, in pieces from node 0 of the source
     ending: Ending,
-    points: Array,
-    last: float,
+    points: Array,  # (nodes, 2n): guess of (q, p), a piece apart
+    last: float,  # duration of the last piece (s); a guess where it is free
     *,
-    evaluations: int = _EVALUATIONS,
+    evaluations: int = _EVALUATIONS,  # of the misfits, at most
 ) -> ExtremalPath:
     """Solve for a path: continuity, n conditions at the source, the conditions of the ending.
 
@@ -107,25 +85,7 @@ def extremal_path(
     Bulirsch, Introduction to Numerical Analysis, 7.3; the damping is Deuflhard's (Newton Methods for Nonlinear
     Problems, 3.3).
 
-    Parameters
-    ----------
-    propagator : SegmentPropagator
-    source : LinearizedOrbit
-        The orbit that the path leaves in its unstable space.
-    first : int
-        Phase of the first node, in pieces from node 0 of the source.
-    ending : Ending
-    points : array (nodes, 2n)
-        Guess of (q, p), a piece apart.
-    last : float
-        Duration of the last piece (s); a guess where it is free.
-    evaluations : int
-        Largest number of evaluations of the misfits.
-
-    Raises
-    ------
-    StructureError
-        It did not converge.
+    Raises StructureError if it does not converge.
     """
     found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations)
     if not found.residual <= _ACCEPTED:

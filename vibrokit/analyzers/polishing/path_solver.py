@@ -41,18 +41,9 @@ class PathSolver:
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
 
-        Parameters
-        ----------
-        cuts : sequence of Cut
-            The candidate cut in several ways, of which the cheapest after the Gauss–Newton method is taken.
-        worth : float
-            Action below which a path that cannot be joined to its source by the linearized equations is solved for as
-            one that starts on the orbit itself.
-
-        Raises
-        ------
-        StructureError
-            No extremal path was found near it.
+        Of several ways to cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be
+        joined to its source by the linearized equations is solved for as one that starts on the orbit itself, if its
+        action is below `worth`. Raises StructureError if no extremal path is found near the candidate.
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
@@ -131,10 +122,7 @@ class PathSolver:
 def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int) -> ExtremalPath:
     """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
 
-    Raises
-    ------
-    StructureError
-        It did not converge, or hardly anything of the path would be left.
+    Raises StructureError if it does not converge, or if hardly anything of the path would be left.
     """
     points, first = found.points, found.first
     if len(points) + min(before, 0) + min(after, 0) < _FEWEST:

@@ -26,19 +26,12 @@ _ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Polished:
-    """What the candidates of one attractor led to.
+    """What the candidates of one attractor led to."""
 
-    Attributes
-    ----------
-    branches : tuple of ActivationEnergy
-        Each exit path once for each attractor that it leads to, the cheapest first, with path and certificate. The
-        lower bound is 0, because polishing does not exclude cheaper paths.
-    findings : tuple of Finding
-        `Code.STOPPED` is among them if the work was stopped before its end.
-    """
-
-    branches: tuple[ActivationEnergy, ...]
-    findings: tuple[Finding, ...]
+    branches: tuple[
+        ActivationEnergy, ...
+    ]  # each exit path once for each attractor that it leads to, the cheapest first
+    findings: tuple[Finding, ...]  # `Code.STOPPED` is among them if the work was stopped before its end
 
 
 def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit | None = None) -> Polished:
@@ -46,24 +39,9 @@ def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit |
 
     If it is stopped, by Ctrl-C or by the time limit, the paths found so far are certified and returned.
 
-    Parameters
-    ----------
-    problem : ExitProblem
-    candidates : sequence of Candidate
-    orbit : Orbit, optional
-        The orbit to leave: for an attractor that is not an orbit, an unstable one inside it. An exit from there costs
-        at least as much as leaving the attractor.
-
-    Returns
-    -------
-    Polished
-
-    Raises
-    ------
-    StructureError
-        The attractor is not an orbit and none is given, or the orbit is not hyperbolic.
-    StepperError
-        The stepper cannot integrate Hamilton's equations of this scene.
+    For an attractor that is not an orbit, `orbit` is an unstable one inside it; an exit from there costs at least as
+    much as leaving the attractor. Raises StructureError if none is given, or if the orbit is not hyperbolic, and
+    StepperError if the stepper cannot integrate Hamilton's equations of this scene.
     """
     source = problem.source
     ends, findings = usable_ends(problem)

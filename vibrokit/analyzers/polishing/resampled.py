@@ -22,20 +22,11 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ResampledCandidate:
-    """A candidate at the nodes.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    states : array (nodes, n)
-        A piece apart, the first on the section.
-    after : array (more, n)
-        The noise-free motion from the last node on, that node included.
-    """
+    """A candidate at the nodes."""
 
     candidate: Candidate
-    states: Array
-    after: Array
+    states: Array  # (nodes, n): a piece apart, the first on the section
+    after: Array  # (more, n): the noise-free motion from the last node on, that node included
 
     @cached_property
     def all_states(self) -> Array:
@@ -46,10 +37,7 @@ class ResampledCandidate:
 def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledCandidate:
     """Bring a candidate to the nodes, and follow the noise-free motion from its end.
 
-    Raises
-    ------
-    StructureError
-        The candidate has no duration, or states that are not finite.
+    Raises StructureError if the candidate has no duration, or states that are not finite.
     """
     if not np.isfinite(candidate.states).all():
         raise StructureError("it has states that are not finite.")

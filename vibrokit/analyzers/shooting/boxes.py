@@ -28,20 +28,11 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Boxes:
-    """Boxes that cover the unit cube without overlap; the first coordinate is periodic.
+    """Boxes that cover the unit cube without overlap; the first coordinate is periodic."""
 
-    Attributes
-    ----------
-    centres : array (count, d)
-    splits : int array (count,)
-        Number of times that each was split.
-    first : array (d,)
-        Sides of a box that was never split.
-    """
-
-    centres: Array
-    splits: Whole
-    first: Array
+    centres: Array  # (count, d)
+    splits: Whole  # (count,): number of times that each was split
+    first: Array  # (d,): sides of a box that was never split
 
     @classmethod
     def grid(cls, counts: tuple[int, ...]) -> Boxes:

@@ -29,23 +29,12 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Branch:
-    """One exit path.
+    """One exit path."""
 
-    Attributes
-    ----------
-    index : int
-        Its place among the outcomes.
-    candidate : Candidate
-    curve : tuple of array (count, 2)
-        For each phase, the path's (x, v).
-    middle : tuple of array (count, 2)
-        Those where most of the action accumulates.
-    """
-
-    index: int
+    index: int  # its place among the outcomes
     candidate: Candidate
-    curve: tuple[Array, ...]
-    middle: tuple[Array, ...]
+    curve: tuple[Array, ...]  # for each phase, the path's (x, v) (count, 2)
+    middle: tuple[Array, ...]  # those of them where most of the action accumulates
 
     def same(self, other: Branch) -> bool:
         """Whether this path passes states of the other at the same phases."""

@@ -29,22 +29,12 @@ class Shell:
     In coordinates y = L⁻¹ δq, Σ = L Lᵀ, ellipses are spheres and the linear growth of extremals
     δq ↦ (M + C M⁻ᵀ Σ⁻¹) δq = Σ' M⁻ᵀ Σ⁻¹ δq becomes B⁻ᵀ, with B = L'⁻¹ M L. Since B Bᵀ = 1 − L'⁻¹ C L'⁻ᵀ, every radius
     grows. The preimage of y is Bᵀ y, which needs no inverse.
-
-    Attributes
-    ----------
-    time : float
-        Since the section (s).
-    point : array (n,)
-    root : array (n, n)
-        L.
-    back : array (n, n)
-        Bᵀ.
     """
 
-    time: float
-    point: Array
-    root: Array
-    back: Array
+    time: float  # since the section (s)
+    point: Array  # (n,)
+    root: Array  # (n, n): L
+    back: Array  # (n, n): Bᵀ
 
     def states(self, directions: Array, radius: float, fractions: Array) -> Array:
         """Return (q, p, S) along unit vectors (count, n), at fractions of the log distance between the edges."""
@@ -70,25 +60,13 @@ class FundamentalDomain(Starts):
 
     A place is the direction in spherical coordinates of the whitened plane, then the fraction of the distance from the
     inner to the outer edge, shells one after another.
-
-    Attributes
-    ----------
-    shells : tuple of Shell
-    radius : float
-        Radius of the inner edge in whitened coordinates, where Ψ = ½ radius².
-    relative_radius : float
-        The same, relative to the distance from the attractor to the exit.
-    ratio : float
-        Ratio of the fastest rate at which deviations decay to the slowest.
-    edge_only : bool
-        Whether only the inner edge is used.
     """
 
     shells: tuple[Shell, ...]
-    radius: float
-    relative_radius: float
-    ratio: float
-    edge_only: bool = False
+    radius: float  # radius of the inner edge in whitened coordinates, where Ψ = ½ radius²
+    relative_radius: float  # the same, relative to the distance from the attractor to the exit
+    ratio: float  # ratio of the fastest rate at which deviations decay to the slowest
+    edge_only: bool = False  # whether only the inner edge is used
 
     @property
     def growth(self) -> float:

@@ -30,10 +30,7 @@ def fitted_domain(problem: ExitProblem, stepper: Stepper) -> FundamentalDomain:
     a smaller linear range than its basin: the edge shrinks until paths from all over the domain, one shell later, have
     the action of the quadratic form there to within 2 %.
 
-    Raises
-    ------
-    StructureError
-        No edge down to the relative radius 1e-7 is in the linear range.
+    Raises StructureError if no edge down to the relative radius 1e-7 is in the linear range.
     """
     shells = shells_around(problem, stepper)
     distance = exit_distance(problem, shells[0])

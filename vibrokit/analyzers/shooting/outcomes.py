@@ -30,34 +30,17 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Outcomes:
-    """How some paths ended.
+    """How some paths ended."""
 
-    Attributes
-    ----------
-    begun : array (count, 2n + 1)
-        (q, p, S) at the first section.
-    section : int array (count,)
-        Number of that section, counted from the attractor's first point.
-    states : array (count, 2n + 1)
-        Last (q, p, S).
-    status : int array (count,)
-        Constants of `vibrokit.kernels.stopping`.
-    checks : int array (count,)
-        Exit tests from the first section to the end.
-    targets : int array (count,)
-        Label of the attractor that the exit leads to: that of the exit's cell, or once confirmed the one that was
-        reached; −1 if unknown or not needed.
-    confirmed : bool array (count,)
-        Whether the path certainly exits.
-    """
-
-    begun: Array
-    section: Whole
-    states: Array
-    status: Whole
-    checks: Whole
-    targets: Whole
-    confirmed: NDArray[np.bool_]
+    begun: Array  # (count, 2n + 1): (q, p, S) at the first section
+    section: Whole  # (count,): number of that section, counted from the attractor's first point
+    states: Array  # (count, 2n + 1): last (q, p, S)
+    status: Whole  # (count,): constants of `vibrokit.kernels.stopping`
+    checks: Whole  # (count,): exit tests from the first section to the end
+    targets: (
+        Whole  # (count,): attractor of the exit's cell, or once confirmed the one reached; −1: unknown or not needed
+    )
+    confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
 
     @property
     def actions(self) -> Array:
@@ -78,19 +61,11 @@ class Outcomes:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Shooter:
-    """Integrates paths away from one attractor.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    stepper : Stepper
-    budget : int
-        Maximum number of section intervals of a path.
-    """
+    """Integrates paths away from one attractor."""
 
     problem: ExitProblem
     stepper: Stepper
-    budget: int
+    budget: int  # maximum number of section intervals of a path
 
     def shoot(self, starts: Array, times: Array) -> Outcomes:
         """Integrate starts (count, 2n + 1) at some times (s) to their exits; exits from a basin are not confirmed."""

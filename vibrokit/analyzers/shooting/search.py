@@ -22,25 +22,13 @@ _TRIED = 64  # local minima, the cheapest, that are compared as paths
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Search:
-    """What was found about one attractor.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    findings : tuple of Finding
-    shots : Shots or None
-        None if the attractor already satisfies the exit condition.
-    branches : tuple of Branch
-        Distinct exit paths, the cheapest first.
-    complete : bool
-        False if the work was stopped before its end.
-    """
+    """What was found about one attractor."""
 
     problem: ExitProblem
     findings: tuple[Finding, ...]
-    shots: Shots | None = None
-    branches: tuple[Branch, ...] = ()
-    complete: bool = True
+    shots: Shots | None = None  # none if the attractor already satisfies the exit condition
+    branches: tuple[Branch, ...] = ()  # distinct exit paths, the cheapest first
+    complete: bool = True  # False if the work was stopped before its end
 
     @classmethod
     def at_exit(cls, problem: ExitProblem) -> Search:

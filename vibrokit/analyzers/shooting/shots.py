@@ -37,24 +37,13 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Shots:
-    """Paths from one attractor.
-
-    Attributes
-    ----------
-    starts : Starts
-    shooter : Shooter
-    boxes : Boxes
-        Around each start.
-    outcomes : Outcomes
-    history : tuple of array
-        Least confirmed actions by target, after the first grid and after each round.
-    """
+    """Paths from one attractor."""
 
     starts: Starts
     shooter: Shooter
-    boxes: Boxes
+    boxes: Boxes  # around each start
     outcomes: Outcomes
-    history: tuple[Array, ...]
+    history: tuple[Array, ...]  # least confirmed actions by target, after the first grid and after each round
 
     @classmethod
     def over(cls, starts: Starts, shooter: Shooter, boxes: Boxes) -> Self:

@@ -59,21 +59,13 @@ class Starts(ABC):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Ring(Starts):
-    """A circle around the attractor's point on the section.
-
-    Attributes
-    ----------
-    point : array (n,)
-    potential : LocalPotential
-    radius : float
-        In m and m s⁻¹ alike.
-    """
+    """A circle around the attractor's point on the section."""
 
     method: ClassVar[str] = "action plot (ring)"
 
-    point: Array
+    point: Array  # (n,)
     potential: LocalPotential
-    radius: float
+    radius: float  # in m and m s⁻¹ alike
 
     @classmethod
     def around(cls, problem: ExitProblem, stepper: Stepper, radius: float) -> Self:
