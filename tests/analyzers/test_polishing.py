@@ -14,11 +14,11 @@ from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.certify import certify
+from vibrokit.analyzers.polishing.ending import resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
 from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
 from vibrokit.analyzers.polishing.polish import polish
-from vibrokit.analyzers.polishing.resampled import resampled
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import single_stepper

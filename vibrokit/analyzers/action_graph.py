@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.action_graph import ActionGraphResult
-from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 
 
@@ -29,10 +29,7 @@ class ActionGraph(GraphSearch, Analyzer):
         If the work is stopped after a first solution, that is returned, marked incomplete.
         """
         if problem.at_exit:
-            zero = ActivationEnergy(
-                problem.source, -1, 0.0, 0.0, 0.0, METHOD, Bound.ESTIMATE, numerical_error=0.0
-            )  # fmt: skip
-            return Analysis((zero,), findings=(Finding.of(Code.AT_EXIT, problem.source),))
+            return at_exit(problem, METHOD, Bound.ESTIMATE)
         found: GraphSolution | None = None
         stopped: tuple[Finding, ...] = ()
         try:

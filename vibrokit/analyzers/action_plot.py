@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.branches import FINDER
 from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.results.action_plot import ActionPlotResult
+from vibrokit.results.energy import Bound
 from vibrokit.results.result import Result
 
 
@@ -25,10 +27,12 @@ class ActionPlot(Shooting, Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Search the exit paths from one attractor."""
+        if problem.at_exit:
+            return at_exit(problem, FINDER, Bound.UPPER)
         found = self.search(problem)
         try:
             estimates = found.estimates
         except KeyboardInterrupt as interrupt:  # the paths are known; only their errors are not
             found = found.stopped(interrupt)
             estimates = found.estimates
-        return Analysis(estimates, found.dataset(), found.findings, found.energies, found.complete)
+        return Analysis(estimates, found.shots.dataset(), found.findings, found.energies, found.complete)

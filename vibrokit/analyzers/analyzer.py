@@ -17,7 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import NOT_FOLLOWED
-from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding, check_findings
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
@@ -53,6 +53,15 @@ class Analysis:
 
     def __post_init__(self) -> None:
         check_findings(self.findings)
+
+
+def at_exit(problem: ExitProblem, method: str, bound: Bound) -> Analysis:
+    """Return the analysis of an attractor that satisfies the exit condition without noise: its energy is 0."""
+    end = problem.path_ends[0]
+    zero = ActivationEnergy(
+        problem.source, end.targets[0], 0.0, 0.0, 0.0, method, bound, numerical_error=0.0, saddle=end.saddle
+    )
+    return Analysis((zero,), findings=(Finding.of(Code.AT_EXIT, problem.source),))
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,))

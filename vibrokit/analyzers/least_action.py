@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import xarray
 
 from vibrokit.analyzers.agreement import combined
-from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths.candidate import Candidate
@@ -16,6 +16,7 @@ from vibrokit.analyzers.polishing.polish import METHOD, polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError, shown
+from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.least_action import LeastActionResult
@@ -82,7 +83,7 @@ class LeastAction(Analyzer):
             The only search cannot be used for this attractor.
         """
         if problem.at_exit:
-            return Analysis((_at_exit(problem),), findings=(Finding.of(Code.AT_EXIT, problem.source),))
+            return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
         for doing, step in (("graph", work.search_graph), ("action plot", work.shoot), ("polishing", work.polish)):
             try:
@@ -176,19 +177,13 @@ class _Work:
             self.findings.append(Finding.of(Code.GRAPH_ONLY_SOURCE, problem.source, kind=attractor.kind))
             return ()
         stepper = problem.single_stepper(Flow.STATE_VARIATIONAL)
-        found = orbits_inside(problem.scene, attractor, stepper, self.analyzer.orbits)
+        with stage("orbits inside the attractor"):
+            found = orbits_inside(problem.scene, attractor, stepper, self.analyzer.orbits)
         periods = [orbit.period for orbit in found]
         self.findings.append(
             Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods)
         )  # fmt: skip
         return found
-
-
-def _at_exit(problem: ExitProblem) -> ActivationEnergy:
-    end = problem.path_ends[0]
-    return ActivationEnergy(
-        problem.source, end.targets[0], 0.0, 0.0, 0.0, METHOD, Bound.CERTIFIED, numerical_error=0.0, saddle=end.saddle
-    )
 
 
 def _once(branches: list[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:

@@ -7,10 +7,9 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.exits import Exit, LeaveBasin
-from vibrokit.analyzers.graph.face_target import FaceTarget
 from vibrokit.analyzers.graph.path_ends import exit_targets, targets_at
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.graph.targets import StateTarget
+from vibrokit.analyzers.graph.targets import FaceTarget, StateTarget
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

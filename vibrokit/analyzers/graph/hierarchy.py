@@ -45,29 +45,13 @@ class TargetEstimate:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class CoarseGrids:
-    """The potential on half as many nodes along each side."""
-
-    whole: SolvedGrid  # on all that the region covers
-    coarse: SolvedGrid  # on what can be reached for little more than the costliest exit
-    long: SolvedGrid  # the same with steps twice as long
-
-    def linearization_error(self, targets: Sequence[ExitTarget]) -> float:
-        """Largest relative change of an exit's cost by linearization over a step."""
-        return max((path.linearization_error for t in targets for path in self.coarse.paths(t)), default=0.0)
-
-    def excess(self, targets: Sequence[ExitTarget]) -> float:
-        """Largest relative difference between V at a target and the action of the path that V leads along."""
-        found = [(self.coarse.arrival(t).value, self.coarse.paths(t)) for t in targets]
-        return max((abs(value / paths[0].candidate.action - 1) for value, paths in found if paths), default=0.0)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
 class GridHierarchy:
-    """The potential on the nodes that were asked for, and on fewer."""
+    """The potential on the nodes that were asked for, and on half as many along each side."""
 
     fine: SolvedGrid
-    coarser: CoarseGrids
+    whole: SolvedGrid  # half as many nodes on all that the region covers
+    coarse: SolvedGrid  # half as many nodes on what can be reached for little more than the costliest exit
+    long: SolvedGrid  # the same with steps twice as long
 
     def estimate(self, target: ExitTarget) -> TargetEstimate:
         """Return what an exit target costs.
@@ -76,10 +60,8 @@ class GridHierarchy:
         no path was traced, half the change by doubling the step), and that of the target's own place.
         """
         arrival = self.fine.arrival(target)
-        fine, coarse, long = (
-            grid.arrival(target).value for grid in (self.fine, self.coarser.coarse, self.coarser.long)
-        )
-        reached = (self.fine, self.coarser.coarse) if np.isfinite(fine) else (self.coarser.whole,)
+        fine, coarse, long = (grid.arrival(target).value for grid in (self.fine, self.coarse, self.long))
+        reached = (self.fine, self.coarse) if np.isfinite(fine) else (self.whole,)
         paths = distinct(path for grid in reached for path in grid.paths(target))
         if np.isfinite([fine, coarse, long]).all():
             by_step = (
@@ -87,7 +69,7 @@ class GridHierarchy:
             )
             value, error = fine, abs(fine - coarse) + by_step + arrival.error
         else:
-            value = error = self.coarser.whole.arrival(target).value
+            value = error = self.whole.arrival(target).value
         return TargetEstimate(value, error, tuple(path.candidate for path in paths))
 
 
@@ -116,19 +98,20 @@ class HierarchySearch:
         of interpolation.
         """
         first, *shorter = self.steps_per_period
-        coarser = self._coarser(first, targets)
+        whole, coarse = self._coarser(first, targets)
         for count in shorter:
-            if coarser.linearization_error(targets) <= _STEP_TOLERANCE:
+            if coarse.linearization_error(targets) <= _STEP_TOLERANCE:
                 break
             tried = self._coarser(count, targets)
-            if tried.excess(targets) > max(coarser.excess(targets), _STEP_TOLERANCE):
+            if tried[1].excess(targets) > max(coarse.excess(targets), _STEP_TOLERANCE):
                 break
-            coarser = tried
-        grids = coarser.coarse.potential.grids.with_shape(self.shape)
-        fine = self._solved(grids, _ROOM * coarser.coarse.highest(targets), targets)
-        return GridHierarchy(fine, coarser)
+            whole, coarse = tried
+        grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
+        long = self._solved(grids.with_double_step(), ceiling, targets)
+        fine = self._solved(grids.with_shape(self.shape), ceiling, targets)
+        return GridHierarchy(fine, whole, coarse, long)
 
-    def _coarser(self, steps: int, targets: Sequence[ExitTarget]) -> CoarseGrids:
+    def _coarser(self, steps: int, targets: Sequence[ExitTarget]) -> tuple[SolvedGrid, SolvedGrid]:
         """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit."""
         grids = self._covering(steps)
         whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
@@ -146,8 +129,7 @@ class HierarchySearch:
                 break
             grids = zoomed
             coarse = self._solved(grids, ceiling, targets)
-        long = self._solved(grids.with_double_step(), _ROOM * coarse.highest(targets), targets)
-        return CoarseGrids(whole, coarse, long)
+        return whole, coarse
 
     def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it."""

@@ -7,9 +7,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.graph.face_target import FaceTarget
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.graph.targets import ExitTarget, StateTarget
+from vibrokit.analyzers.graph.targets import ExitTarget, FaceTarget, StateTarget
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

@@ -15,6 +15,7 @@ from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
+from vibrokit.progress import stage
 from vibrokit.structure.validation import pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -105,9 +106,10 @@ class GraphSearch:
                 "the structure on a wider region."
             )
         steps = self._affordable_steps(problem.scene)
-        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-        search = HierarchySearch(problem, model, self.nodes, steps)
-        yield from solutions(problem, search, exit_targets(problem, model))
+        with stage("exit targets", subject=attractor.name):
+            model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+            targets = exit_targets(problem, model)
+        yield from solutions(problem, HierarchySearch(problem, model, self.nodes, steps), targets)
 
     def _affordable_steps(self, scene: Oscillator) -> tuple[int, ...]:
         """Numbers of steps to try that there is memory for."""

@@ -28,9 +28,7 @@ class GraphSolution:
 
     source: int  # label of the attractor
     energies: tuple[ActivationEnergy, ...]  # of each place where paths may end, the cheapest first
-    candidates: tuple[
-        Candidate, ...
-    ]  # distinct paths to them, in the same order; their last states lie beyond the exit
+    candidates: tuple[Candidate, ...]  # distinct paths to these places, in the same order, that end beyond the exit
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
 

@@ -6,11 +6,19 @@ import dataclasses
 from abc import ABC, abstractmethod
 
 import numpy as np
+import scipy.optimize
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.graph.potential import Potential
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.kernels.sweeps import descend_all
 
 _BEYOND = (1.5, 3.0)  # nodes from a saddle to where paths over it are traced back from
+_PARTS = 8  # of a step, at whose ends the face is evaluated before the minimum is refined
+_PER_NODE = 2  # states on the face for each node along it
+_ITERATIONS = 60  # of the refinement, which takes some 40 of them to its tolerance
+_TOLERANCE = 1e-3  # of the refinement, in units of the distances above: the cost is quadratic there
+_SHORTEST = 0.01  # of a step: the covariance of a shorter one is close to singular
 
 Array = NDArray[np.float64]
 
@@ -79,3 +87,66 @@ class StateTarget(ExitTarget):
         values = potential.at(0, self.states[0] + _BEYOND[0] * sides)
         side = sides[int(np.nanargmax(values))] if np.isfinite(values).any() else step
         return tuple(TraceStart(self.states[0] + beyond * side) for beyond in _BEYOND)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FaceTarget(ExitTarget):
+    """The states with one coordinate at a given level.
+
+    A path may reach the face between two phases and between two nodes: V is advanced from each phase by parts of a
+    step, to states on the face.
+    """
+
+    model: StepModel
+    axis: int  # 0 for a level of x, 1 for a level of v
+    level: float
+
+    def evaluate(self, potential: Potential) -> Arrival:
+        """The cheapest state over all times; paths are traced back from the phase before."""
+        grids, free = potential.grids, 1 - self.axis
+        best = (np.inf, 0, grids.step, 0.0)
+        for phase in range(grids.phases):
+            low, high = grids.boxes[phase, free]
+            along = np.linspace(low, high, _PER_NODE * grids.shape[free])
+            for part in range(1, _PARTS + 1):
+                duration = grids.step * part / _PARTS
+                costs, _ = self._costs(potential, phase, duration, along)
+                index = int(np.argmin(costs))
+                if costs[index] < best[0]:
+                    best = (float(costs[index]), phase, duration, float(along[index]))
+        if not np.isfinite(best[0]):
+            return Arrival(np.inf)
+        value, phase, duration, place = self._refined(potential, *best[1:])
+        _, predecessors = self._costs(potential, phase, duration, np.array([place]))
+        start = grids.states(phase, predecessors[0])
+        return Arrival(value, 0.0, (TraceStart(start, phase, self._on_face(np.array([place]))),))
+
+    def _refined(
+        self, potential: Potential, phase: int, duration: float, place: float
+    ) -> tuple[float, int, float, float]:
+        """The least cost near a state on the face, with its phase, duration and place."""
+        grids = potential.grids
+        middle = np.array([duration, place])
+        apart = np.array([grids.step / _PARTS, grids.spacing(phase)[1 - self.axis] / _PER_NODE])
+
+        def cost(shifts: Array) -> float:
+            when, where = middle + shifts * apart
+            if not _SHORTEST * grids.step <= when <= grids.step:
+                return np.inf
+            return float(self._costs(potential, phase, when, np.array([where]))[0][0])
+
+        simplex = np.array([(0.0, 0.0), (-0.5, 0.5), (0.5, 0.5)])
+        options = {"initial_simplex": simplex, "maxiter": _ITERATIONS, "xatol": _TOLERANCE, "fatol": 0.0}
+        found = scipy.optimize.minimize(cost, simplex[0], method="Nelder-Mead", options=options)
+        duration, place = middle + found.x * apart
+        return float(found.fun), phase, float(duration), float(place)
+
+    def _costs(self, potential: Potential, phase: int, duration: float, along: Array) -> tuple[Array, Array]:
+        """Costs of being at places along the face some time after a phase, and the predecessors at that phase."""
+        costs = self.model.into(self._on_face(along), potential.grids, phase, duration)
+        tries = np.stack([costs.centres, costs.uphill], axis=1)
+        return descend_all(potential.values[phase], tries, costs.centres, costs.roots, 1.0)
+
+    def _on_face(self, along: Array) -> Array:
+        level = np.full(len(along), self.level)
+        return np.column_stack([level, along] if self.axis == 0 else [along, level])

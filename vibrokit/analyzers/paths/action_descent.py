@@ -71,7 +71,7 @@ class _Descent:
     ) -> None:
         n = propagator.size
         self.propagator, self.first, self.last, self.n = propagator, first, last, n
-        self.held = np.full(n, closing is None) if free is None else ~free
+        self.held = np.full(n, closing is None) if free is None or closing is not None else ~free
         self.target, self.form = (np.zeros(n), np.zeros((n, n))) if closing is None else closing
 
     def evaluate(self, states: Array, momenta: Array) -> _Evaluation | None:

@@ -81,7 +81,3 @@ class SegmentPropagator:
     def onward(self, state: Array, phase: int, count: int) -> Array:
         """Return the noise-free motion from one state at `count` + 1 nodes, the first included."""
         return record(self.osc, Flow.STATE, self.stepper, state, phase % self.pieces * self.piece, self.piece, count)
-
-    def with_stepper(self, stepper: Stepper) -> SegmentPropagator:
-        """Return the same with another stepper."""
-        return dataclasses.replace(self, stepper=stepper)

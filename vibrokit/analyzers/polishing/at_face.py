@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import AtFace
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Cut, Ending
-from vibrokit.analyzers.polishing.resampled import ResampledCandidate
+from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
 from vibrokit.results.energy import ExitPath
 
 _ROUNDING = 1e-9  # of a path's extent: samples this far beyond the face still count as inside

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.action_descent import Closing
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Cut, Ending
+from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, linearized_orbit, normals_of
-from vibrokit.analyzers.polishing.resampled import ResampledCandidate
 
 _SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
 _MOST_ADDED = 40  # section intervals

@@ -12,15 +12,14 @@ import numpy as np
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.dense import dense_path
-from vibrokit.analyzers.polishing.ending import Ending
+from vibrokit.analyzers.polishing.ending import Ending, ResampledCandidate, resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath
 from vibrokit.analyzers.polishing.path_solver import PathSolver
-from vibrokit.analyzers.polishing.resampled import ResampledCandidate, resampled
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.kernels.single import record
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.finding import Code, Finding
 from vibrokit.symbolic.flow_kind import Flow
@@ -33,6 +32,7 @@ _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
+_SAMPLES = 128  # in a section interval: enough for pictures, and for quadrature to about 1e-6
 _SAME = 0.05  # of a path's extent: distance between two paths that are one, one of them at its samples
 
 
@@ -144,7 +144,7 @@ class CandidatePolisher:
             found = solver.solve(ending.cuts(self._resampled(candidate, pieces)), worth)
             if not found.action > 0:
                 raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
-            path = dense_path(solver.propagator, found)
+            path = _dense_path(solver.propagator, found)
             if any(self._ending(other, pieces).crossing(path) is not None for other in self.ends if other is not end):
                 raise StructureError("the path leaves by another face before its end.")
             left = ending.crossing(path)
@@ -152,3 +152,21 @@ class CandidatePolisher:
                 return Solved(end, solver.propagator, found, path)
             candidate = dataclasses.replace(candidate, times=path.t[: left + 1], states=path.q[: left + 1])
         raise StructureError(f"after {_ROUNDS} cuts where it has already left, the path still leaves before its end.")
+
+
+def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:
+    """Record a path piece by piece, each from its own node; the time is 0 at the start, which is on the section."""
+    each, n, piece = _SAMPLES // propagator.pieces, propagator.size, propagator.piece
+    lengths = np.append(np.full(len(found.points) - 2, piece), found.last)
+    actions = found.head + np.concatenate([[0.0], np.cumsum(found.actions)])
+    parts, times = [], []
+    for node, length in enumerate(lengths):
+        start = (found.first + node) % propagator.pieces * piece
+        begin = np.append(found.points[node], actions[node])
+        part = record(propagator.osc, Flow.HAMILTONIAN, propagator.stepper, begin, start, length / each, each)
+        parts.append(part[:-1])
+        times.append(node * piece + length / each * np.arange(len(part) - 1))
+    z = np.vstack([*parts, np.append(found.points[-1], actions[-1])])
+    t = np.concatenate([*times, [float(np.sum(lengths))]])
+    section = np.arange(0, len(z) - (found.last != piece), _SAMPLES)
+    return ExitPath(t, z[:, :n], z[:, n : 2 * n], z[:, -1], section)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
@@ -48,7 +50,7 @@ def _dropped(found: ExtremalPath) -> int:
 
 
 def _tightened(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
-    finer, orbit = propagator.with_stepper(propagator.stepper.refined()), found.source
+    finer, orbit = dataclasses.replace(propagator, stepper=propagator.stepper.refined()), found.source
     source = linearized_orbit(finer, orbit.states[0], len(orbit.states) // finer.pieces)
     if orbit.start_on_orbit:
         source = source.with_start_on_orbit()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, PathEnd
@@ -33,25 +31,12 @@ def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
     return usable, findings
 
 
-@functools.singledispatch
 def obstacle(end: PathEnd, problem: ExitProblem) -> str:
     """Return what an end is if no path can be polished to it, as to a basin; empty if one can."""
-    return "of a kind without conditions"
-
-
-@functools.singledispatch
-def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
-    """Prepare the conditions of an end; raises StructureError if it is a saddle that is not hyperbolic."""
-    raise NotImplementedError(f"no path is polished to ends of the kind {type(end).__name__}.")
-
-
-@obstacle.register
-def _(end: AtFace, problem: ExitProblem) -> str:
-    return ""
-
-
-@obstacle.register
-def _(end: AtSaddle, problem: ExitProblem) -> str:
+    if isinstance(end, AtFace):
+        return ""
+    if not isinstance(end, AtSaddle):
+        return "of a kind without conditions"
     saddle = problem.structure.saddles[end.number]
     if saddle.kind == "chaotic":
         return "chaotic"
@@ -59,12 +44,9 @@ def _(end: AtSaddle, problem: ExitProblem) -> str:
     return "a limit cycle" if saddle.period == 1 and saddle.duration > 0 and neutral else ""
 
 
-@ending_at.register
-def _(end: AtSaddle, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
-    saddle = problem.structure.saddles[end.number]
+def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
+    """Prepare the conditions of an end; raises StructureError if it is a saddle that is not hyperbolic."""
+    if isinstance(end, AtFace):
+        return FaceEnding(propagator, end)
+    saddle = problem.structure.saddles[end.saddle]
     return SaddleEnding(propagator, linearized_orbit(propagator, saddle.points[0], max(1, saddle.period)))
-
-
-@ending_at.register
-def _(end: AtFace, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
-    return FaceEnding(propagator, end)

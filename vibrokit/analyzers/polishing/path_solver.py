@@ -73,9 +73,8 @@ class PathSolver:
 
     def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
         ending = cut.ending
-        free = ending.free if ending.closing is None else None
         points, _ = descend_action(
-            self.propagator, first, points, last=cut.last, free=free, closing=ending.closing
+            self.propagator, first, points, last=cut.last, free=ending.free, closing=ending.closing
         )  # fmt: skip
         return extremal_path(self.propagator, source, first, ending, points, cut.last)
 

@@ -28,9 +28,7 @@ _ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
 class Polished:
     """What the candidates of one attractor led to."""
 
-    branches: tuple[
-        ActivationEnergy, ...
-    ]  # each exit path once for each attractor that it leads to, the cheapest first
+    branches: tuple[ActivationEnergy, ...]  # each path once for each attractor that it leads to, the cheapest first
     findings: tuple[Finding, ...]  # `Code.STOPPED` is among them if the work was stopped before its end
 
 
@@ -44,8 +42,9 @@ def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit |
     StepperError if the stepper cannot integrate Hamilton's equations of this scene.
     """
     source = problem.source
-    ends, findings = usable_ends(problem)
-    polisher = CandidatePolisher(problem, ends, *_start(problem, orbit))
+    with stage("ends of exit paths", subject=problem.attractor.name):
+        ends, findings = usable_ends(problem)
+        polisher = CandidatePolisher(problem, ends, *_start(problem, orbit))
     ranked = sorted(candidates, key=lambda each: each.action)
     branches: list[ActivationEnergy] = []
     try:

@@ -37,9 +37,7 @@ class Outcomes:
     states: Array  # (count, 2n + 1): last (q, p, S)
     status: Whole  # (count,): constants of `vibrokit.kernels.stopping`
     checks: Whole  # (count,): exit tests from the first section to the end
-    targets: (
-        Whole  # (count,): attractor of the exit's cell, or once confirmed the one reached; −1: unknown or not needed
-    )
+    targets: Whole  # (count,): attractor of the exit's cell, or once confirmed the one reached; −1 if unknown
     confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
 
     @property

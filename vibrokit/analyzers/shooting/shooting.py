@@ -12,7 +12,7 @@ import numpy as np
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.boxes import Boxes
 from vibrokit.analyzers.shooting.branches import FINDER
-from vibrokit.analyzers.shooting.linear_range import fitted_domain
+from vibrokit.analyzers.shooting.domain import fitted_domain
 from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget
 from vibrokit.analyzers.shooting.search import Search
 from vibrokit.analyzers.shooting.shots import Shots
@@ -80,14 +80,13 @@ class Shooting:
         StructureError
             The attractor is neither a periodic orbit nor an equilibrium, or is not hyperbolic.
         """
-        if problem.at_exit:
-            return Search.at_exit(problem)
         if not problem.attractor.is_fixed:
             raise StructureError(
                 f"it is {problem.attractor.kind}; the action plot needs a periodic orbit or an equilibrium."
             )
-        stepper = problem.ensemble_stepper(Flow.HAMILTONIAN)
-        starts = self._starts(problem, stepper)
+        with stage("starts of exit paths", subject=problem.attractor.name):
+            stepper = problem.ensemble_stepper(Flow.HAMILTONIAN)
+            starts = self._starts(problem, stepper)
         slowest = float(np.abs(problem.attractor.multipliers).max())
         budget = self.budget or default_budget(slowest, problem.attractor.period, starts.growth)
         rounds = 0 if self.radius is not None else self.rounds
@@ -99,7 +98,7 @@ class Shooting:
                     shots = refined
             except KeyboardInterrupt as stopped:
                 interrupt = stopped
-        found = Search.of(shots)
+            found = Search.of(shots)
         return found if interrupt is None else found.stopped(interrupt)
 
     def _starts(self, problem: ExitProblem, stepper: Stepper) -> Starts:
