@@ -223,9 +223,7 @@ def test_derivatives_of_momenta_are_refused_at_grazing_too():
 def test_fixed_steps_refuse_momenta_that_jump():
     osc = scene()
     for flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
-        with pytest.raises(
-            StepperError, match=r"jumps at first touch, the momenta jump too; take FreeFlight or Order8"
-        ):
+        with pytest.raises(StepperError, match="momenta jump too"):
             kernel_for(osc, flow, vk.RK4())
         assert isinstance(ensemble_stepper(osc, flow), vk.FreeFlight)
 
