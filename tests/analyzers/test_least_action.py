@@ -71,6 +71,15 @@ def test_the_result_has_the_graph_s_potential_and_the_work_done(structure):
     assert {"graph", "action plot", "polishing", "certifying"} <= set(result.stats.seconds)
 
 
+def test_all_work_belongs_to_a_named_stage(structure):
+    seconds = dict(vk.LeastAction(source=0, **SMALL).run(OSC, structure).stats.seconds)
+    rest = seconds.pop("LeastAction")
+    assert set(seconds) - {"compiling"} == {
+        "exit targets", "graph", "starts of exit paths", "action plot", "ends of exit paths", "polishing", "certifying"
+    }  # fmt: skip
+    assert rest < 0.05 * sum(seconds.values())
+
+
 class LeaveLeft(LeaveRegion):
     """Being to the right of x = −0.5; the left well is to the left of it."""
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.shooting.branches import FINDER
+from vibrokit.analyzers.shooting.search import FINDER
 from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.results.action_plot import ActionPlotResult
 from vibrokit.results.energy import Bound

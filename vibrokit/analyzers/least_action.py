@@ -9,8 +9,7 @@ import xarray
 
 from vibrokit.analyzers.agreement import combined
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
-from vibrokit.analyzers.graph.search import GraphSearch
-from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.polish import METHOD, polish
 from vibrokit.analyzers.problem import ExitProblem

@@ -5,8 +5,7 @@ import pytest
 
 from tests.analyzers.graph import linear
 from vibrokit.analyzers.graph.grids import Grids
-from vibrokit.analyzers.graph.potential import quasi_potential
-from vibrokit.analyzers.graph.seeds import seeds
+from vibrokit.analyzers.graph.potential import quasi_potential, seeds
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.tracing import backtrack
 from vibrokit.kernels.rk4 import RK4

@@ -11,10 +11,9 @@ import numpy as np
 
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.boxes import Boxes
-from vibrokit.analyzers.shooting.branches import FINDER
 from vibrokit.analyzers.shooting.domain import fitted_domain
 from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget
-from vibrokit.analyzers.shooting.search import Search
+from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.analyzers.shooting.starts import Ring, Starts
 from vibrokit.errors import StructureError, shown
