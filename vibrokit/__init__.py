@@ -3,17 +3,114 @@
 The public names below are loaded on first use, so that importing vibrokit is fast.
 """
 
-import ast
 from importlib import import_module
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibrokit.analyzers.action_graph import ActionGraph as ActionGraph
+    from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
+    from vibrokit.analyzers.analyzer import Analysis as Analysis
+    from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.exits import Exit as Exit
+    from vibrokit.analyzers.exits import FirstContact as FirstContact
+    from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
+    from vibrokit.analyzers.exits import LeaveRegion as LeaveRegion
+    from vibrokit.analyzers.graph.search import GraphSearch as GraphSearch
+    from vibrokit.analyzers.least_action import LeastAction as LeastAction
+    from vibrokit.analyzers.problem import ExitProblem as ExitProblem
+    from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
+    from vibrokit.comparison.transitions import Transitions as Transitions
+    from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
+    from vibrokit.kernels.order8 import Order8 as Order8
+    from vibrokit.kernels.rk4 import RK4 as RK4
+    from vibrokit.oscillator import Oscillator as Oscillator
+    from vibrokit.parts.barrier import Barrier as Barrier
+    from vibrokit.parts.contact.contact_law import ContactLaw as ContactLaw
+    from vibrokit.parts.contact.custom import CustomLaw as CustomLaw
+    from vibrokit.parts.contact.hertz import Hertz as Hertz
+    from vibrokit.parts.contact.linear import Linear as Linear
+    from vibrokit.parts.excitation.constant import Constant as Constant
+    from vibrokit.parts.excitation.excitation import Excitation as Excitation
+    from vibrokit.parts.excitation.harmonic import Harmonic as Harmonic
+    from vibrokit.parts.noise.noise_model import NoiseModel as NoiseModel
+    from vibrokit.parts.noise.state_dependent import StateDependentNoise as StateDependentNoise
+    from vibrokit.parts.noise.white import WhiteNoise as WhiteNoise
+    from vibrokit.parts.parameter import parameter as parameter
+    from vibrokit.parts.spring.cubic import CubicSpring as CubicSpring
+    from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
+    from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
+    from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
+    from vibrokit.results.energy import Bound as Bound
+    from vibrokit.results.files import load_result as load_result
+    from vibrokit.results.finding import Code as Code
+    from vibrokit.results.finding import Finding as Finding
+    from vibrokit.results.finding import Severity as Severity
+    from vibrokit.results.record import Record as Record
+    from vibrokit.results.result import Result as Result
+    from vibrokit.results.structure import Structure as Structure
+    from vibrokit.scene_file import bundled_scenes as bundled_scenes
+    from vibrokit.scene_file import load_scene as load_scene
+    from vibrokit.scene_file import save_scene as save_scene
+    from vibrokit.structure.continuation import continuation as continuation
+    from vibrokit.structure.find import find_structure as find_structure
+    from vibrokit.structure.shocks import shape_stability as shape_stability
+    from vibrokit.structure.unstable_orbits import unstable_orbits as unstable_orbits
 
 __version__ = "0.1.0"
 
-# The module of each public name, as the stub beside this file imports it for type checkers.
-_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-_IMPORTS = [node for node in _STUB.body if isinstance(node, ast.ImportFrom) and node.module != "typing"]
-_MODULES = {alias.name: str(node.module) for node in _IMPORTS for alias in node.names}
+# The same imports again, for use at run time; tests/test_import.py checks that the two lists agree.
+_MODULES = {
+    "ActionGraph": "vibrokit.analyzers.action_graph",
+    "ActionPlot": "vibrokit.analyzers.action_plot",
+    "Analysis": "vibrokit.analyzers.analyzer",
+    "Analyzer": "vibrokit.analyzers.analyzer",
+    "Exit": "vibrokit.analyzers.exits",
+    "FirstContact": "vibrokit.analyzers.exits",
+    "LeaveBasin": "vibrokit.analyzers.exits",
+    "LeaveRegion": "vibrokit.analyzers.exits",
+    "GraphSearch": "vibrokit.analyzers.graph.search",
+    "LeastAction": "vibrokit.analyzers.least_action",
+    "ExitProblem": "vibrokit.analyzers.problem",
+    "Shooting": "vibrokit.analyzers.shooting.shooting",
+    "Transitions": "vibrokit.comparison.transitions",
+    "FreeFlight": "vibrokit.kernels.free_flight",
+    "Order8": "vibrokit.kernels.order8",
+    "RK4": "vibrokit.kernels.rk4",
+    "Oscillator": "vibrokit.oscillator",
+    "Barrier": "vibrokit.parts.barrier",
+    "ContactLaw": "vibrokit.parts.contact.contact_law",
+    "CustomLaw": "vibrokit.parts.contact.custom",
+    "Hertz": "vibrokit.parts.contact.hertz",
+    "Linear": "vibrokit.parts.contact.linear",
+    "Constant": "vibrokit.parts.excitation.constant",
+    "Excitation": "vibrokit.parts.excitation.excitation",
+    "Harmonic": "vibrokit.parts.excitation.harmonic",
+    "NoiseModel": "vibrokit.parts.noise.noise_model",
+    "StateDependentNoise": "vibrokit.parts.noise.state_dependent",
+    "WhiteNoise": "vibrokit.parts.noise.white",
+    "parameter": "vibrokit.parts.parameter",
+    "CubicSpring": "vibrokit.parts.spring.cubic",
+    "CustomSpring": "vibrokit.parts.spring.custom",
+    "LinearSpring": "vibrokit.parts.spring.linear",
+    "Spring": "vibrokit.parts.spring.spring",
+    "ActivationEnergy": "vibrokit.results.energy",
+    "Bound": "vibrokit.results.energy",
+    "load_result": "vibrokit.results.files",
+    "Code": "vibrokit.results.finding",
+    "Finding": "vibrokit.results.finding",
+    "Severity": "vibrokit.results.finding",
+    "Record": "vibrokit.results.record",
+    "Result": "vibrokit.results.result",
+    "Structure": "vibrokit.results.structure",
+    "bundled_scenes": "vibrokit.scene_file",
+    "load_scene": "vibrokit.scene_file",
+    "save_scene": "vibrokit.scene_file",
+    "continuation": "vibrokit.structure.continuation",
+    "find_structure": "vibrokit.structure.find",
+    "shape_stability": "vibrokit.structure.shocks",
+    "unstable_orbits": "vibrokit.structure.unstable_orbits",
+}
 
 __all__ = list(_MODULES)
 
