@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.labels import label_of
+from vibrokit.results.labels import source_among
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
@@ -69,10 +69,7 @@ class ActionPlotResult(Result):
         starts = self._starts()
         if not starts:
             raise StructureError("the result has no starts; see its status.")
-        label = min(starts) if source is None else label_of(source, self.names)
-        if label not in starts:
-            have = ", ".join(self.names[other] for other in starts)
-            raise StructureError(f"the result has no starts from {self.names[label]}; it has those from {have}.")
+        label = source_among(starts, source, self.names, "starts", "from")
         return action_map(*starts[label], name=self.names[label], ax=ax)
 
     def _starts(self) -> dict[int, Starts]:

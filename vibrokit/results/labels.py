@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -30,3 +30,16 @@ def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:
         known = ", ".join(f"{label} ({name})" for label, name in enumerate(names))
         raise StructureError(f"there is no {what} {shown(which)}; there are {known}.")
     return int(which)
+
+
+def source_among(known: Collection[int], which: Any, names: Sequence[str], what: str, of: str) -> int:
+    """Return the label of an attractor of which something is known; by default the first one.
+
+    `what` and `of` name the thing, such as ``"starts"`` and ``"from"``. Raises StructureError if it is not
+    known of this attractor.
+    """
+    label = min(known) if which is None else label_of(which, names)
+    if label not in known:
+        have = ", ".join(names[other] for other in known)
+        raise StructureError(f"the result has no {what} {of} {names[label]}; it has those {of} {have}.")
+    return label

@@ -14,7 +14,7 @@ from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
 from vibrokit.results.energy import ActivationEnergy, ExitPath, energy_variables, read_energies
-from vibrokit.results.labels import label_of
+from vibrokit.results.labels import label_of, source_among
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
@@ -210,10 +210,7 @@ class Result(Record):
         known = self._quasi_potentials()
         if not known:
             raise StructureError("the result has no quasi-potential.")
-        label = min(known) if source is None else label_of(source, self.names)
-        if label not in known:
-            have = ", ".join(self.names[other] for other in known)
-            raise StructureError(f"the result has no quasi-potential of {self.names[label]}; it has those of {have}.")
+        label = source_among(known, source, self.names, "quasi-potential", "of")
         values, bounds = known[label]
         own = [energy for energy in self.energies if energy.source == label]
         return quasi_potential_map(
