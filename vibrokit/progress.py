@@ -37,7 +37,7 @@ class Update:
     stage : str
         What is being done, such as ``"basins"`` or ``"graph"``.
     subject : str
-        The attractor or other thing it is done for; empty if there is none.
+        The attractor or other thing that the work is about; may be empty.
     done : int
         How many units are done.
     total : int or None

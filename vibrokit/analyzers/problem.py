@@ -85,7 +85,7 @@ class ExitProblem:
         return self.exit.is_out(self.osc, states)
 
     def orbit(self, stepper: Stepper) -> Orbit:
-        """Return the attractor's orbit as a stepper gives it; raises StructureError if there is none."""
+        """Return the attractor's orbit as a stepper gives it; raises StructureError if it gives none."""
         return refine_orbit(self.scene, self.attractor.points[0], self.attractor.period, stepper)
 
     def ensemble_stepper(self, flow: Flow) -> Stepper:

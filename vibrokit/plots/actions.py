@@ -191,7 +191,7 @@ def _scientific(value: float) -> str:
 
 
 def _least_by_angle(angle: Array, action: Array) -> tuple[Array, Array]:
-    """Middles of equal parts of the circle, and the least action that started in each; NaN if there is none."""
+    """Middles of equal parts of the circle, and the least action that started in each; NaN without a start."""
     part = np.minimum((angle / (2 * np.pi) * _PARTS).astype(int), _PARTS - 1)
     least = np.full(_PARTS, np.inf)
     np.minimum.at(least, part, np.where(np.isfinite(action), action, np.inf))

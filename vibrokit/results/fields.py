@@ -108,7 +108,7 @@ class Word(Scalar):
 
 @dataclasses.dataclass(frozen=True)
 class BySide(Scalar):
-    """A number, 0 or more, for each side of the mass where there is a stop; NaN where there is none."""
+    """A number, 0 or more, for each side of the mass; NaN on a side without a stop."""
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         rows = np.array([[value.get(side, np.nan) for side in SIDES] for value in values], dtype=float)

@@ -112,7 +112,7 @@ class Record(ABC):
 
     @property
     def summary(self) -> Summary:
-        """What the record shows of itself in a console or a notebook, besides its findings."""
+        """Title and rows for a console or a notebook; the findings are added to them."""
         return Summary(type(self).__name__)
 
     def __repr__(self) -> str:

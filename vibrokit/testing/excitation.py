@@ -42,7 +42,7 @@ class ExcitationChecks(PartChecks[Excitation]):
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(part,))
 
     def period(self) -> str:
-        """The force repeats after a finite `period`, and is constant if it is None."""
+        """The force repeats after a finite `period`; a `period` of None means a constant force."""
         periods = []
         for part in self.samples:
             period = self._declared_period(part)

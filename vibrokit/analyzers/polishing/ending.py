@@ -101,7 +101,7 @@ class Ending(ABC):
         return 0.0
 
     def crossing(self, path: ExitPath) -> int | None:
-        """Return the first sample at which a path has already left, before its end; None if there is none."""
+        """Return the first sample before the end at which a path has left; None if it leaves at its end."""
         return None
 
     def distance_left(self, point: Array) -> float:
