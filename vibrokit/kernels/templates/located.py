@@ -31,6 +31,7 @@ from vibrokit.kernels.templates.steps import (
     TIMED,
     TOUCHED,
     TRIAL,
+    ZERO,
     attempt,
     copy,
     misfit,
@@ -41,7 +42,7 @@ from vibrokit.kernels.templates.steps import (
 
 # --- scene above, stepper below ---
 
-DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0, 1, 2
+DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0.0, 1.0, 2.0
 
 
 @njit(**INNER)
@@ -142,7 +143,7 @@ def press_step(i, y, end, memory, pushing, theta, settings, workspace):
     last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
     h = length_of(course, sigma, remaining if last else memory[CONTACT_STEP], i, y, theta)
     copy(y, workspace[STAGE])
-    slope(course, sigma, h, i, pushing, theta, workspace, 0)
+    slope(course, sigma, h, i, pushing, theta, workspace, int(ZERO))
     depth = max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30)
     grain = grain_of(i, depth, y, theta)
     first, before, misses = h, np.inf, 0

@@ -20,6 +20,7 @@ from vibrokit.kernels.templates.steps import (
     STAGE,
     TIME,
     TRIAL,
+    ZERO,
     attempt,
     copy,
     misfit,
@@ -36,19 +37,19 @@ CLEAR, TOO_LONG = -1, -2  # what `watch` finds in a step, or the stop that it ru
 @njit(**INNER)
 def fly(y, end, memory, pushing, theta, settings, workspace, coefficients):
     """Follow the free motion until a stop is touched, or to the end time."""
-    trial = workspace[TRIAL]
+    trial, none = workspace[TRIAL], int(ZERO)  # no stop decides the course
     while y[CLOCK] < end:
         remaining = end - y[CLOCK]
         last = memory[FREE_STEP] >= 0.99 * remaining
         h = remaining if last else memory[FREE_STEP]
         first, touched, length, before, misses = h, CLEAR, h, np.inf, 0
         copy(y, workspace[STAGE])
-        slope(TIME, 0.0, h, 0, pushing, theta, workspace, 0)
+        slope(TIME, 0.0, h, none, pushing, theta, workspace, int(ZERO))
         while True:
             memory[COUNT] += 1.0
             if memory[COUNT] > settings[1]:
                 return STALLED
-            attempt(TIME, 0.0, h, y, 0, pushing, theta, workspace)
+            attempt(TIME, 0.0, h, y, none, pushing, theta, workspace)
             error = misfit(h, y, memory[SPAN], settings[0], 0.0, 0.0, workspace)
             tiny = h <= EPSILON * (abs(y[CLOCK]) + memory[SPAN])
             if error > 1.0 and not tiny and misses < 2:

@@ -24,7 +24,9 @@ from vibrokit.kernels.templates.scene import (
 
 # --- scene above, stepper below ---
 
-TIME, ROOT_TIME, ROOT_DEPTH = 0, 1, 2
+# Numba compiles a function again for each integer constant that it is called with, so these are no integers.
+TIME, ROOT_TIME, ROOT_DEPTH = 0.0, 1.0, 2.0
+ZERO = 0.0  # for int(ZERO), an integer that is no constant
 CLOCK = EQUATIONS  # place of the time in y
 TRIAL, STAGE, SPARE, SIZE, ROWS = STAGES, STAGES + 1, STAGES + 2, STAGES + 3, STAGES + 4  # rows of the workspace
 # Memory between steps: durations of the next step in free flight, in contact and at the next touch, the stop that is
