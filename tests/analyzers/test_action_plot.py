@@ -269,6 +269,7 @@ def linear_scene(damping=0.05, amplitude=0.3, frequency=0.57, stop=1.0):
     )
 
 
+@pytest.mark.slow
 def test_first_contact_of_the_linear_scene():
     """ΔU = 2ζω_n³ (b − max x_s)², x_s the forced steady state; one attractor is enough."""
     osc = linear_scene()

@@ -100,6 +100,7 @@ def test_strong_damping_needs_more_shells():
     assert max(1 / np.linalg.svd(shell.back, compute_uv=False)[-1] for shell in medium) <= 10
 
 
+@pytest.mark.slow
 def test_phases_close_after_a_period(paper):
     """Whole periods and pieces are integrated apart, so they agree as far as the steps are fine."""
     osc, structure = paper

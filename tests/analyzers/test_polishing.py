@@ -344,6 +344,7 @@ def spiralling(forced, filtered, period, reach, turns=4):
 FACES = {"right": ("x", 0, 1), "left": ("x", 0, -1), "up": ("v", 1, 1), "down": ("v", 1, -1)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filtered", [False, True], ids=["white", "filtered"])
 @pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
 @pytest.mark.parametrize("face", FACES.values(), ids=FACES)

@@ -34,31 +34,24 @@ def exact_energies(scene, structure):
     return {attractor.label: exact for attractor, exact in zip(by_place, scene.exact, strict=True)}
 
 
-def is_inside(attractor, structure):
-    bounds = structure.basins.region.bounds
-    return np.all((attractor.points[:, :2] >= bounds[:, 0]) & (attractor.points[:, :2] <= bounds[:, 1]))
-
-
 MILD = [
-    *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 0.1, 1.0, 2.0))),
+    *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 2.0))),
     *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
     *by_name(pressed_wells("linear"), "pressed well, linear, k=1, zeta=0.05"),
-    *by_name(tilted_wells(), *(f"tilted well, {d:g} from its fold" for d in (1e-2, 1e-3))),
+    *by_name(tilted_wells(), "tilted well, 0.001 from its fold"),
 ]
 STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05")
 
 
 def energies_of(scene):
-    """Energies, each with its exact value, and the result."""
+    """Energies of the well that is pressed or tilted, each with its exact value, and the result."""
     structure = structure_of(scene)
     exact = exact_energies(scene, structure)
+    by_place = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
+    well = by_place[-1 if scene.oscillator.barriers else 0]
     graph = vk.GraphSearch(nodes=(64, 64), steps_per_period=8)
-    result = vk.LeastAction(shooting=SHOOTING, graph=graph).run(scene.oscillator, structure)
-    left = {energy.source for energy in result.energies}
-    assert left == {attractor.label for attractor in structure.attractors if is_inside(attractor, structure)}
-    outside = set(exact) - left
-    assert {finding.source for finding in result.found(Code.NO_EXIT_FOUND)} == outside
-    assert outside <= {finding.source for finding in result.found(Code.METHOD_FAILED)}
+    result = vk.LeastAction(source=well.label, shooting=SHOOTING, graph=graph).run(scene.oscillator, structure)
+    assert {energy.source for energy in result.energies} == {well.label}
     return [(energy, exact[energy.source]) for energy in result.energies], result
 
 

@@ -100,6 +100,7 @@ def off(found, true):
 # --- the equations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
 def test_through_the_stops_of_the_paper(paper, stepper):
     for start in HITTING:
@@ -165,6 +166,7 @@ def test_states_of_the_noise_have_a_covariance_too(stepper):
 # --- backwards
 
 
+@pytest.mark.slow
 def test_backwards_it_is_the_covariance_pulled_back_to_the_start(paper):
     stepper, duration, begin = vk.FreeFlight(1e-13), 5.0, 0.4
     for start in HITTING:
@@ -175,6 +177,7 @@ def test_backwards_it_is_the_covariance_pulled_back_to_the_start(paper):
         assert off(FLIP @ backwards @ FLIP, back @ covariance @ back.T) < 1e-8
 
 
+@pytest.mark.slow
 def test_noise_that_depends_on_the_velocity(paper):
     """Its amplitude backwards is that of the velocity forwards."""
     osc = vk.Oscillator(
@@ -246,6 +249,7 @@ class Piecewise:
         self.covariance = saltation @ self.covariance @ saltation.T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adhesive", [False, True])
 def test_a_damped_stop_in_closed_form(adhesive):
     osc, duration = damped_stop(adhesive), 3.0

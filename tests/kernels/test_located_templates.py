@@ -246,6 +246,7 @@ def test_energy_at_any_stiffness_and_without_gap(module):
         assert np.allclose(*energy, rtol=drift, atol=0)
 
 
+@pytest.mark.slow
 def test_law_that_would_pull_is_let_go(clamped):
     """The fine solution agrees with small Runge–Kutta steps of max(law, 0), which lose order at the kinks."""
     states = starts(6, 0.0)

@@ -67,6 +67,7 @@ def test_forcing_drag_and_a_spring_that_damps_run_backwards(stepper):
     assert np.abs(preimages(osc, starts, stepper=stepper) - expected).max() < 1e-8 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_a_law_that_would_pull_is_cut_where_it_is_cut_forwards():
     """Strong damping, so that the stop lets go of the mass before it leaves; tested where the way back is bounded."""
     osc = scene(HuntCrossley(50.0, 0.4))
@@ -129,6 +130,7 @@ def round_trip(osc, stepper, periods=1):
     return np.linalg.norm(ended.states - STATES[near], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_located_contacts(name):
     """A located contact's error is the tolerance, times what motion through stops makes of it: some 1e2 at most."""

@@ -17,6 +17,7 @@ def energy(x, v, k, b, power):
 HERTZ, LINEAR = (vk.Hertz(50.0), 1.5), (vk.Linear(300.0), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "power", "stepper", "tolerance"),
     [
@@ -41,6 +42,7 @@ def test_energy_is_kept(law, power, stepper, tolerance):
     assert np.abs(path.x).max() > 0.31  # it did hit the stops
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", [vk.Order8(1e-12), vk.FreeFlight(1e-12), vk.RK4(4096)], ids=str)
 def test_friction_takes_what_it_should(stepper):
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(vk.Hertz(50.0), 0.3, "right"),))

@@ -25,6 +25,7 @@ def kelvin_voigt(adhesive=False, noise=None):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
 @pytest.mark.parametrize("adhesive", [False, True])
 def test_derivatives_are_those_of_the_map(stepper, adhesive):
@@ -38,6 +39,7 @@ def test_derivatives_are_those_of_the_map(stepper, adhesive):
     np.testing.assert_allclose(derivative, differences, atol=1e-6 * np.abs(differences).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stepper", LOCATED, ids=lambda s: s.name)
 def test_one_adhesive_bounce_in_closed_form(stepper):
     """Inside an adhesive Kelvin–Voigt stop at 0 the motion is linear: it leaves after half a damped period."""
@@ -54,6 +56,7 @@ def test_one_adhesive_bounce_in_closed_form(stepper):
     np.testing.assert_allclose(path.states[-1], [-speed, 0.0], atol=1e-11)
 
 
+@pytest.mark.slow
 def test_steady_states_are_found():
     structure = vk.find_structure(kelvin_voigt(), cells=(30, 30))
     assert all(attractor.residual < 1e-9 for attractor in structure.attractors)

@@ -59,6 +59,7 @@ def energy(z):
 # --- H
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stepper", "adhesive"),
     [(FIRM, False), (vk.Order8(1e-13), False), (FIRM, True)],
@@ -112,6 +113,7 @@ def ramped(start, begin, duration, width, adhesive):
     return z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adhesive", [False, True])
 def test_it_is_the_limit_of_damping_that_sets_in_ever_faster(adhesive):
     found = carried(scene(adhesive))
@@ -134,6 +136,7 @@ def derivative(osc, start, stepper=FIRM):
     return end[:5], end[5:].reshape(4, 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adhesive", [False, True])
 @pytest.mark.parametrize("start", [START, LEFTWARDS], ids=["right", "left"])
 def test_derivatives_are_those_of_the_flow(adhesive, start):

@@ -52,6 +52,7 @@ def test_two_states_and_one_saddle_at_0570(paper):
     assert structure.survival == ()
 
 
+@pytest.mark.slow
 def test_a_third_attractor_at_0525(slower):
     _, structure = slower
     clear, hammering, wandering = structure.attractors
@@ -66,6 +67,7 @@ def test_a_third_attractor_at_0525(slower):
     assert min(attractor.basin_fraction for attractor in structure.attractors) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper", "slower"])
 def test_orbits_are_those_that_scipy_finds(request, name):
     osc, structure = request.getfixturevalue(name)

@@ -71,6 +71,7 @@ def test_a_weakly_nonlinear_cycle_has_the_multiplier_of_averaging():
     assert least == pytest.approx(np.exp(-0.01 * 2 * np.pi), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_cycle_that_hits_a_stop():
     stop = vk.Barrier(vk.Hertz(stiffness=50.0), position=1.2, side="right")
     cycle = find_cycle(van_der_pol(barriers=(stop,)), np.array([0.5, 0.0]), vk.Order8(1e-12), longest=20.0)
@@ -91,6 +92,7 @@ def test_a_cycle_that_hits_a_stop():
     assert cycle.point[0] > 1.2
 
 
+@pytest.mark.slow
 def test_a_cycle_of_three_states_with_two_turns():
     still = vk.CustomSpring("0*x")
     osc = vk.Oscillator(

@@ -46,6 +46,7 @@ def test_labels_are_where_the_flow_leads(paper):
     assert np.mean(nearest == basins.labels.ravel()[picked]) > 0.9  # cells on a boundary may differ by the step
 
 
+@pytest.mark.slow
 def test_duffing_has_a_small_and_a_large_orbit():
     osc = vk.load_scene("duffing")
     structure = vk.find_structure(osc, cells=(60, 60), region=((-3, 3), (-3, 3)))
@@ -119,6 +120,7 @@ def test_bad_seeds(rng):
         vk.load_scene("hertz-0.570").trajectory([0, 0], 1, rng=rng)
 
 
+@pytest.mark.slow
 def test_a_scene_whose_noise_depends_on_the_state():
     well = vk.load_scene("double-well")
     osc = vk.Oscillator(
@@ -387,6 +389,7 @@ def test_units_change_nothing(paper, length, rate):
     np.testing.assert_allclose(structure.saddles[0].points / scale, same.saddles[0].points, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_symmetric_orbit_meets_both_stops_alike():
     """A force that damps is largest before the deepest point; the numbers are SciPy's (DOP853, 1e-12)."""
     law = vk.CustomLaw("k*depth + c*rate", k=100.0, c=2.0)

@@ -210,6 +210,7 @@ def test_a_finer_curve_lies_within_what_the_coarser_one_claims():
         assert distances(middles, other.curve).max() < (0.01 * 0.2 + 0.005 * 0.1) / 8 * 6.0
 
 
+@pytest.mark.slow
 def test_another_stepper_finds_the_same_curve():
     osc, point, _, branches = paper()
     exact = list(grow_manifolds(osc, 0, saddle(point), region=SQUARE, stepper=vk.FreeFlight(1e-8), arc_length=3.0))
@@ -217,6 +218,7 @@ def test_another_stepper_finds_the_same_curve():
         assert np.quantile(distances(one.curve[::5], other.curve), 0.95) < 5e-4
 
 
+@pytest.mark.slow
 def test_a_flip_saddle_and_an_orbit_of_two_points():
     """Driven double well: both multipliers are negative, so each branch is carried to the other side and back."""
     osc = DOUBLE_WELL.replace({"damping_ratio": 0.125})

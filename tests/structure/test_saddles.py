@@ -81,6 +81,7 @@ def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
     assert saddle.leads_to == (0, 1)
 
 
+@pytest.mark.slow
 def test_a_saddle_that_presses_on_a_stop():
     # A softening spring, x − x³, whose hilltop at x = 1 a weak stop at 0.9 moves outwards; beyond it the mass escapes.
     osc = vk.Oscillator(
@@ -99,6 +100,7 @@ def test_a_saddle_that_presses_on_a_stop():
         assert saddle.leads_to == ends
 
 
+@pytest.mark.slow
 def test_stops_whose_force_jumps():
     # Its variational equations are not RK4's: the branches are entered from the exact saddle.
     law = vk.CustomLaw("stiffness*depth + loss*rate", stiffness=20.0, loss=0.5)
@@ -109,6 +111,7 @@ def test_stops_whose_force_jumps():
     assert saddle.leads_to == (0, 1)
 
 
+@pytest.mark.slow
 def test_a_third_state_of_the_noise():
     osc = double_well(noise=Coloured(intensity=0.01, rate=0.3))
     (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
@@ -228,6 +231,7 @@ def test_edge_tracks_are_trajectories_on_the_boundary(stops):
         np.testing.assert_allclose(track.stretches[-5:], np.log(unstable), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_an_unstable_limit_cycle_parts_rest_from_motion():
     # x″ + v (2ζ − a x² + b x⁴) + x = 0 averages to 2ζ/2 − a A²/8 + b A⁴/16 = 0 on its cycles (first order in these).
     osc = vk.Oscillator(

@@ -44,6 +44,7 @@ def test_indices_of_all_fixed_points_add_up_to_one(name, starts, bounds):
     assert any(index(orbit.multipliers) == -1 for orbit in unstable)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [2, 3, 5])
 def test_orbits_of_longer_period_are_born_in_pairs_or_by_doubling(period):
     # The index of the map's power is 1 too, so that those of all its fixed points that are no fixed points of the map
