@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.graph.search import GraphSearch as GraphSearch
     from vibrokit.analyzers.least_action import LeastAction as LeastAction
     from vibrokit.analyzers.problem import ExitProblem as ExitProblem
+    from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
     from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.spring import Spring as Spring
     from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
     from vibrokit.results.energy import Bound as Bound
+    from vibrokit.results.exit_rate import ExitRate as ExitRate
     from vibrokit.results.files import load_result as load_result
     from vibrokit.results.finding import Code as Code
     from vibrokit.results.finding import Finding as Finding
@@ -72,6 +74,7 @@ _MODULES = {
     "GraphSearch": "vibrokit.analyzers.graph.search",
     "LeastAction": "vibrokit.analyzers.least_action",
     "ExitProblem": "vibrokit.analyzers.problem",
+    "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
     "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",
@@ -96,6 +99,7 @@ _MODULES = {
     "Spring": "vibrokit.parts.spring.spring",
     "ActivationEnergy": "vibrokit.results.energy",
     "Bound": "vibrokit.results.energy",
+    "ExitRate": "vibrokit.results.exit_rate",
     "load_result": "vibrokit.results.files",
     "Code": "vibrokit.results.finding",
     "Finding": "vibrokit.results.finding",

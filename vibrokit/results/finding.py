@@ -183,6 +183,23 @@ class Code(StrEnum):
         "Raise the number of nodes.",
     )  # fmt: skip
 
+    # Density
+    DENSITY_NOT_CONVERGED = (
+        "density-not-converged", WARNING,
+        "The density of {state} at D = {intensity:g} had not converged after {intervals} section intervals: ln rate "
+        "still changes by about {change:.1e}.", "Expect an error of that size, or raise the noise intensity.",
+    )  # fmt: skip
+    DENSITY_AT_EDGE = (
+        "density-at-edge", WARNING,
+        "At D = {intensity:g}, {share:.1e} of the probability of {state} is at the edge of the region, so that exits "
+        "beyond it may be missing.", "Find the structure on a wider region.",
+    )  # fmt: skip
+    RATE_UNCERTAIN = (
+        "rate-uncertain", WARNING,
+        "The rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.0%}, above {accepted:.0%}.",
+        "Raise the number of nodes or of steps, or the noise intensity.",
+    )  # fmt: skip
+
     # Polishing
     SADDLE_NOT_USABLE = (
         "saddle-not-usable", WARNING,

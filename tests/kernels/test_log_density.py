@@ -1,0 +1,78 @@
+"""Steps of ln p on a grid, where the answer is known in closed form."""
+
+import numpy as np
+import pytest
+
+from vibrokit.kernels.log_density import WIDEST, step_rows
+
+NODES = np.stack(np.meshgrid(np.arange(40.0), np.arange(50.0), indexing="ij"), axis=-1)
+NO_FLOW, NO_WEIGHT = np.empty((0, 0, 2)), np.empty((0, 0))
+FLOOR = -1e6
+EVERYWHERE_ROUGH = np.ones(NODES.shape[:2], dtype=bool)
+
+
+def gaussian(centre, variances):
+    return -0.5 * np.sum((NODES - centre) ** 2 / variances, axis=-1)
+
+
+def stepped(phi, feet=NO_FLOW, spread=0.0, parts=0, rough=EVERYWHERE_ROUGH):
+    """φ, and where it is rough, after a step of the flow and parts of diffusion."""
+    out, marks = np.empty_like(phi), np.empty(phi.shape, dtype=bool)
+    spreads = np.full_like(phi, spread)
+    step_rows(phi, rough, feet, np.zeros_like(phi), NO_WEIGHT, spreads, parts, FLOOR, out, marks, 0, len(phi))
+    return out, marks
+
+
+@pytest.mark.parametrize(("depth", "spread", "parts"), [(1.0, 0.5, 1), (1.0, WIDEST, 5), (1e3, 0.02, 1)])
+def test_diffusion_of_a_gaussian_widens_it_by_the_variance(depth, spread, parts):
+    variances = np.array([30.0, 40.0]) / depth
+    found, _ = stepped(gaussian([20.0, 25.0], variances), spread=spread, parts=parts)
+    widened = variances + np.array([0.0, parts * spread**2])
+    expected = gaussian([20.0, 25.0], widened) + 0.5 * np.log(variances[1] / widened[1])
+    margin = 10 + 4 * parts // 3
+    assert expected[:, margin:-margin].min() < -5 * depth
+    np.testing.assert_allclose(found[:, margin:-margin], expected[:, margin:-margin], rtol=1e-9, atol=1e-11)
+
+
+def test_diffusion_keeps_the_probability_of_a_step():
+    phi = np.where(NODES[..., 1] < 25, 0.0, FLOOR)
+    found, _ = stepped(phi, spread=0.5, parts=1)
+    assert np.exp(found[:, 8:-8]).sum() == pytest.approx(np.exp(phi[:, 8:-8]).sum(), rel=1e-3)
+    assert found.max() <= 1e-12
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_transport_of_a_quadratic_form_is_exact(smooth):
+    phi = gaussian([20.0, 25.0], np.array([0.03, 0.04]))
+    feet = NODES + np.array([0.3, -0.4])
+    _, marks = stepped(phi)
+    assert not marks[:, 3:-3].any()
+    found, _ = stepped(phi, feet, rough=marks if smooth else EVERYWHERE_ROUGH)
+    inner = (slice(3, -3), slice(3, -3))
+    np.testing.assert_allclose(found[inner], gaussian([19.7, 25.4], np.array([0.03, 0.04]))[inner], rtol=1e-11)
+
+
+def test_transport_of_a_smooth_function_has_order_six():
+    errors = []
+    for length in (20.0, 40.0):
+        phi = np.sin(NODES[..., 0] / length * 2 * np.pi) * np.cos(NODES[..., 1] / length * 2 * np.pi)
+        _, marks = stepped(phi)
+        shift = np.array([0.4, 0.3])
+        found, _ = stepped(phi, NODES + shift, rough=marks)
+        angles = (NODES + shift) / length * 2 * np.pi
+        exact = np.sin(angles[..., 0]) * np.cos(angles[..., 1])
+        errors.append(np.abs(found - exact)[5:-5, 5:-5].max())
+    assert np.log2(errors[0] / errors[1]) > 5.5
+
+
+def test_transport_across_a_jump_interpolates_the_density():
+    phi = np.where(NODES[..., 1] < 25, 0.0, FLOOR)
+    found, _ = stepped(phi, NODES + np.array([0.0, 0.25]))
+    assert np.exp(found[10, 22:27]) == pytest.approx([1.0, 1.0, 0.75, 0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("foot", [np.nan, -0.1, 1e9])
+def test_motion_from_outside_the_grid_brings_the_floor(foot):
+    feet = NODES.copy()
+    feet[5, 5] = foot
+    assert stepped(np.zeros(NODES.shape[:2]), feet)[0][5, 5] == FLOOR

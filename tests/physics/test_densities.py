@@ -1,0 +1,58 @@
+"""Densities and exit rates against closed forms and simulated trajectories."""
+
+import math
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from tests.scenes import scene
+
+pytestmark = pytest.mark.slow
+
+
+def test_density_of_a_forced_linear_scene_is_gaussian_to_a_depth_of_40():
+    damping, intensity = 0.05, 1e-3
+    variance = intensity / (4 * damping)
+    osc = scene(
+        vk.Barrier(vk.Linear(1e3), 1.15, "right"),
+        damping_ratio=damping,
+        excitations=(vk.Harmonic(amplitude=0.1, frequency=0.8),),
+        noise=vk.WhiteNoise(intensity=intensity),
+    )
+    structure = vk.find_structure(osc, region=((-1.2, 1.2), (-1.2, 1.2)), cells=(40, 40), manifolds=False, rng=0)
+    found = vk.SGCM(intensities=(intensity,), nodes=(100, 100), exit=vk.FirstContact()).run(osc, structure)
+    data = found.data.isel(source=0, intensity_index=0)
+    offsets = np.stack(
+        np.meshgrid(data["quasi_potential_x"], data["quasi_potential_v"], indexing="ij"), axis=-1
+    ) - np.array([0.1 * 0.36 / (0.36**2 + 0.08**2), 0.1 * 0.8 * 0.08 / (0.36**2 + 0.08**2)])
+    depth = (offsets**2).sum(axis=-1) / (2 * variance)
+    expected = -depth - math.log(2 * math.pi * variance)
+    # The stop lies 12 standard deviations from the orbit's largest x; the motion up to it is free.
+    known = (depth < 40) & (np.hypot(*np.moveaxis(offsets, -1, 0)) < 0.6)
+    assert depth[known].max() > 30
+    np.testing.assert_allclose(data["log_density"].values[known], expected[known], atol=0.01 * 40, rtol=0.01)
+
+
+def kramers_rate(damping, intensity):
+    """Kramers' rate for moderate and strong damping; well and barrier of x⁴/4 − x²/2."""
+    prefactor = (math.sqrt(damping**2 + 1) - damping) * math.sqrt(2) / (2 * math.pi)
+    return prefactor * math.exp(-damping / intensity)
+
+
+@pytest.mark.parametrize("damping", [0.2, 1.0])
+def test_rates_of_a_double_well(damping):
+    barrier = damping  # ΔU = 4ζ times the barrier of 1/4
+    intensities = tuple(barrier / ratio for ratio in (12.0, 16.0, 20.0))
+    osc = scene(
+        damping_ratio=damping,
+        spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
+        noise=vk.WhiteNoise(intensity=barrier / 12),
+    )
+    structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
+    found = vk.SGCM(source=0, intensities=intensities, nodes=(120, 120)).run(osc, structure)
+    for rate in found.rates:
+        assert rate.value == pytest.approx(kramers_rate(damping, rate.intensity), rel=0.03)
+    (energy,) = found.energies
+    assert energy.lower <= barrier <= energy.upper
+    assert energy.value == pytest.approx(barrier, rel=0.02)

@@ -1,0 +1,146 @@
+"""DensityGrid: the nodes on which a density is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d, map_coordinates
+from scipy.spatial import cKDTree
+from scipy.special import logsumexp
+
+from vibrokit.kernels.vector_field import VectorField
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.region import Region
+
+_FEW = 64  # centres, each with its own ellipse
+_FINER = 5  # points along each side of a cell, which decide how much of it a set covers
+_PLACES = 4001  # in x, where the stiffness is evaluated
+_CLOSEST = 8.0  # times closer than elsewhere, at most
+_SMOOTHED = 0.01  # of the region, over which the density of nodes is smoothed
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DensityGrid:
+    """Nodes in x and at equal distances in v, the outermost ones on the bounds of a region.
+
+    Attributes
+    ----------
+    x, v : array (nx,), (nv,)
+    """
+
+    x: Array
+    v: Array
+
+    @classmethod
+    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int]) -> DensityGrid:
+        """Return a grid whose nodes in x are closer where the oscillator is stiffer.
+
+        In a contact of natural frequency ω a density is as wide in v as outside, and narrower in x by ω_n/ω.
+        """
+        places = np.linspace(*region.x, _PLACES)
+        stiffness = -VectorField(osc).jacobian(np.stack([places, np.zeros_like(places)], axis=-1))[:, 1, 0]
+        relative = np.sqrt(np.abs(stiffness) / np.median(np.abs(stiffness)))
+        density = gaussian_filter1d(np.clip(relative, 1.0, _CLOSEST), _SMOOTHED * _PLACES, mode="nearest")
+        count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+        nodes = CubicSpline(count, places)(np.linspace(0.0, count[-1], shape[0]))
+        nodes[[0, -1]] = region.x
+        return cls(nodes, np.linspace(*region.v, shape[1]))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Nodes in x and in v."""
+        return len(self.x), len(self.v)
+
+    @property
+    def region(self) -> Region:
+        """What the nodes cover."""
+        return Region.of([(self.x[0], self.x[-1]), (self.v[0], self.v[-1])])
+
+    @cached_property
+    def areas(self) -> Array:
+        """Area that belongs to each node, shape (nx, 1)."""
+        return (np.gradient(self.x) * self.v_spacing)[:, None]
+
+    @property
+    def v_spacing(self) -> float:
+        """Distance of neighbouring nodes in v."""
+        return float(self.v[1] - self.v[0])
+
+    @property
+    def nodes(self) -> Array:
+        """States at the nodes, shape (nx, nv, 2)."""
+        return np.stack(np.meshgrid(self.x, self.v, indexing="ij"), axis=-1)
+
+    @cached_property
+    def _place(self) -> CubicSpline:
+        return CubicSpline(self.x, np.arange(len(self.x), dtype=float))
+
+    def places(self, states: Array) -> Array:
+        """Return states (…, 2) in units of nodes; outside the grid they are outside its range of nodes."""
+        x, v = states[..., 0], states[..., 1]
+        inside = self._place(np.clip(x, self.x[0], self.x[-1]))
+        beyond = np.where(x < self.x[0], -1.0, np.where(x > self.x[-1], float(len(self.x)), inside))
+        return np.stack([np.where(np.isnan(x), np.nan, beyond), (v - self.v[0]) / self.v_spacing], axis=-1)
+
+    def mass(self, phi: Array, where: NDArray[np.bool_] | None = None) -> float:
+        """Return the logarithm of the probability of a density e^φ on the grid, or on some of its nodes."""
+        weighted = phi + np.log(self.areas)
+        return float(logsumexp(weighted if where is None else weighted[where]))
+
+    def local_spacing(self, points: Array) -> Array:
+        """Distances of neighbouring nodes in x and in v at some points (count, 2), shape (count, 2)."""
+        widths = np.interp(points[:, 0], self.x, np.gradient(self.x))
+        return np.stack([widths, np.full_like(widths, self.v_spacing)], axis=-1)
+
+    def nearest(self, centres: Array, roots: Array, moved: Array | float = 0.0) -> Array:
+        """Return the least |R (q − c)|² over centres c with their matrices R, at each node q, shape (nx, nv).
+
+        Parameters
+        ----------
+        centres : array (count, 2)
+        roots : array (count, 2, 2)
+            If there are more than a few centres, the first R is used for all.
+        moved : array broadcastable to (nx, nv, 2)
+            Added to the nodes.
+        """
+        states = (self.nodes + moved).reshape(-1, 2)
+        if len(centres) > _FEW:
+            distances = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0] ** 2
+        else:
+            each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
+            distances = functools.reduce(np.minimum, each)
+        nearest: Array = distances.reshape(self.shape)
+        return nearest
+
+    def covered(self, centres: Array, roots: Array) -> Array:
+        """Return how much of the cell around each node is covered by ellipses |R (q − c)| ≤ 1, from 0 to 1."""
+        covered = np.zeros(self.shape)
+        inner = (np.arange(_FINER) + 0.5) / _FINER - 0.5
+        widths = np.gradient(self.x)[:, None]
+        for x in inner:
+            for v in inner:
+                moved = np.stack(np.broadcast_arrays(x * widths, v * self.v_spacing), axis=-1)
+                covered += self.nearest(centres, roots, moved) <= 1
+        return covered / _FINER**2
+
+    def resampled(self, phi: Array, other: DensityGrid) -> Array:
+        """Return φ, known on another grid, on these nodes; outside it goes on with the values at its edge."""
+        places = np.moveaxis(other.places(self.nodes), -1, 0)
+        resampled: Array = map_coordinates(phi, places, order=1, mode="nearest")
+        return resampled
+
+    def around(self, wanted: NDArray[np.bool_], margin: int) -> Region:
+        """Return a region around the wanted nodes and `margin` nodes more on each side."""
+        bounds = []
+        for axis, places in enumerate((self.x, self.v)):
+            found = np.flatnonzero(wanted.any(axis=1 - axis))
+            first, last = max(found[0] - margin, 0), min(found[-1] + margin, len(places) - 1)
+            bounds.append((places[first], places[last]))
+        return Region.of(bounds)

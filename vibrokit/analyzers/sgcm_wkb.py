@@ -1,0 +1,251 @@
+"""SGCM: densities on the section, exit rates, and the activation energies that follow."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import ClassVar
+
+import numpy as np
+import xarray
+
+from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.energies import extrapolated
+from vibrokit.analyzers.sgcm.propagator import FlowTables
+from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.kernels.vector_field import VectorField
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.result import Result
+from vibrokit.results.sgcm import SGCMResult
+from vibrokit.structure.validation import pair, whole
+
+METHOD = "SGCM-WKB"
+_FEWEST_NODES = 32
+_MOST_STEPS = 4096
+_STEPS_PER_RADIAN = 1.5  # of the fastest oscillation or decay: 18 in a forcing period of hertz-0.570
+_INTENSITIES = (1.0, 0.8, 0.64)  # times the scene's: three, so that the limit D → 0 has an error estimate
+_ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
+_EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
+_ALL_GRIDS = 1.6  # memory of all grids together, in units of the finest
+
+
+class SGCM(Analyzer):
+    """Quasi-stationary densities and exit rates at finite noise, and activation energies as D → 0.
+
+    The density p on the section is carried from section to section as φ = ln p: along the exact flow, and by diffusion
+    of the velocity in closed form (see `vibrokit.kernels.log_density`). Tails are as exact as the maximum, at any
+    depth. The density of an attractor that loses what leaves it, and is normalized, converges to the quasi-stationary
+    one; what is lost in a section interval is the exit rate.
+
+    With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
+    shape of the density there and half its standard deviations, or 2.5 node spacings if that is more. With an exit by
+    position it has left at the first time that satisfies the condition.
+
+    Parameters
+    ----------
+    intensities : tuple of float, optional
+        Noise intensities D (m² s⁻³); by default the scene's, and 0.8 and 0.64 times that.
+    nodes : (int, int)
+        Nodes in x and in v.
+    steps : int, optional
+        Steps of time in a section interval; even. By default 6 per radian of the fastest oscillation or decay.
+    max_memory_gib : float
+        Memory that the tables may take (GiB).
+
+    Raises
+    ------
+    StructureError
+        A setting has a value that is not allowed.
+
+    Notes
+    -----
+    Each rate has an error estimate: what halving the nodes changes, and a third of what doubling the steps changes.
+    An activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
+
+    The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
+    1990), without its matrix of sampled transitions, which cannot contain a probability of 1e-9.
+    """
+
+    result: ClassVar[type[Result]] = SGCMResult
+
+    intensities: tuple[float, ...] | None = None
+    nodes: tuple[int, int] = (240, 240)
+    steps: int | None = None
+    max_memory_gib: float = 2.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", pair("SGCM: nodes", self.nodes))
+        if min(self.nodes) < _FEWEST_NODES:
+            raise StructureError(f"SGCM: nodes must be {_FEWEST_NODES} or more in x and in v, got {self.nodes}.")
+        if self.steps is not None:
+            whole("SGCM: steps", self.steps, 2, _MOST_STEPS)
+            if self.steps % 2:
+                raise StructureError(
+                    f"SGCM: steps must be an even number, got {self.steps}; the error is estimated with half as many."
+                )
+        memory = self.max_memory_gib
+        if isinstance(memory, bool) or not isinstance(memory, Real) or not memory > 0:
+            raise StructureError(f"SGCM: max_memory_gib must be a positive number of GiB, got {shown(memory)}.")
+        if self.intensities is not None:
+            object.__setattr__(self, "intensities", _checked_intensities(self.intensities))
+
+    def analyze(self, problem: ExitProblem) -> Analysis:
+        """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
+        noise = problem.osc.noise
+        assert noise is not None
+        if noise.extra_states:
+            raise SceneError(
+                f"the noise has {len(noise.extra_states)} states of its own, so that a density needs "
+                f"{2 + len(noise.extra_states)} dimensions; SGCM covers x and v only. Use ActionPlot."
+            )
+        if problem.at_exit:
+            return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
+        if not problem.exit.by_position and len(problem.structure.attractors) < 2:
+            raise StructureError(
+                "there is no other attractor to reach; use an exit by position, such as FirstContact()."
+            )
+        steps = self.steps or _steps_for(problem)
+        self._check_memory(problem, steps)
+        intensities = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
+        solved: list[AtIntensity] = []
+        stopped: tuple[Finding, ...] = ()
+        try:
+            solved.extend(DensitySolver(problem, self.nodes, steps).solve(intensities))
+        except KeyboardInterrupt as interrupt:
+            if not solved:
+                raise
+            stopped = (Finding.stopped("density", interrupt, problem.source),)
+        return Analysis(
+            _energies(problem, solved),
+            _data(problem, solved),
+            (*_findings(problem, solved), *stopped),
+            complete=not stopped,
+        )
+
+    def _check_memory(self, problem: ExitProblem, steps: int) -> None:
+        needed = _ALL_GRIDS * FlowTables.memory(self.nodes, 1 if problem.scene.autonomous else steps)
+        if needed > self.max_memory_gib:
+            nx, nv = self.nodes
+            raise StructureError(
+                f"tables of {nx} × {nv} nodes and {steps} steps need {needed:.3g} GiB of memory, and max_memory_gib is "
+                f"{self.max_memory_gib:.3g}; lower nodes or steps, or raise max_memory_gib."
+            )
+
+
+def _checked_intensities(intensities: tuple[float, ...]) -> tuple[float, ...]:
+    """Intensities in descending order, each once."""
+    given = intensities if isinstance(intensities, tuple | list) else (intensities,)
+    for intensity in given:
+        if isinstance(intensity, bool) or not isinstance(intensity, Real) or not 0 < intensity < math.inf:
+            raise StructureError(f"SGCM: intensities must be positive numbers, got {shown(intensity)}.")
+    if not given:
+        raise StructureError("SGCM: intensities must contain at least one number, got ().")
+    return tuple(sorted({float(intensity) for intensity in given}, reverse=True))
+
+
+def _steps_for(problem: ExitProblem) -> int:
+    """An even number of steps that resolves how fast small deviations turn or decay.
+
+    The exact flow treats contacts; a step limits only how long noise acts before it is carried along. So the rate is
+    the median along the attractors' orbits, which short contacts do not change.
+    """
+    osc: Oscillator = problem.osc
+    orbits = np.concatenate([attractor.orbit[:, :2] for attractor in problem.structure.attractors])
+    rates = np.abs(np.linalg.eigvals(VectorField(osc).jacobian(orbits))).max(axis=1)
+    return 2 * math.ceil(_STEPS_PER_RADIAN * float(np.median(rates)) * osc.section_interval / 2)
+
+
+def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[ActivationEnergy, ...]:
+    found = []
+    for target in solved[0].errors:
+        if not all(target in one.errors for one in solved):
+            continue
+        times = [-one.found.log_rates[target] for one in solved]
+        value, error = extrapolated([s.intensity for s in solved], times, [one.errors[target] for one in solved])
+        lower, upper = max(value - error, 0.0), max(value + error, 0.0)
+        found.append(
+            ActivationEnergy(
+                problem.source,
+                target,
+                value=max(value, 0.0),
+                lower=lower,
+                upper=upper,
+                method=METHOD,
+                bound=Bound.ESTIMATE,
+                numerical_error=error,
+            )
+        )
+    return tuple(found)
+
+
+def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
+    targets = sorted({target for one in solved for target in one.errors})
+    interval = problem.osc.section_interval
+    logs = np.array([[one.found.log_rates.get(target, np.nan) for target in targets] for one in solved])
+    errors = np.array([[one.errors.get(target, np.nan) for target in targets] for one in solved])
+    last = solved[-1]
+    x, v = last.grid.x, last.grid.v
+    potential = -last.intensity * (last.found.phi - last.found.phi.max())
+    event = "contact" if problem.exit.by_position else "commitment"
+    return xarray.Dataset(
+        {
+            "log_density": (
+                ("intensity_index", "node_x", "node_v"), np.array([one.found.phi for one in solved]),
+                {"long_name": "logarithm of the quasi-stationary density (s m-2)", "units": "1"},
+            ),
+            "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln p", "units": "m2 s-3"}),
+            "log_rate": (
+                ("intensity_index", "exit_index"), logs - math.log(interval),
+                {"long_name": "logarithm of the exit rate (s-1)", "units": "1"},
+            ),
+            "log_rate_error": (
+                ("intensity_index", "exit_index"), errors, {"long_name": "error of log_rate", "units": "1"},
+            ),
+            "rate_target": (
+                ("exit_index",), np.array(targets), {"long_name": "label of the attractor that is reached"},
+            ),
+            "rate_event": ((), event, {"long_name": "what counts as an exit"}),
+            "rate_intensity": (
+                ("intensity_index",), np.array([one.intensity for one in solved]),
+                {"long_name": "noise intensity", "units": "m2 s-3"},
+            ),
+        },
+        {"quasi_potential_x": ("node_x", x, {"units": "m"}), "quasi_potential_v": ("node_v", v, {"units": "m s-1"})},
+    )  # fmt: skip
+
+
+def _findings(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Finding, ...]:
+    """What limits the rates."""
+    found = []
+    for one in solved:
+        if not one.found.converged:
+            found.append(
+                Finding.of(
+                    Code.DENSITY_NOT_CONVERGED,
+                    problem.source,
+                    intensity=one.intensity,
+                    intervals=one.found.intervals,
+                    change=one.found.change,
+                )
+            )
+        if one.at_edge > max(one.found.log_rates.values()) + math.log(_EDGE):
+            found.append(
+                Finding.of(Code.DENSITY_AT_EDGE, problem.source, intensity=one.intensity, share=math.exp(one.at_edge))
+            )
+        for target, error in one.errors.items():
+            if not error <= _ACCEPTED:
+                found.append(
+                    Finding.of(
+                        Code.RATE_UNCERTAIN,
+                        problem.source,
+                        target,
+                        intensity=one.intensity,
+                        error=error,
+                        accepted=_ACCEPTED,
+                    )
+                )
+    return tuple(found)
