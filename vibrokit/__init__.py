@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
     from vibrokit.analyzers.analyzer import Analysis as Analysis
     from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.evolution import evolve_density as evolve_density
     from vibrokit.analyzers.exits import Exit as Exit
     from vibrokit.analyzers.exits import FirstContact as FirstContact
     from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
@@ -67,6 +68,7 @@ _MODULES = {
     "ActionPlot": "vibrokit.analyzers.action_plot",
     "Analysis": "vibrokit.analyzers.analyzer",
     "Analyzer": "vibrokit.analyzers.analyzer",
+    "evolve_density": "vibrokit.analyzers.evolution",
     "Exit": "vibrokit.analyzers.exits",
     "FirstContact": "vibrokit.analyzers.exits",
     "LeaveBasin": "vibrokit.analyzers.exits",

@@ -6,7 +6,7 @@ import pytest
 import vibrokit as vk
 from tests.scenes import Coloured, double_well, scene
 
-WELL = double_well(noise=vk.WhiteNoise(intensity=4e-3))
+WELL = double_well(noise=vk.WhiteNoise(intensity=6e-3))
 
 
 @pytest.fixture(scope="module")
@@ -16,11 +16,11 @@ def structure():
 
 @pytest.fixture(scope="module")
 def result(structure):
-    return vk.SGCM(source=0, intensities=(5e-3, 4e-3), nodes=(60, 60), steps=16).run(WELL, structure)
+    return vk.SGCM(source=0, intensities=(8e-3, 6e-3), nodes=(90, 90), steps=16).run(WELL, structure)
 
 
 def test_rates_at_each_intensity(result):
-    assert [rate.intensity for rate in result.rates] == [5e-3, 4e-3]
+    assert [rate.intensity for rate in result.rates] == [8e-3, 6e-3]
     assert {(rate.source, rate.target, rate.event) for rate in result.rates} == {(0, 1, "commitment")}
     assert all(0 < rate.lower < rate.value < rate.upper for rate in result.rates)
     assert result.rates[1].value < result.rates[0].value
@@ -29,9 +29,9 @@ def test_rates_at_each_intensity(result):
 
 def test_density_has_probability_1(result):
     data = result.data.isel(source=0)
-    spacings = [float(np.diff(data[f"quasi_potential_{axis}"][:2])[0]) for axis in ("x", "v")]
+    widths = [np.gradient(data[f"density_{axis}"].values) for axis in ("x", "v")]
     for density in np.exp(data["log_density"].values):
-        assert density.sum() * np.prod(spacings) == pytest.approx(1.0, rel=1e-6)
+        assert np.nansum(density * np.outer(*widths)) == pytest.approx(1.0, rel=1e-6)
 
 
 def test_result_is_saved_and_reopened(result, tmp_path):
@@ -43,17 +43,26 @@ def test_result_is_saved_and_reopened(result, tmp_path):
 
 
 def test_same_bits_again(result, structure):
-    again = vk.SGCM(source=0, intensities=(5e-3, 4e-3), nodes=(60, 60), steps=16).run(WELL, structure)
+    again = vk.SGCM(source=0, intensities=(8e-3, 6e-3), nodes=(90, 90), steps=16).run(WELL, structure)
     np.testing.assert_array_equal(again.data["log_density"], result.data["log_density"])
 
 
-def test_coarse_grid_is_reported(structure):
-    found = vk.SGCM(source=0, intensities=(2e-4,), nodes=(32, 32), steps=8).run(WELL, structure)
-    assert vk.Code.RATE_UNCERTAIN in {finding.code for finding in found.findings}
+def test_a_grid_that_cannot_resolve_the_density_is_refused_with_the_nodes_it_needs(structure):
+    found = vk.SGCM(source=0, intensities=(1e-5,), nodes=(40, 40), steps=8).run(WELL, structure)
+    (failed,) = found.found(vk.Code.SOURCE_FAILED)
+    assert "needs" in failed.values["reason"]
+    assert not found.energies
+
+
+def test_a_rate_that_depends_on_the_nodes_is_uncertain(structure):
+    found = vk.SGCM(source=0, intensities=(4e-3,), nodes=(64, 64), steps=8).run(WELL, structure)
+    (rate,) = found.rates
+    assert found.found(vk.Code.RATE_UNCERTAIN)
+    assert rate.upper > 1.1 * rate.value
 
 
 def test_time_limit_keeps_what_was_solved(structure):
-    limited = vk.SGCM(nodes=(60, 60), steps=16).run(WELL, structure, time_limit=1e-3)
+    limited = vk.SGCM(nodes=(90, 90), steps=16).run(WELL, structure, time_limit=1e-3)
     assert not limited.complete
     assert vk.Code.STOPPED in {finding.code for finding in limited.findings}
 
@@ -90,5 +99,5 @@ def test_noise_with_states_of_its_own(structure):
 
 def test_one_attractor_has_nowhere_to_go():
     osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-3))
-    found = vk.SGCM(nodes=(40, 40)).run(osc, vk.find_structure(osc, cells=(20, 20), rng=0))
-    assert [finding.code for finding in found.findings] == [vk.Code.SOURCE_FAILED]
+    with pytest.raises(vk.errors.StructureError, match="only one attractor"):
+        vk.SGCM(nodes=(40, 40)).run(osc, vk.find_structure(osc, cells=(20, 20), rng=0))

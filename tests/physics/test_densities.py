@@ -23,9 +23,9 @@ def test_density_of_a_forced_linear_scene_is_gaussian_to_a_depth_of_40():
     structure = vk.find_structure(osc, region=((-1.2, 1.2), (-1.2, 1.2)), cells=(40, 40), manifolds=False, rng=0)
     found = vk.SGCM(intensities=(intensity,), nodes=(100, 100), exit=vk.FirstContact()).run(osc, structure)
     data = found.data.isel(source=0, intensity_index=0)
-    offsets = np.stack(
-        np.meshgrid(data["quasi_potential_x"], data["quasi_potential_v"], indexing="ij"), axis=-1
-    ) - np.array([0.1 * 0.36 / (0.36**2 + 0.08**2), 0.1 * 0.8 * 0.08 / (0.36**2 + 0.08**2)])
+    offsets = np.stack(np.meshgrid(data["density_x"], data["density_v"], indexing="ij"), axis=-1) - np.array(
+        [0.1 * 0.36 / (0.36**2 + 0.08**2), 0.1 * 0.8 * 0.08 / (0.36**2 + 0.08**2)]
+    )
     depth = (offsets**2).sum(axis=-1) / (2 * variance)
     expected = -depth - math.log(2 * math.pi * variance)
     # The stop lies 12 standard deviations from the orbit's largest x; the motion up to it is free.

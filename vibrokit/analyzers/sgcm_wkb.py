@@ -11,12 +11,11 @@ import xarray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.energies import extrapolated
-from vibrokit.analyzers.sgcm.propagator import FlowTables
+from vibrokit.analyzers.sgcm.propagator import FlowTables, checked_noise, steps_for
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
-from vibrokit.errors import SceneError, StructureError, shown
-from vibrokit.kernels.vector_field import VectorField
-from vibrokit.oscillator import Oscillator
+from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
@@ -26,7 +25,6 @@ from vibrokit.structure.validation import pair, whole
 METHOD = "SGCM-WKB"
 _FEWEST_NODES = 32
 _MOST_STEPS = 4096
-_STEPS_PER_RADIAN = 1.5  # of the fastest oscillation or decay: 18 in a forcing period of hertz-0.570
 _INTENSITIES = (1.0, 0.8, 0.64)  # times the scene's: three, so that the limit D → 0 has an error estimate
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
@@ -52,7 +50,7 @@ class SGCM(Analyzer):
     nodes : (int, int)
         Nodes in x and in v.
     steps : int, optional
-        Steps of time in a section interval; even. By default 6 per radian of the fastest oscillation or decay.
+        Steps of time in a section interval; even. By default 1.5 per radian of the fastest oscillation or decay.
     max_memory_gib : float
         Memory that the tables may take (GiB).
 
@@ -63,7 +61,7 @@ class SGCM(Analyzer):
 
     Notes
     -----
-    Each rate has an error estimate: what halving the nodes changes, and a third of what doubling the steps changes.
+    Each rate has an error estimate: what 0.7 times the nodes change, and a third of what doubling the steps changes.
     An activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
@@ -95,20 +93,11 @@ class SGCM(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
-        noise = problem.osc.noise
-        assert noise is not None
-        if noise.extra_states:
-            raise SceneError(
-                f"the noise has {len(noise.extra_states)} states of its own, so that a density needs "
-                f"{2 + len(noise.extra_states)} dimensions; SGCM covers x and v only. Use ActionPlot."
-            )
+        noise = checked_noise(problem.osc)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
-        if not problem.exit.by_position and len(problem.structure.attractors) < 2:
-            raise StructureError(
-                "there is no other attractor to reach; use an exit by position, such as FirstContact()."
-            )
-        steps = self.steps or _steps_for(problem)
+        orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
+        steps = self.steps or steps_for(problem.osc, np.concatenate(orbits))
         self._check_memory(problem, steps)
         intensities = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
         solved: list[AtIntensity] = []
@@ -147,18 +136,6 @@ def _checked_intensities(intensities: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted({float(intensity) for intensity in given}, reverse=True))
 
 
-def _steps_for(problem: ExitProblem) -> int:
-    """An even number of steps that resolves how fast small deviations turn or decay.
-
-    The exact flow treats contacts; a step limits only how long noise acts before it is carried along. So the rate is
-    the median along the attractors' orbits, which short contacts do not change.
-    """
-    osc: Oscillator = problem.osc
-    orbits = np.concatenate([attractor.orbit[:, :2] for attractor in problem.structure.attractors])
-    rates = np.abs(np.linalg.eigvals(VectorField(osc).jacobian(orbits))).max(axis=1)
-    return 2 * math.ceil(_STEPS_PER_RADIAN * float(np.median(rates)) * osc.section_interval / 2)
-
-
 def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[ActivationEnergy, ...]:
     found = []
     for target in solved[0].errors:
@@ -188,14 +165,19 @@ def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
     logs = np.array([[one.found.log_rates.get(target, np.nan) for target in targets] for one in solved])
     errors = np.array([[one.errors.get(target, np.nan) for target in targets] for one in solved])
     last = solved[-1]
-    x, v = last.grid.x, last.grid.v
-    potential = -last.intensity * (last.found.phi - last.found.phi.max())
+    uniform = DensityGrid(np.linspace(*last.grid.region.x, last.grid.shape[0]), last.grid.v)
+    shown = uniform.resampled(last.log_density, last.grid)
+    potential = -last.intensity * (shown - np.nanmax(shown))
     event = "contact" if problem.exit.by_position else "commitment"
     return xarray.Dataset(
         {
             "log_density": (
-                ("intensity_index", "node_x", "node_v"), np.array([one.found.phi for one in solved]),
+                ("intensity_index", "density_node_x", "density_node_v"), np.array([one.log_density for one in solved]),
                 {"long_name": "logarithm of the quasi-stationary density (s m-2)", "units": "1"},
+            ),
+            "mass_drift": (
+                ("intensity_index",), np.array([one.found.drift for one in solved]),
+                {"long_name": "relative change of probability in a section interval by truncation", "units": "1"},
             ),
             "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln p", "units": "m2 s-3"}),
             "log_rate": (
@@ -214,7 +196,12 @@ def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
                 {"long_name": "noise intensity", "units": "m2 s-3"},
             ),
         },
-        {"quasi_potential_x": ("node_x", x, {"units": "m"}), "quasi_potential_v": ("node_v", v, {"units": "m s-1"})},
+        {
+            "density_x": ("density_node_x", last.grid.x, {"long_name": "displacement", "units": "m"}),
+            "density_v": ("density_node_v", last.grid.v, {"long_name": "velocity", "units": "m s-1"}),
+            "quasi_potential_x": ("node_x", uniform.x, {"long_name": "displacement", "units": "m"}),
+            "quasi_potential_v": ("node_v", uniform.v, {"long_name": "velocity", "units": "m s-1"}),
+        },
     )  # fmt: skip
 
 

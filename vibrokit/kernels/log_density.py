@@ -116,10 +116,8 @@ def _transport_row(phi: Array, rough: Flags, feet: Array, growth: Array, floor: 
         if smooth:
             u0, u1, u2, u3, u4, u5 = _weights(t - b)
             for k in range(6):
-                row = phi[a - 2 + k]
-                lines[k] = (
-                    u0 * row[b - 2] + u1 * row[b - 1] + u2 * row[b] + u3 * row[b + 1] + u4 * row[b + 2] + u5 * row[b + 3]
-                )
+                row = phi[a - 2 + k, b - 2 : b + 4]
+                lines[k] = u0 * row[0] + u1 * row[1] + u2 * row[2] + u3 * row[3] + u4 * row[4] + u5 * row[5]
             for k in range(3):
                 low = lines[k] - 2.0 * lines[k + 1] + lines[k + 2]
                 high = lines[k + 1] - 2.0 * lines[k + 2] + lines[k + 3]

@@ -194,6 +194,11 @@ class Code(StrEnum):
         "At D = {intensity:g}, {share:.1e} of the probability of {state} is at the edge of the region, so that exits "
         "beyond it may be missing.", "Find the structure on a wider region.",
     )  # fmt: skip
+    MASS_NOT_KEPT = (
+        "mass-not-kept", WARNING,
+        "At t = {time:.4g} s the probability on the nodes is {mass:.4g}, not 1.",
+        "Some left the region, or the nodes are too far apart: widen the region, or raise the number of nodes.",
+    )  # fmt: skip
     RATE_UNCERTAIN = (
         "rate-uncertain", WARNING,
         "The rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.0%}, above {accepted:.0%}.",

@@ -18,11 +18,13 @@ class SGCMResult(Result):
 
     `data` has, along ``source``:
 
-    - ``log_density`` over (``intensity_index``, ``node_x``, ``node_v``), ln p while probability leaves, of mass 1, with
-      the coordinates ``quasi_potential_x`` and ``quasi_potential_v`` of the nodes;
-    - ``quasi_potential``, −D ln p at the least intensity, 0 at its minimum;
+    - ``log_density`` over (``intensity_index``, ``density_node_x``, ``density_node_v``), ln p while probability leaves,
+      of mass 1, NaN where it is not resolved; ``density_x`` and ``density_v`` are the nodes, which are closer in x
+      where the oscillator is stiffer;
+    - ``quasi_potential``, −D ln p at the least intensity, 0 at its minimum, on nodes at equal distances;
     - ``log_rate`` and ``log_rate_error`` over (``intensity_index``, ``exit_index``), with ``rate_target`` and
-      ``rate_intensity``.
+      ``rate_intensity``;
+    - ``mass_drift`` over ``intensity_index``, the probability that truncation errors add in a section interval.
     """
 
     kind: ClassVar[str] = "sgcm"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
+from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import cached_property
 from typing import Any
@@ -11,21 +13,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.errors import SceneError
 from vibrokit.kernels.ensemble import carry, run_ensemble
 from vibrokit.kernels.log_density import WIDEST, step_rows
+from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.vector_field import VectorField
+from vibrokit.oscillator import Oscillator
+from vibrokit.parts.noise.noise_model import NoiseModel
 from vibrokit.progress import advance, stage
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.symbolic.flow_kind import Flow
 
 _BLOCKS = 8  # of rows; a constant, so that the number of threads changes nothing
+# On hertz-0.570 at D = 3e-4 and 200² nodes, the mean time to the clear orbit is 2048 periods with 12 steps, 2063 with
+# 16, 2018 with 24, and 1932 with 8.
+_STEPS_PER_RADIAN = 1.5  # of the fastest oscillation or decay: 18 in a forcing period of hertz-0.570
+_FEWEST_STEPS = 8
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
 
 Array = NDArray[np.float64]
+IsOut = Callable[[Array], NDArray[np.bool_]]
 
 _MIRROR = np.array([1.0, -1.0])  # the reversed flow has −v in place of v
 _NO_FLOW = np.empty((0, 0, 2))
@@ -61,11 +71,14 @@ class FlowTables:
     amplitude: Array
 
     @classmethod
-    def of(cls, problem: ExitProblem, grid: DensityGrid, steps: int) -> FlowTables:
-        """Integrate backwards in time from all nodes, and forwards again for the derivatives."""
-        scene = problem.scene
+    def of(
+        cls, scene: Oscillator, stepper: Stepper, grid: DensityGrid, steps: int, is_out: IsOut | None = None
+    ) -> FlowTables:
+        """Integrate backwards in time from all nodes, and forwards again for the derivatives.
+
+        `is_out` tells which states have left, if position decides.
+        """
         step = scene.section_interval / steps
-        stepper = problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
         nodes = grid.nodes.reshape(-1, 2)
         tables = cls(grid, step, steps, [], [], [], _amplitude(scene, grid))
         phases = 1 if scene.autonomous else steps
@@ -86,8 +99,8 @@ class FlowTables:
                 places[~np.isfinite(growth)] = np.nan
                 tables.feet.append(places.reshape(*grid.shape, 2))
                 tables.growth.append(np.nan_to_num(growth).reshape(grid.shape))
-                if problem.exit.by_position:
-                    out = problem.is_out(nodes) | problem.is_out(np.nan_to_num(feet))
+                if is_out is not None:
+                    out = is_out(nodes) | is_out(np.nan_to_num(feet))
                     tables.crossed.append(out.reshape(grid.shape))
                 advance()
         return tables
@@ -141,19 +154,27 @@ class Propagator:
 
         `highest`, if given, keeps the largest φ at each node over all steps.
         """
-        lost, last = -np.inf, self.tables.steps - 1
-        phi, rough = self._stepped(phi, np.zeros(phi.shape, dtype=bool), None, 0.5, floor)
+        lost, phi, rough = -np.inf, *self._stepped(phi, np.zeros(phi.shape, dtype=bool), None, 0.5, floor)
         for step in range(self.tables.steps):
             phase = step % len(self.tables.feet)
-            phi, rough = self._stepped(phi, rough, phase, 1.0 if step < last else 0.5, floor)
+            phi, rough = self._stepped(phi, rough, phase, 1.0 if step < self.tables.steps - 1 else 0.5, floor)
             if self.tables.crossed:
                 out = self.tables.crossed[phase]
                 if out.any():
                     lost = np.logaddexp(lost, self.tables.grid.mass(phi, out))
-                    phi[out] += np.log(1 - ABSORBED)
+                    phi[out] = np.maximum(phi[out] + np.log(1 - ABSORBED), floor)
+                    rough[:] = True  # where it was changed, and there cubics with limits do for all
             if highest is not None:
                 np.maximum(highest, phi, out=highest)
         return phi, float(lost)
+
+    def over(self, phi: Array, first: int, steps: int, floor: float) -> Array:
+        """Return φ some steps later, where `first` is the number of steps since a section."""
+        phi, rough = self._stepped(phi, np.zeros(phi.shape, dtype=bool), None, 0.5, floor)
+        for step in range(first, first + steps):
+            phase = step % len(self.tables.feet)
+            phi, rough = self._stepped(phi, rough, phase, 1.0 if step < first + steps - 1 else 0.5, floor)
+        return phi
 
     def _stepped(self, phi: Array, rough: Any, phase: int | None, time: float, floor: float) -> tuple[Array, Any]:
         """φ after the flow of a phase, if any, and diffusion over `time` steps, in parts that are narrow enough."""
@@ -167,3 +188,27 @@ class Propagator:
         for _ in carry(step_rows, tasks, self.executor):
             pass
         return out, marks
+
+
+def checked_noise(osc: Oscillator) -> NoiseModel:
+    """Return the noise; raises SceneError if there is none, or if it has states of its own."""
+    if osc.noise is None:
+        raise SceneError("the scene has no noise, so a density does not spread; give it a noise model.")
+    if osc.noise.extra_states:
+        extra = len(osc.noise.extra_states)
+        raise SceneError(
+            f"the noise has {extra} state{'s' * (extra > 1)} of its own, so that a density needs {2 + extra} "
+            f"dimensions: with 100 nodes in each, {100 ** (2 + extra) * 8 / 2**30:.3g} GiB. Densities are computed in "
+            "x and v only; use ActionPlot or LeastAction."
+        )
+    return osc.noise
+
+
+def steps_for(osc: Oscillator, states: Array) -> int:
+    """Return an even number of steps in a section interval that resolves how fast small deviations turn or decay.
+
+    The exact flow treats contacts; a step limits only how long noise acts before it is carried along. So the rate is
+    the median over the states, which short contacts do not change.
+    """
+    rates = np.abs(np.linalg.eigvals(VectorField(osc).jacobian(states))).max(axis=1)
+    return max(2 * math.ceil(_STEPS_PER_RADIAN * float(np.median(rates)) * osc.section_interval / 2), _FEWEST_STEPS)

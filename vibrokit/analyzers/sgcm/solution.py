@@ -20,6 +20,7 @@ from vibrokit.analyzers.sgcm.propagator import FlowTables, Propagator
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, quasi_stationary
 from vibrokit.errors import StructureError
 from vibrokit.results.region import Region
+from vibrokit.symbolic.flow_kind import Flow
 
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
@@ -27,6 +28,7 @@ _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole regi
 _NARROWEST = 2.0  # the same on the finest grid, at least
 _COARSER = 0.7  # nodes of the grid for the error estimate, and for exploration, in those of the finest
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
+_UNRESOLVED = 1.0  # in ln p above the floor
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _MARGIN = 3  # nodes around it
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
@@ -55,6 +57,12 @@ class AtIntensity:
     grid: DensityGrid
     found: QuasiStationary
     errors: Mapping[int, float]
+
+    @property
+    def log_density(self) -> Array:
+        """ln p; NaN where it is not resolved, because it is at the floor."""
+        phi = self.found.phi
+        return np.where(phi > phi.min() + _UNRESOLVED, phi, np.nan)
 
     @property
     def at_edge(self) -> float:
@@ -92,9 +100,9 @@ class DensitySolver:
             fine = DensityGrid.of(self.problem.osc, coarse.region, self.shape)
             self._check_resolution(fine, intensities[-1])
             tables = {
-                "long": FlowTables.of(self.problem, coarse, self.steps // 2),
-                "coarse": FlowTables.of(self.problem, coarse, self.steps),
-                "fine": FlowTables.of(self.problem, fine, self.steps),
+                "long": self._tables(coarse, self.steps // 2),
+                "coarse": self._tables(coarse, self.steps),
+                "fine": self._tables(fine, self.steps),
             }
             for intensity, following in itertools.zip_longest(intensities, intensities[1:]):
                 known: dict[str, QuasiStationary] = {}
@@ -118,7 +126,7 @@ class DensitySolver:
         steps = max(self.steps // 2, 2)
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._resolved(grid, _EXPLORED))
-            found = self._found(FlowTables.of(self.problem, grid, steps), stronger, executor)
+            found = self._found(self._tables(grid, steps), stronger, executor)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
             for covered in self._sets(grid, intensity).values():
@@ -160,6 +168,11 @@ class DensitySolver:
         high = np.maximum(around_orbits[:, 1], orbits.max(axis=0) + beyond)
         own = structure.basins.region.bounds
         return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
+
+    def _tables(self, grid: DensityGrid, steps: int) -> FlowTables:
+        stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
+        is_out = self.problem.is_out if self.problem.exit.by_position else None
+        return FlowTables.of(self.problem.scene, stepper, grid, steps, is_out)
 
     def _found(
         self, tables: FlowTables, intensity: float, executor: Executor, start: Array | None = None

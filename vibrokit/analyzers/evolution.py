@@ -1,0 +1,169 @@
+"""How a distribution of states changes in time."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.analyzers.sgcm.propagator import FlowTables, Propagator, checked_noise, steps_for
+from vibrokit.errors import StructureError, shown
+from vibrokit.kernels.choice import ensemble_stepper
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, advance, stage, working
+from vibrokit.results.density_history import DensityHistory
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.region import Region
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.validation import check_means, pair, plain, whole
+from vibrokit.symbolic.flow_kind import Flow
+
+_DEPTH = 60.0  # in ln p below the maximum that is resolved
+_UNRESOLVED = 1.0  # in ln p above the floor
+_KEPT = 0.01  # change of the probability that a finding reports
+_START = 1.5  # standard deviation of a start at one state, in node spacings
+_MOST_INTERVALS = 100_000
+_FEWEST_NODES = 32
+_MOST_STEPS = 4096
+
+Array = NDArray[np.float64]
+
+
+def evolve_density(
+    osc: Oscillator,
+    region: Any,
+    intervals: Sequence[float] = (1, 5, 20),
+    *,
+    start: Any = None,
+    nodes: tuple[int, int] = (240, 240),
+    steps: int | None = None,
+    stepper: Stepper | None = None,
+    executor: Executor | None = None,
+    progress: Progress = None,
+    time_limit: float | None = None,
+) -> DensityHistory:
+    """Compute the probability density of the state at some times.
+
+    ln p is carried along the exact flow and diffuses in closed form, as in `SGCM`.
+
+    Parameters
+    ----------
+    osc : Oscillator
+        With noise that has no states of its own.
+    region : ((float, float), (float, float))
+        Bounds of x and v. What leaves them is lost, and `DensityHistory.mass` shows how much.
+    intervals : sequence of float
+        Times, in section intervals since the start; each is rounded to a whole number of steps.
+    start : array_like (2,), optional
+        A state on the section, about which the start is a normal distribution with a standard deviation of 1.5 node
+        spacings; by default the start is uniform over the region.
+    nodes : (int, int)
+        Nodes in x and in v.
+    steps : int, optional
+        Steps of time in a section interval; by default 1.5 per radian of the fastest oscillation or decay.
+    stepper : Stepper, optional
+    executor : concurrent.futures.Executor, optional
+        Threads of this process by default; the result is the same to the last bit.
+    progress, time_limit
+        As in `find_structure`. If the work is stopped, the times that were reached are returned, marked incomplete.
+
+    Returns
+    -------
+    DensityHistory
+
+    Raises
+    ------
+    SceneError
+        The scene has no noise, or noise with states of its own.
+    StructureError
+        An argument has a value that is not allowed, or the start is outside the region.
+    """
+    check_means(osc, stepper, executor)
+    noise = checked_noise(osc)
+    shape = pair("evolve_density: nodes", nodes)
+    if min(shape) < _FEWEST_NODES:
+        raise StructureError(f"evolve_density: nodes must be {_FEWEST_NODES} or more in x and in v, got {shape}.")
+    wanted = _checked_times(intervals)
+    area = Region.of(region)
+    grid = DensityGrid.of(osc, area, shape)
+    count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
+    whole("evolve_density: steps", count, 1, _MOST_STEPS)
+    phi = _start(grid, start)
+    ends = np.maximum(np.rint(np.array(wanted) * count).astype(int), 1)
+    kept: list[Array] = []
+    masses: list[float] = []
+    findings: list[Finding] = []
+    with working(progress, time_limit) as work, ExitStack() as stack:
+        pool = executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
+        try:
+            chosen = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
+            propagator = Propagator(FlowTables.of(osc, chosen, grid, count), noise.intensity, pool)
+            done = 0
+            with stage("density", unit="steps", total=int(ends[-1])):
+                for end in ends.tolist():
+                    while done < end:
+                        now = min(end - done, count - done % count)
+                        phi = propagator.over(phi, done % count, now, float(phi.max()) - _DEPTH)
+                        done += now
+                        advance(now)
+                    kept.append(np.where(phi > phi.min() + _UNRESOLVED, phi, np.nan))
+                    masses.append(math.exp(grid.mass(phi)))
+        except KeyboardInterrupt as stopped:
+            findings.append(Finding.stopped("evolve_density", stopped))
+        times = ends[: len(kept)] / count * osc.section_interval
+        findings += [
+            Finding.of(Code.MASS_NOT_KEPT, time=float(time), mass=mass)
+            for time, mass in zip(times, masses, strict=True)
+            if abs(mass - 1) > _KEPT
+        ][-1:]
+        arguments = {"region": area, "intervals": wanted, "start": start, "nodes": shape, "steps": count}
+        return DensityHistory(
+            times=times,
+            x=grid.x,
+            v=grid.v,
+            log_density=np.array(kept).reshape(-1, *shape),
+            mass=np.array(masses),
+            scene=scene_data(osc),
+            settings=plain(arguments | {"stepper": stepper}),
+            findings=tuple(findings),
+            stats=work.stats,
+            complete=len(kept) == len(wanted),
+            seconds=work.seconds,
+        )
+
+
+def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
+    given = tuple(intervals) if isinstance(intervals, Sequence | np.ndarray) else (intervals,)
+    for time in given:
+        if isinstance(time, bool) or not isinstance(time, Real) or not 0 < time <= _MOST_INTERVALS:
+            raise StructureError(
+                f"evolve_density: intervals must be numbers above 0 and up to {_MOST_INTERVALS}, got {shown(time)}."
+            )
+    if not given or list(given) != sorted(set(given)):
+        raise StructureError(f"evolve_density: intervals must be one or more in ascending order, got {shown(given)}.")
+    return tuple(float(time) for time in given)
+
+
+def _start(grid: DensityGrid, start: Any) -> Array:
+    """ln p at the start, of probability 1."""
+    if start is None:
+        phi = np.zeros(grid.shape)
+    else:
+        point = np.asarray(start, dtype=float)
+        if point.shape != (2,) or not grid.region.contains(point[None]).all():
+            raise StructureError(
+                f"evolve_density: start must be one state (x, v) inside the region x {grid.region.x}, v "
+                f"{grid.region.v}, got {shown(start)}."
+            )
+        roots = np.eye(2)[None] / (_START * grid.local_spacing(point[None]))[:, None, :]
+        phi = -0.5 * grid.nearest(point[None], roots)
+    return phi - grid.mass(phi)
