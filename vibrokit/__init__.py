@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.problem import ExitProblem as ExitProblem
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
+    from vibrokit.comparison.stationary import StationaryDensity as StationaryDensity
     from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
@@ -78,6 +79,7 @@ _MODULES = {
     "ExitProblem": "vibrokit.analyzers.problem",
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
+    "StationaryDensity": "vibrokit.comparison.stationary",
     "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",
     "Order8": "vibrokit.kernels.order8",

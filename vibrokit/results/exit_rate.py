@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,10 +16,10 @@ class ExitRate:
         Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor.
     intensity : float
         D (m² s⁻³).
-    value : float
-        Exits per unit of time (s⁻¹) while the density that has not left keeps its shape.
-    lower, upper : float
-        Error estimate of the method.
+    log_value : float
+        ln of the rate in s⁻¹, which may be too small for a floating-point number.
+    log_error : float
+        Error estimate of it.
     event : str
         What counts: ``"commitment"``, the first state on the section in the core of another attractor, or
         ``"contact"``, the first time at which position and velocity satisfy the exit condition.
@@ -28,13 +29,30 @@ class ExitRate:
     source: int
     target: int
     intensity: float
-    value: float
-    lower: float
-    upper: float
+    log_value: float
+    log_error: float
     event: str
     method: str
 
     @property
+    def value(self) -> float:
+        """Exits per unit of time (s⁻¹) while the density that has not left keeps its shape."""
+        return math.exp(self.log_value)
+
+    @property
+    def lower(self) -> float:
+        """The rate less its error estimate (s⁻¹)."""
+        return math.exp(self.log_value - self.log_error)
+
+    @property
+    def upper(self) -> float:
+        """The rate with its error estimate added (s⁻¹)."""
+        return math.exp(min(self.log_value + self.log_error, _LARGEST))
+
+    @property
     def mean_time(self) -> float:
         """Mean exit time (s), if there is no other exit."""
-        return 1.0 / self.value
+        return math.exp(min(-self.log_value, _LARGEST))
+
+
+_LARGEST = 709.0  # exponent of the largest floating-point number

@@ -5,8 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+import xarray
+
+from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.labels import source_among
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
@@ -30,6 +35,15 @@ class SGCMResult(Result):
     kind: ClassVar[str] = "sgcm"
 
     @property
+    def intensities(self) -> list[float]:
+        """Noise intensities D (m² s⁻³) at which there are densities, descending."""
+        if "rate_intensity" not in self.data:
+            return []
+        values = Arrays(self.data).numbers("rate_intensity", (None, None), finite=False)
+        found: list[float] = np.nanmax(values, axis=0).tolist()
+        return found
+
+    @property
     def rates(self) -> tuple[ExitRate, ...]:
         """Exit rates of all attractors at all intensities."""
         arrays = Arrays(self.data)
@@ -41,21 +55,44 @@ class SGCMResult(Result):
             for i, intensity in enumerate(one["rate_intensity"].values.tolist()):
                 for k, target in enumerate(one["rate_target"].values.tolist()):
                     log_rate, error = float(one["log_rate"][i, k]), float(one["log_rate_error"][i, k])
-                    if math.isnan(log_rate):
+                    if math.isnan(log_rate) or math.isnan(error):
                         continue
                     found.append(
                         ExitRate(
                             source,
                             target,
                             intensity,
-                            value=math.exp(log_rate),
-                            lower=math.exp(log_rate - error),
-                            upper=math.exp(log_rate + error),
+                            log_value=log_rate,
+                            log_error=error,
                             event=str(one["rate_event"].values),
                             method="SGCM",
                         )
                     )
         return tuple(found)
+
+    def barrier(self, source: int | str) -> xarray.DataArray:
+        """Return −D ln p at the lowest point of the saddles, above the minimum, over intensity (m² s⁻³).
+
+        This is the activation energy as the WKB approximation has it at finite noise. It differs from the limit D → 0
+        by the prefactors, of the order of D; `Result.energy` has the limit.
+
+        Raises
+        ------
+        StructureError
+            There is no density of this attractor, or no saddle.
+        """
+        labels = self.data["source"].values.tolist() if "log_density" in self.data else []
+        label = source_among(labels, source, self.names, "density", "of")
+        points = [point[:2] for saddle in self.section.saddles for point in saddle]
+        if not points:
+            raise StructureError("the structure has no saddle.")
+        one = self.data.isel(source=labels.index(label))
+        places = xarray.DataArray(np.array(points), dims=("saddle_point", "component"))
+        grid = one["log_density"].assign_coords(density_node_x=one["density_x"], density_node_v=one["density_v"])
+        there = grid.interp(density_node_x=places[:, 0], density_node_v=places[:, 1])
+        depths = (one["log_density"].max(("density_node_x", "density_node_v")) - there).min("saddle_point")
+        found: xarray.DataArray = (one["rate_intensity"] * depths).rename("barrier")
+        return found
 
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
         """Draw −D ln p at the least intensity; see `Result.plot_quasi_potential`."""

@@ -12,9 +12,10 @@ def extrapolated(
 ) -> tuple[float, float]:
     """Return the limit of D ln τ as D → 0, and its error estimate.
 
-    D ln τ = ΔU + c D + d D² + …, where c is the logarithm of the prefactor. The three least intensities determine all
-    three terms; the error estimate is what the last one changes. Two determine ΔU and c, and half of c D counts as
-    error. With one, c is not known: the estimate is D ln τ with τ in section intervals, and 3 D counts as error.
+    D ln τ = ΔU + c D + d D² + …, where c is the logarithm of the prefactor. The value is that of the straight line
+    through the two least intensities. Its error estimate is what a third intensity changes by the term of second order,
+    and the errors of ln τ. With two intensities, half of c D counts in place of the former. With one, c is not known:
+    the value is D ln τ with τ in section intervals, and 3 D counts as error.
 
     Parameters
     ----------
@@ -25,13 +26,14 @@ def extrapolated(
     errors : sequence of float
         Error estimates of ln τ.
     """
-    d, y = np.array(intensities), np.array(intensities) * np.array(log_times)
-    propagated = float(np.max(d * np.array(errors)))
+    d = np.array(intensities)
+    y, e = d * np.array(log_times), d * np.array(errors)
     if len(d) == 1:
-        return float(y[0]), 3.0 * float(d[0]) + propagated
-    straight = np.polynomial.polynomial.polyfit(d[-2:], y[-2:], 1)
-    amplified = propagated * (d[-2] + d[-1]) / (d[-2] - d[-1])
+        return float(y[0]), 3.0 * float(d[0]) + float(e[0])
+    slope = (y[-2] - y[-1]) / (d[-2] - d[-1])
+    straight = y[-1] - slope * d[-1]
+    propagated = float(np.hypot(e[-1] * d[-2], e[-2] * d[-1]) / (d[-2] - d[-1]))
     if len(d) == 2:
-        return float(straight[0]), float(abs(straight[1]) * d[-1] * 0.5 + amplified)
-    curved = np.polynomial.polynomial.polyfit(d[-3:], y[-3:], 2)
-    return float(curved[0]), float(abs(curved[0] - straight[0]) + amplified)
+        return float(straight), float(abs(slope) * d[-1] * 0.5) + propagated
+    curved = np.polynomial.polynomial.polyfit(d[-3:], y[-3:], 2)[0]
+    return float(straight), float(abs(curved - straight)) + propagated

@@ -1,0 +1,77 @@
+"""Stationary densities: balance of rates, exact distributions, bad input."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+
+import vibrokit as vk
+from tests.scenes import double_well
+from vibrokit.comparison.stationary import log_stationary
+
+NAMES = ("a", "b", "c", "d")
+
+
+def test_stationary_probabilities_are_the_null_space_of_the_generator():
+    rates = np.random.default_rng(3).uniform(0.1, 2.0, (4, 4))
+    np.fill_diagonal(rates, 0.0)
+    exact = null_space((rates - np.diag(rates.sum(axis=1))).T)[:, 0]
+    np.testing.assert_allclose(
+        np.exp(log_stationary(np.log(rates + np.eye(4)), NAMES)), exact / exact.sum(), rtol=1e-12
+    )
+
+
+def test_rates_too_small_for_floating_point_balance():
+    rates = np.array([[-np.inf, -2000.0], [-1500.0, -np.inf]])
+    found = log_stationary(rates, NAMES)
+    assert found[1] - found[0] == pytest.approx(-500.0)
+
+
+def test_a_state_that_is_never_left_is_refused_by_name():
+    with pytest.raises(vk.errors.StructureError, match="no exit from b"):
+        log_stationary(np.array([[-np.inf, 0.0], [-np.inf, -np.inf]]), NAMES)
+
+
+@pytest.fixture(scope="module")
+def wells():
+    """Double well at ζ = 0.2, and what SGCM finds for both sides at ΔU/D = 10."""
+    osc = double_well(noise=vk.WhiteNoise(intensity=0.02)).replace(damping_ratio=0.2)
+    structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
+    return vk.SGCM(intensities=(0.02,), nodes=(80, 80), steps=40).run(osc, structure)
+
+
+def test_density_of_the_double_well_is_the_one_of_boltzmann(wells):
+    found = vk.StationaryDensity.of(wells, nodes=(81, 81))
+    np.testing.assert_allclose(found.occupancies.values, [[0.5, 0.5]], rtol=0.01)
+    x, v = np.meshgrid(found.x, found.v, indexing="ij")
+    energy = 0.5 * v**2 - 0.5 * x**2 + 0.25 * x**4 + 0.25
+    known = energy < 0.25
+    area = (found.x[1] - found.x[0]) * (found.v[1] - found.v[0])
+    exact = -4 * 0.2 * energy / 0.02
+    exact -= math.log(np.exp(exact).sum() * area)
+    np.testing.assert_allclose(found.log_density[0][known], exact[known], atol=0.15)
+    assert float((found.density[0] * area).sum()) == pytest.approx(1.0, rel=0.02)
+
+
+def test_barrier_at_the_saddle(wells):
+    barrier = float(wells.barrier("left-rest")[0])
+    assert barrier == pytest.approx(4 * 0.2 * 0.25, abs=0.02)  # within D: half of the density of the saddle has left
+
+
+def test_picture_shows_the_saddle(wells):
+    artists = vk.StationaryDensity.of(wells).plot()
+    assert len(artists.saddles) == 1
+    assert "x" in artists.ax.get_xlabel()
+
+
+def test_an_attractor_without_a_density_is_named(wells):
+    alone = vk.SGCM(source=0, intensities=(0.02,), nodes=(80, 80)).run(wells.oscillator, wells_structure(wells))
+    with pytest.raises(vk.errors.StructureError, match="right-rest"):
+        vk.StationaryDensity.of(alone)
+    with pytest.raises(vk.errors.StructureError, match="needs a result of SGCM"):
+        vk.StationaryDensity.of(3)
+
+
+def wells_structure(wells):
+    return vk.find_structure(wells.oscillator, cells=(40, 40), manifolds=False, rng=0)

@@ -1,0 +1,184 @@
+"""StationaryDensity: the density over all attractors, from what SGCM finds for each."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+from scipy.special import logsumexp
+
+from vibrokit.errors import StructureError, shown
+from vibrokit.results.section import Section
+from vibrokit.results.sgcm import SGCMResult
+from vibrokit.text_table import text_table
+
+if TYPE_CHECKING:
+    from vibrokit.plots.quasi_potential import QuasiPotentialArtists
+
+Array = NDArray[np.float64]
+
+_ABOVE = 1.3  # the quasi-potential at the highest saddle
+_LOWEST = -1e6  # in place of −inf where ln p is interpolated
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StationaryDensity:
+    """Stationary probabilities of all attractors and the density on the section, at finite noise.
+
+    The exit rates W between the attractors balance: for two attractors W_IN P_I = W_NI P_N. The density is the sum of
+    the quasi-stationary ones, each with the probability of its attractor. Nothing waits for relaxation between basins,
+    so that it is right also where that takes 10³⁰ periods.
+
+    Attributes
+    ----------
+    intensities : array (count,)
+        Noise intensities D (m² s⁻³), descending.
+    log_occupancies : array (count, attractors)
+        ln of the probability of each attractor.
+    log_density : array (count, nx, nv)
+        ln p at the nodes; −inf where it is not resolved.
+    x, v : array (nx,), (nv,)
+        Nodes at equal distances.
+    section : Section
+        Attractors and saddles.
+    """
+
+    intensities: Array
+    log_occupancies: Array
+    log_density: Array
+    x: Array
+    v: Array
+    section: Section
+
+    @classmethod
+    def of(cls, result: SGCMResult, nodes: tuple[int, int] = (240, 240)) -> StationaryDensity:
+        """Combine what `SGCM` found for every attractor of a scene.
+
+        Raises
+        ------
+        StructureError
+            The result is not one of SGCM, an attractor was not analyzed, or no exit from one was resolved.
+        """
+        if not isinstance(result, SGCMResult):
+            raise StructureError(f"StationaryDensity.of needs a result of SGCM, got {shown(result)}.")
+        names, known = result.section.names, result.intensities
+        labels = result.data["source"].values.tolist() if "log_density" in result.data else []
+        absent = [name for label, name in enumerate(names) if label not in labels]
+        if absent:
+            raise StructureError(
+                f"SGCM has no density of {', '.join(absent)}; run it without source=, and see the result's findings."
+            )
+        log_rates = np.full((len(known), len(names), len(names)), -np.inf)
+        for rate in result.rates:
+            if rate.target >= 0:
+                log_rates[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
+        occupancies = np.array([log_stationary(one, names) for one in log_rates])
+        x, v, parts = _on_one_grid(result, nodes)
+        density = logsumexp(parts + occupancies[:, :, None, None], axis=1)
+        return cls(np.array(known), occupancies, density, x, v, result.section)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, in the order of their labels."""
+        return self.section.names
+
+    @property
+    def occupancies(self) -> xarray.DataArray:
+        """Probability of each attractor, over (intensity, attractor)."""
+        coordinates = {"intensity": self.intensities, "attractor": list(self.names)}
+        return xarray.DataArray(np.exp(self.log_occupancies), coordinates, ("intensity", "attractor"), "occupancy")
+
+    @property
+    def density(self) -> xarray.DataArray:
+        """The stationary density on the section (s m⁻²), over (intensity, x, v)."""
+        coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
+        return xarray.DataArray(np.exp(self.log_density), coordinates, ("intensity", "x", "v"), "density")
+
+    @property
+    def quasi_potential(self) -> xarray.DataArray:
+        """−D ln p (m² s⁻³), 0 at its minimum, over (intensity, x, v); infinite where p is not resolved."""
+        potential = -self.intensities[:, None, None] * self.log_density
+        potential -= potential.min(axis=(1, 2), keepdims=True)
+        coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
+        return xarray.DataArray(potential, coordinates, ("intensity", "x", "v"), "quasi_potential")
+
+    def plot(self, ax: Any = None, intensity: float | None = None) -> QuasiPotentialArtists:
+        """Draw −D ln p at an intensity, the least one by default, with attractors and saddles."""
+        from vibrokit.plots.quasi_potential import quasi_potential_map
+
+        chosen = self.intensities[-1] if intensity is None else intensity
+        found = self.quasi_potential.sel(intensity=chosen, method="nearest").values
+        half = [0.5 * (axis[1] - axis[0]) for axis in (self.x, self.v)]
+        bounds = [(self.x[0] - half[0], self.x[-1] + half[0]), (self.v[0] - half[1], self.v[-1] + half[1])]
+        likeliest = int(np.argmax(self.log_occupancies[-1]))
+        return quasi_potential_map(
+            found,
+            bounds,
+            self.section.points[likeliest],
+            label=likeliest,
+            names=self.names,
+            top=self._shown(found),
+            saddles=self.section.saddles,
+            ax=ax,
+        )
+
+    def _shown(self, potential: Array) -> float | None:
+        """The value up to which a picture tells shades apart: somewhat above the highest saddle."""
+        points = np.concatenate([saddle[:, :2] for saddle in self.section.saddles] or [np.empty((0, 2))])
+        inside = (points >= [self.x[0], self.v[0]]) & (points <= [self.x[-1], self.v[-1]])
+        points = points[inside.all(axis=1)]
+        there = potential[np.searchsorted(self.x, points[:, 0]), np.searchsorted(self.v, points[:, 1])]
+        there = there[np.isfinite(there)]
+        return _ABOVE * float(there.max()) if there.size else None
+
+    def __str__(self) -> str:
+        pairs = zip(self.intensities.tolist(), self.log_occupancies, strict=True)
+        rows = [[f"{d:g}", *(f"{p:.4g}" for p in np.exp(row))] for d, row in pairs]
+        return "\n".join(text_table([["D", *self.names], *rows]))
+
+
+def log_stationary(log_rates: Array, names: tuple[str, ...]) -> Array:
+    """Return ln of the stationary probabilities of a Markov chain, from ln of its rates, shape (n, n).
+
+    By elimination without subtractions (Grassmann, Taksar & Heyman, Oper. Res. 33, 1107, 1985), in logarithms: rates of
+    1e-400 are as good as any. Raises StructureError if a state is never left.
+    """
+    rates = np.array(log_rates, dtype=float)
+    np.fill_diagonal(rates, -np.inf)
+    count = len(rates)
+    left = np.full(count, -np.inf)
+    for k in range(count - 1, 0, -1):
+        left[k] = logsumexp(rates[k, :k])
+        if not np.isfinite(left[k]):
+            raise StructureError(f"no exit from {names[k]} was resolved, so that its probability is not known.")
+        through = rates[:k, k, None] + rates[None, k, :k] - left[k]
+        rates[:k, :k] = np.logaddexp(rates[:k, :k], through)
+    found = np.zeros(count)
+    for k in range(1, count):
+        found[k] = logsumexp(found[:k] + rates[:k, k]) - left[k]
+    stationary: Array = found - logsumexp(found)
+    return stationary
+
+
+def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Array, Array]:
+    """Nodes at equal distances over all regions, and ln p there, shape (intensities, attractors, nx, nv)."""
+    data = result.data
+    axes = {axis: data[f"density_{axis}"].values for axis in ("x", "v")}
+    x, v = (
+        np.linspace(np.nanmin(axis), np.nanmax(axis), count) for axis, count in zip(axes.values(), nodes, strict=True)
+    )
+    points = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
+    known = np.nan_to_num(data["log_density"].values, nan=-np.inf)
+    parts = np.full((known.shape[1], known.shape[0], *nodes), -np.inf)
+    for place, label in enumerate(data["source"].values.tolist()):
+        own = tuple(axes[axis][place][np.isfinite(axes[axis][place])] for axis in ("x", "v"))
+        for number, phi in enumerate(known[place]):
+            resolved = np.maximum(phi[: len(own[0]), : len(own[1])], _LOWEST)
+            found = RegularGridInterpolator(own, resolved, bounds_error=False, fill_value=-np.inf)(points)
+            least = np.min(resolved, where=resolved > _LOWEST, initial=np.inf)
+            parts[number, label] = np.where(found >= least, found, -np.inf)
+    return x, v, parts
