@@ -72,6 +72,11 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert made["t"].energies == pytest.approx(np.array([[0, well], [well, 0]]), rel=1e-6)
         touch = 2 * 0.01 * (0.5 - 0.2 - 0.18 / abs(1 - 0.57**2 + 0.02j * 0.57)) ** 2
         assert made["touch"].energies[0].value == pytest.approx(touch, rel=1e-8)
+    elif page.stem == "density":
+        energy = made["r"].energy("left-rest", "right-rest")
+        assert energy.lower <= 4 * 0.05 * 0.25 <= energy.upper
+        np.testing.assert_allclose(made["d"].occupancies, 0.5, rtol=1e-6)
+        assert made["h"].times == pytest.approx(np.array([0.5, 1, 4]) * made["osc"].section_interval)
     elif page.stem == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
