@@ -7,6 +7,8 @@ import pytest
 
 import vibrokit as vk
 from tests.scenes import scene
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
 
@@ -56,3 +58,20 @@ def test_rates_of_a_double_well(damping):
     (energy,) = found.energies
     assert energy.lower <= barrier <= energy.upper
     assert energy.value == pytest.approx(barrier, rel=0.02)
+
+
+def test_transients_of_the_paper_s_scene_are_those_of_simulated_trajectories():
+    """Of 20 000 trajectories, the distribution function is within 0.013 of the exact one in 99.8 % of cases."""
+    osc, intervals = vk.load_scene("hertz-0.570"), (1, 3, 10)
+    box = np.array([[-0.4, 0.4], [-0.4, 0.4]])
+    history = vk.evolve_density(osc, ((-0.75, 0.75), (-0.9, 0.9)), intervals, start=box, nodes=(400, 400))
+    np.testing.assert_allclose(history.mass, 1.0, atol=0.1)
+    count = 20_000
+    starts = np.random.default_rng(5).uniform(*box.T, (count, 2))
+    for time, interval in enumerate(intervals):
+        ended = run_ensemble(osc, Flow.NOISY, vk.RK4(512), starts, interval, stream=(7, 0)).states
+        marginal = history.marginal("x")[time].values
+        steps = np.diff(history.x)
+        cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (marginal[1:] + marginal[:-1]) * steps)])
+        sampled = np.searchsorted(np.sort(ended[:, 0]), history.x) / count
+        assert np.abs(cumulative / cumulative[-1] - sampled).max() < 0.013

@@ -63,9 +63,9 @@ def evolve_density(
         Bounds of x and v. What leaves them is lost, and `DensityHistory.mass` shows how much.
     intervals : sequence of float
         Times, in section intervals since the start; each is rounded to a whole number of steps.
-    start : array_like (2,), optional
+    start : array_like (2,) or (2, 2), optional
         A state on the section, about which the start is a normal distribution with a standard deviation of 1.5 node
-        spacings; by default the start is uniform over the region.
+        spacings; or bounds of x and v, between which the start is uniform; by default those of the region.
     nodes : (int, int)
         Nodes in x and in v.
     steps : int, optional
@@ -155,15 +155,18 @@ def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
 
 def _start(grid: DensityGrid, start: Any) -> Array:
     """ln p at the start, of probability 1."""
-    if start is None:
-        phi = np.zeros(grid.shape)
+    point = np.asarray(grid.region.bounds if start is None else start, dtype=float)
+    whole_box = point.shape == (2, 2) and bool(np.all(point[:, 0] < point[:, 1]))
+    corners = point.T if whole_box else point.reshape(-1, 2) if point.shape == (2,) else np.full((1, 2), np.nan)
+    if not grid.region.contains(corners).all():
+        raise StructureError(
+            "evolve_density: start must be a state (x, v) or bounds ((x, x), (v, v)), inside the region x "
+            f"{grid.region.x}, v {grid.region.v}, got {shown(start)}."
+        )
+    if whole_box:
+        inside = ((grid.nodes >= point[:, 0]) & (grid.nodes <= point[:, 1])).all(axis=-1)
+        phi = np.where(inside, 0.0, -_DEPTH)
     else:
-        point = np.asarray(start, dtype=float)
-        if point.shape != (2,) or not grid.region.contains(point[None]).all():
-            raise StructureError(
-                f"evolve_density: start must be one state (x, v) inside the region x {grid.region.x}, v "
-                f"{grid.region.v}, got {shown(start)}."
-            )
-        roots = np.eye(2)[None] / (_START * grid.local_spacing(point[None]))[:, None, :]
-        phi = -0.5 * grid.nearest(point[None], roots)
+        roots = np.eye(2)[None] / (_START * grid.local_spacing(corners))[:, None, :]
+        phi = -0.5 * grid.nearest(corners, roots)
     return phi - grid.mass(phi)
