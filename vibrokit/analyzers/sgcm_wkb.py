@@ -25,7 +25,7 @@ from vibrokit.structure.validation import pair, whole
 METHOD = "SGCM-WKB"
 _FEWEST_NODES = 32
 _MOST_STEPS = 4096
-_INTENSITIES = (2.0, 1.4, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
+_INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
 _ALL_GRIDS = 1.6  # memory of all grids together, in units of the finest
@@ -46,7 +46,7 @@ class SGCM(Analyzer):
     Parameters
     ----------
     intensities : tuple of float, optional
-        Noise intensities D (m² s⁻³); by default 2, 1.4 and 1 times the scene's.
+        Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
     nodes : (int, int)
         Nodes in x and in v.
     steps : int, optional

@@ -13,9 +13,10 @@ def extrapolated(
     """Return the limit of D ln τ as D → 0, and its error estimate.
 
     D ln τ = ΔU + c D + d D² + …, where c is the logarithm of the prefactor. The value is that of the straight line
-    through the two least intensities. Its error estimate is what a third intensity changes by the term of second order,
-    and the errors of ln τ. With two intensities, half of c D counts in place of the former. With one, c is not known:
-    the value is D ln τ with τ in section intervals, and 3 D counts as error.
+    through the two least intensities. Its error estimate is twice what a third intensity changes by the term of second
+    order, since terms of higher order are not known, and the errors of ln τ. With two intensities, half of c D counts
+    in place of the former. With one, c is not known: the value is D ln τ with τ in section intervals, and 3 D counts as
+    error.
 
     Parameters
     ----------
@@ -36,4 +37,4 @@ def extrapolated(
     if len(d) == 2:
         return float(straight), float(abs(slope) * d[-1] * 0.5) + propagated
     curved = np.polynomial.polynomial.polyfit(d[-3:], y[-3:], 2)[0]
-    return float(straight), float(abs(curved - straight)) + propagated
+    return float(straight), 2.0 * float(abs(curved - straight)) + propagated
