@@ -1,13 +1,13 @@
 """One step of the Fokker–Planck equation for φ = ln p on the nodes of a grid in (x, v).
 
 A step is the flow without noise, φ(F(y)) = φ(y) − ln |det F′(y)|, followed by diffusion in v. Both are exact where φ is
-a quadratic form: the flow interpolates with cubics, and the diffusion is a Gaussian integral in closed form. Densities
-of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no density is added to a larger one.
+a quadratic form: the flow interpolates with quintics, and the diffusion is a Gaussian integral in closed form. So
+densities of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no density is added to a larger one.
 
-Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) cubics would
-oscillate. There p, not ln p, is interpolated linearly at jumps, curvatures of ridges are limited as in essentially
-non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and the diffusion is a sum over nodes, which
-keeps densities positive and has no overshoot.
+Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) polynomials
+would oscillate. There p, not ln p, is interpolated linearly at jumps, curvatures of ridges are limited as in
+essentially non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and the diffusion is a sum over
+nodes, which has no overshoot.
 """
 
 import math
@@ -21,8 +21,7 @@ ROUGH_RATIO, ROUGH_CHANGE = 2.0, 1.0
 change.
 
 With 10 and 3 the corners of a grid become unstable on a forced linear scene, where 2 and 1 conserve probability to
-rounding. On ``hertz-0.570`` at D = 3e-4, the mean time from the hammering orbit to within 0.03 of the clear one is 2139
-periods with 200² nodes and 1942 with 300²; simulated trajectories give 2010 ± 60.
+rounding.
 """
 WIDEST = 0.55  # spread of a part of the diffusion in node spacings: the closed form is unstable from about 0.7 on
 _JUMP = 3.0  # in φ between neighbouring nodes: beyond it p, not ln p, is interpolated linearly if φ is rough
