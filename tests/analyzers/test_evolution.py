@@ -1,5 +1,7 @@
 """Densities in time: closed forms, records and bad input."""
 
+import concurrent.futures as futures
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -51,6 +53,16 @@ def test_probability_is_kept(history):
     np.testing.assert_allclose(history.mass, 1.0, rtol=2e-3)
     np.testing.assert_allclose(history.marginal("x").integrate("x"), history.mass, rtol=1e-2)
     assert not history.findings
+
+
+@pytest.mark.parametrize("pool", [futures.ThreadPoolExecutor, futures.ProcessPoolExecutor])
+def test_any_executor_gives_the_same_bits(pool):
+    given = {"intervals": (1,), "nodes": (40, 40), "steps": 8}
+    alone = vk.evolve_density(LINEAR, REGION, **given)
+    with pool(3) as executor:
+        shared = vk.evolve_density(LINEAR, REGION, **given, executor=executor)
+    np.testing.assert_array_equal(shared.log_density, alone.log_density)
+    assert np.isfinite(alone.log_density).any()
 
 
 def test_times_are_whole_steps(history):

@@ -230,8 +230,8 @@ def step_rows(
         How often that diffusion is applied.
     floor : float
         φ outside the grid, and the least φ inside.
-    out, out_rough : arrays (nx, nv)
-        Rows `first` to `last` are written: φ, and where it is not smooth.
+    out, out_rough : arrays (last - first, nv)
+        φ in the rows from `first` to `last`, and where it is not smooth.
     first, last : int
     """
     nv = phi.shape[1]
@@ -250,6 +250,6 @@ def step_rows(
             row, other = other, row
         for j in range(nv):
             lighter = weight[i, j] if len(weight) > 0 else 0.0
-            out[i, j] = max(row[j] - lighter, floor)
-        _mark_row(out[i], marks)
-        _widen(marks, out_rough[i])
+            out[i - first, j] = max(row[j] - lighter, floor)
+        _mark_row(out[i - first], marks)
+        _widen(marks, out_rough[i - first])

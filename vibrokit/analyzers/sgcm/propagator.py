@@ -183,13 +183,19 @@ class Propagator:
         parts = max(1, int(np.ceil(time * (self._deviation.max() / WIDEST) ** 2)))
         spreads = self._deviation * np.sqrt(time / parts)
         feet, growth = (_NO_FLOW, phi) if phase is None else (self.tables.feet[phase], self.tables.growth[phase])
-        out, marks = np.empty_like(phi), np.empty_like(rough)
-        given = (phi, rough, feet, growth, self._weight, spreads, parts, floor, out, marks)
+        given = (phi, rough, feet, growth, self._weight, spreads, parts, floor)
         edges = np.linspace(0, len(phi), _BLOCKS + 1).astype(int).tolist()
-        tasks = [(*given, first, last) for first, last in itertools.pairwise(edges)]
-        for _ in carry(step_rows, tasks, self.executor):
-            pass
-        return out, marks
+        tasks = [(given, first, last) for first, last in itertools.pairwise(edges)]
+        blocks = list(carry(_stepped_rows, tasks, self.executor))
+        return np.concatenate([out for out, _ in blocks]), np.concatenate([marks for _, marks in blocks])
+
+
+def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Some rows of φ after a step, and where they are not smooth; in whatever thread or process."""
+    shape = (last - first, given[0].shape[1])
+    out, marks = np.empty(shape), np.empty(shape, dtype=bool)
+    step_rows(*given, out, marks, first, last)
+    return out, marks
 
 
 def checked_noise(osc: Oscillator) -> NoiseModel:
