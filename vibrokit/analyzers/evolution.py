@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from numbers import Real
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.propagator import FlowTables, Propagator, checked_noise, steps_for
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
+from vibrokit.analyzers.sgcm.propagator import MOST_STEPS, FlowTables, Propagator, checked_noise, steps_for
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -24,16 +24,13 @@ from vibrokit.results.density_history import DensityHistory
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.region import Region
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.validation import check_means, pair, plain, whole
+from vibrokit.structure.validation import check_means, plain, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _DEPTH = 60.0  # in ln p below the maximum that is resolved
-_UNRESOLVED = 1.0  # in ln p above the floor
 _KEPT = 0.01  # change of the probability that a finding reports
 _START = 1.5  # standard deviation of a start at one state, in node spacings
 _MOST_INTERVALS = 100_000
-_FEWEST_NODES = 32
-_MOST_STEPS = 4096
 
 Array = NDArray[np.float64]
 
@@ -89,15 +86,13 @@ def evolve_density(
     """
     check_means(osc, stepper, executor)
     noise = checked_noise(osc)
-    shape = pair("evolve_density: nodes", nodes)
-    if min(shape) < _FEWEST_NODES:
-        raise StructureError(f"evolve_density: nodes must be {_FEWEST_NODES} or more in x and in v, got {shape}.")
+    shape = checked_nodes("evolve_density", nodes)
     wanted = _checked_times(intervals)
     area = Region.of(region)
     grid = DensityGrid.of(osc, area, shape)
     count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
-    whole("evolve_density: steps", count, 1, _MOST_STEPS)
-    phi = _start(grid, start)
+    whole("evolve_density: steps", count, 1, MOST_STEPS)
+    begun = _start(grid, start)
     ends = np.maximum(np.rint(np.array(wanted) * count).astype(int), 1)
     kept: list[Array] = []
     masses: list[float] = []
@@ -107,16 +102,9 @@ def evolve_density(
         try:
             chosen = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
             propagator = Propagator(FlowTables.of(osc, chosen, grid, count), noise.intensity, pool)
-            done = 0
-            with stage("density", unit="steps", total=int(ends[-1])):
-                for end in ends.tolist():
-                    while done < end:
-                        now = min(end - done, count - done % count)
-                        phi = propagator.over(phi, done % count, now, float(phi.max()) - _DEPTH)
-                        done += now
-                        advance(now)
-                    kept.append(np.where(phi > phi.min() + _UNRESOLVED, phi, np.nan))
-                    masses.append(math.exp(grid.mass(phi)))
+            for carried in _at(ends.tolist(), propagator, begun):
+                kept.append(resolved(carried))
+                masses.append(math.exp(grid.mass(carried)))
         except KeyboardInterrupt as stopped:
             findings.append(Finding.stopped("evolve_density", stopped))
         times = ends[: len(kept)] / count * osc.section_interval
@@ -139,6 +127,19 @@ def evolve_density(
             complete=len(kept) == len(wanted),
             seconds=work.seconds,
         )
+
+
+def _at(ends: list[int], propagator: Propagator, phi: Array) -> Iterator[Array]:
+    """Yield ln p after some numbers of steps since a section."""
+    done, steps = 0, propagator.tables.steps
+    with stage("density", unit="steps", total=ends[-1]):
+        for end in ends:
+            while done < end:
+                now = min(end - done, steps - done % steps)
+                phi = propagator.over(phi, done % steps, now, float(phi.max()) - _DEPTH)
+                done += now
+                advance(now)
+            yield phi
 
 
 def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:

@@ -11,20 +11,18 @@ import xarray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes
 from vibrokit.analyzers.sgcm.energies import extrapolated
-from vibrokit.analyzers.sgcm.propagator import FlowTables, checked_noise, steps_for
+from vibrokit.analyzers.sgcm.propagator import MOST_STEPS, FlowTables, checked_noise, steps_for
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
-from vibrokit.structure.validation import pair, whole
+from vibrokit.structure.validation import whole
 
 METHOD = "SGCM-WKB"
-_FEWEST_NODES = 32
-_MOST_STEPS = 4096
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
@@ -76,11 +74,9 @@ class SGCM(Analyzer):
     max_memory_gib: float = 2.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", pair("SGCM: nodes", self.nodes))
-        if min(self.nodes) < _FEWEST_NODES:
-            raise StructureError(f"SGCM: nodes must be {_FEWEST_NODES} or more in x and in v, got {self.nodes}.")
+        object.__setattr__(self, "nodes", checked_nodes("SGCM", self.nodes))
         if self.steps is not None:
-            whole("SGCM: steps", self.steps, 2, _MOST_STEPS)
+            whole("SGCM: steps", self.steps, 2, MOST_STEPS)
             if self.steps % 2:
                 raise StructureError(
                     f"SGCM: steps must be an even number, got {self.steps}; the error is estimated with half as many."

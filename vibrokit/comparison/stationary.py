@@ -95,16 +95,18 @@ class StationaryDensity:
     @property
     def density(self) -> xarray.DataArray:
         """The stationary density on the section (s m⁻²), over (intensity, x, v)."""
-        coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
-        return xarray.DataArray(np.exp(self.log_density), coordinates, ("intensity", "x", "v"), "density")
+        return self._over_section(np.exp(self.log_density), "density")
 
     @property
     def quasi_potential(self) -> xarray.DataArray:
         """−D ln p (m² s⁻³), 0 at its minimum, over (intensity, x, v); infinite where p is not resolved."""
         potential = -self.intensities[:, None, None] * self.log_density
         potential -= potential.min(axis=(1, 2), keepdims=True)
+        return self._over_section(potential, "quasi_potential")
+
+    def _over_section(self, values: Array, name: str) -> xarray.DataArray:
         coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
-        return xarray.DataArray(potential, coordinates, ("intensity", "x", "v"), "quasi_potential")
+        return xarray.DataArray(values, coordinates, ("intensity", "x", "v"), name)
 
     def plot(self, ax: Any = None, intensity: float | None = None) -> QuasiPotentialArtists:
         """Draw −D ln p at an intensity, the least one by default, with attractors and saddles."""

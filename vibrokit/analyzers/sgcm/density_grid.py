@@ -13,10 +13,14 @@ from scipy.ndimage import gaussian_filter1d, map_coordinates
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
+from vibrokit.errors import StructureError
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
+from vibrokit.structure.validation import pair
 
+_FEWEST = 32  # nodes along each side
+_UNRESOLVED = 1.0  # in ln p above the floor
 _FEW = 64  # centres, each with its own ellipse
 _FINER = 5  # points along each side of a cell, which decide how much of it a set covers
 _PLACES = 4001  # in x, where the stiffness is evaluated
@@ -144,3 +148,16 @@ class DensityGrid:
             first, last = max(found[0] - margin, 0), min(found[-1] + margin, len(places) - 1)
             bounds.append((places[first], places[last]))
         return Region.of(bounds)
+
+
+def resolved(phi: Array) -> Array:
+    """Return ln p, NaN where it is not resolved, because it is at the floor."""
+    return np.where(phi > phi.min() + _UNRESOLVED, phi, np.nan)
+
+
+def checked_nodes(caller: str, nodes: object) -> tuple[int, int]:
+    """Return numbers of nodes in x and in v; raises StructureError if they are too few, or no such numbers."""
+    shape = pair(f"{caller}: nodes", nodes)
+    if min(shape) < _FEWEST:
+        raise StructureError(f"{caller}: nodes must be {_FEWEST} or more in x and in v, got {shape}.")
+    return shape

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from functools import cached_property
 from typing import Any
@@ -33,6 +34,8 @@ _QUINTIC = 3  # nodes that a quintic reaches to each side
 # steps, 2063 with 16, 2018 with 24, and 1932 with 8.
 _STEPS_PER_RADIAN = 1.5  # of the fastest oscillation or decay: 18 in a forcing period of hertz-0.570
 _FEWEST_STEPS = 8
+MOST_STEPS = 4096
+"""Largest number of steps in a section interval."""
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
 
@@ -156,29 +159,36 @@ class Propagator:
 
         `highest`, if given, keeps the largest φ at each node over all steps.
         """
-        lost, phi, rough = -np.inf, *self._stepped(phi, np.zeros(phi.shape, dtype=bool), None, 0.5, floor)
-        for step in range(self.tables.steps):
-            phase = step % len(self.tables.feet)
-            phi, rough = self._stepped(phi, rough, phase, 1.0 if step < self.tables.steps - 1 else 0.5, floor)
+        lost, carried = -np.inf, phi
+        for phase, carried, rough in self._carried(phi, 0, self.tables.steps, floor):
             if self.tables.crossed:
                 out = self.tables.crossed[phase]
                 if out.any():
-                    lost = np.logaddexp(lost, self.tables.grid.mass(phi, out))
-                    phi[out] = np.maximum(phi[out] + np.log(1 - ABSORBED), floor)
+                    lost = np.logaddexp(lost, self.tables.grid.mass(carried, out))
+                    carried[out] = np.maximum(carried[out] + np.log(1 - ABSORBED), floor)
                     rough |= binary_dilation(out, iterations=_QUINTIC)
             if highest is not None:
-                np.maximum(highest, phi, out=highest)
-        return phi, float(lost)
+                np.maximum(highest, carried, out=highest)
+        return carried, float(lost)
 
     def over(self, phi: Array, first: int, steps: int, floor: float) -> Array:
         """Return φ some steps later, where `first` is the number of steps since a section."""
+        ((_, carried, _),) = deque(self._carried(phi, first, steps, floor), maxlen=1)
+        return carried
+
+    def _carried(
+        self, phi: Array, first: int, steps: int, floor: float
+    ) -> Iterator[tuple[int, Array, NDArray[np.bool_]]]:
+        """Yield the phase, φ and where it is rough after each step; the caller may change the arrays in place."""
         phi, rough = self._stepped(phi, np.zeros(phi.shape, dtype=bool), None, 0.5, floor)
         for step in range(first, first + steps):
             phase = step % len(self.tables.feet)
             phi, rough = self._stepped(phi, rough, phase, 1.0 if step < first + steps - 1 else 0.5, floor)
-        return phi
+            yield phase, phi, rough
 
-    def _stepped(self, phi: Array, rough: Any, phase: int | None, time: float, floor: float) -> tuple[Array, Any]:
+    def _stepped(
+        self, phi: Array, rough: NDArray[np.bool_], phase: int | None, time: float, floor: float
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """φ after the flow of a phase, if any, and diffusion over `time` steps, in parts that are narrow enough."""
         parts = max(1, int(np.ceil(time * (self._deviation.max() / WIDEST) ** 2)))
         spreads = self._deviation * np.sqrt(time / parts)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.cores import around, core, covariances_of, deviations
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, resolved
 from vibrokit.analyzers.sgcm.propagator import FlowTables, Propagator
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, quasi_stationary
 from vibrokit.errors import StructureError
@@ -28,7 +28,6 @@ _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole regi
 _NARROWEST = 2.0  # the same on the finest grid, at least
 _COARSER = 0.7  # nodes of the grid for the error estimate, and for exploration, in those of the finest
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
-_UNRESOLVED = 1.0  # in ln p above the floor
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _MARGIN = 3  # nodes around it
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
@@ -61,8 +60,7 @@ class AtIntensity:
     @property
     def log_density(self) -> Array:
         """ln p; NaN where it is not resolved, because it is at the floor."""
-        phi = self.found.phi
-        return np.where(phi > phi.min() + _UNRESOLVED, phi, np.nan)
+        return resolved(self.found.phi)
 
     @property
     def at_edge(self) -> float:
