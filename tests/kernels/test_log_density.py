@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from vibrokit.kernels.log_density import WIDEST, step_rows
+from vibrokit.kernels.log_density import EMPTY, ROUGH, SMOOTH, SUMMED, WIDEST, parts_of, step_rows
 
 NODES = np.stack(np.meshgrid(np.arange(40.0), np.arange(50.0), indexing="ij"), axis=-1)
-NO_FLOW, NO_WEIGHT = np.empty((0, 0, 2)), np.empty((0, 0))
+NO_WEIGHT = np.empty((0, 0))
 FLOOR = -1e6
-EVERYWHERE_ROUGH = np.ones(NODES.shape[:2], dtype=bool)
+EVERYWHERE_ROUGH = np.full(NODES.shape[:2], ROUGH, dtype=np.uint8)
 
 
 def gaussian(centre, variances):
     return -0.5 * np.sum((NODES - centre) ** 2 / variances, axis=-1)
 
 
-def stepped(phi, feet=NO_FLOW, spread=0.0, parts=0, rough=EVERYWHERE_ROUGH):
-    """φ, and where it is rough, after a step of the flow and parts of diffusion."""
-    out, marks = np.empty_like(phi), np.empty(phi.shape, dtype=bool)
+def stepped(phi, feet=NODES, spread=0.0, parts=1, rough=EVERYWHERE_ROUGH):
+    """φ and its marks after a step of the flow and parts of diffusion."""
+    out, marks = np.empty_like(phi), np.empty(phi.shape, dtype=np.uint8)
     spreads = np.full_like(phi, spread)
     step_rows(phi, rough, feet, np.zeros_like(phi), NO_WEIGHT, spreads, parts, FLOOR, out, marks, 0, len(phi))
     return out, marks
@@ -41,12 +41,38 @@ def test_diffusion_keeps_the_probability_of_a_step():
     assert found.max() <= 1e-12
 
 
+@pytest.mark.parametrize("spread", [1.2, 3.0])
+def test_wide_diffusion_is_a_sum_that_is_exact_at_any_depth(spread):
+    variances = np.array([0.3, 9.0])
+    found, _ = stepped(gaussian([20.0, 25.0], variances), spread=spread, parts=parts_of(spread))
+    widened = variances + np.array([0.0, spread**2])
+    expected = gaussian([20.0, 25.0], widened) + 0.5 * np.log(variances[1] / widened[1])
+    assert parts_of(spread) == 0
+    assert expected.min() < -600
+    np.testing.assert_allclose(found[:, 15:-15], expected[:, 15:-15], rtol=1e-6, atol=1e-6)
+
+
+def test_parts_are_narrow_enough_or_the_diffusion_is_summed():
+    assert [parts_of(WIDEST), parts_of(1.01 * WIDEST), parts_of(SUMMED), parts_of(1.01 * SUMMED)] == [1, 2, 4, 0]
+
+
+def test_nothing_is_computed_where_there_is_nothing():
+    phi = np.full(NODES.shape[:2], FLOOR)
+    phi[20, 25] = 0.0
+    found, marks = stepped(phi, spread=0.5)
+    others = np.arange(len(phi)) != 20
+    assert np.all(found[others] == FLOOR)
+    assert np.all(marks[others] == EMPTY)
+    assert np.all(marks[20, 22:28] == ROUGH)
+    assert np.exp(found[20]).sum() == pytest.approx(1.0, rel=1e-7)  # e⁻¹⁸ is lost, three nodes away
+
+
 @pytest.mark.parametrize("smooth", [True, False])
 def test_transport_of_a_quadratic_form_is_exact(smooth):
     phi = gaussian([20.0, 25.0], np.array([0.03, 0.04]))
     feet = NODES + np.array([0.3, -0.4])
     _, marks = stepped(phi)
-    assert not marks[:, 3:-3].any()
+    assert np.all(marks[:, 3:-3] == SMOOTH)
     found, _ = stepped(phi, feet, rough=marks if smooth else EVERYWHERE_ROUGH)
     inner = (slice(3, -3), slice(3, -3))
     np.testing.assert_allclose(found[inner], gaussian([19.7, 25.4], np.array([0.03, 0.04]))[inner], rtol=1e-11)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from concurrent.futures import Executor
 from typing import Any, ClassVar, dataclass_transform
 
 import xarray
@@ -112,6 +113,7 @@ class Analyzer(ABC):
         osc: Oscillator,
         structure: Structure,
         *,
+        executor: Executor | None = None,
         progress: Progress = None,
         time_limit: float | None = None,
     ) -> Result:
@@ -124,6 +126,9 @@ class Analyzer(ABC):
         osc : Oscillator
         structure : Structure
             What `find_structure` returned for this oscillator.
+        executor : concurrent.futures.Executor, optional
+            Where `SGCM` works on parts of a grid; threads of this process by default, which the other methods always
+            use. The result is the same to the last bit.
         progress : bool or callable, optional
             True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
         time_limit : float, optional
@@ -140,13 +145,13 @@ class Analyzer(ABC):
         StructureError
             The structure is that of another scene, the scene has no such exit, or the source is unknown.
         """
-        sources = self._checked(osc, structure)
+        sources = self._checked(osc, structure, executor)
         analyses: dict[int, Analysis] = {}
         findings: list[Finding] = []
         with working(progress, time_limit) as work:
             try:
                 for attractor in sources:
-                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper)
+                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor)
                     with stage(type(self).__name__, subject=attractor.name):
                         analyses[attractor.label] = self._analyzed(problem)
                     if not analyses[attractor.label].complete:
@@ -170,9 +175,9 @@ class Analyzer(ABC):
                 seconds=work.seconds,
             )
 
-    def _checked(self, osc: Oscillator, structure: Structure) -> tuple[Attractor, ...]:
+    def _checked(self, osc: Oscillator, structure: Structure, executor: Executor | None) -> tuple[Attractor, ...]:
         """Check what a run is given, before any work is done, and return the attractors to leave."""
-        check_means(osc, self.stepper, None)
+        check_means(osc, self.stepper, executor)
         check_belongs(osc, structure)
         if osc.noise is None:
             raise SceneError("the scene has no noise, so nothing leaves an attractor; give it a noise model.")

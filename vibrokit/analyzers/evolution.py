@@ -13,24 +13,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
-from vibrokit.analyzers.sgcm.propagator import MOST_STEPS, FlowTables, Propagator, checked_noise, steps_for
+from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.density_history import DensityHistory
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.region import Region
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.validation import check_means, plain, whole
+from vibrokit.structure.validation import check_means, plain
 from vibrokit.symbolic.flow_kind import Flow
 
 _DEPTH = 60.0  # in ln p below the maximum that is resolved
 _KEPT = 0.01  # change of the probability that a finding reports
 _START = 1.5  # standard deviation of a start at one state, in node spacings
 _MOST_INTERVALS = 100_000
+_SAME = 1e-9  # section intervals: times that differ by less are equal
 
 Array = NDArray[np.float64]
 
@@ -41,8 +44,10 @@ def evolve_density(
     intervals: Sequence[float] = (1, 5, 20),
     *,
     start: Any = None,
+    phase: float = 0.0,
     nodes: tuple[int, int] = (240, 240),
     steps: int | None = None,
+    max_memory_gib: float = 2.0,
     stepper: Stepper | None = None,
     executor: Executor | None = None,
     progress: Progress = None,
@@ -59,14 +64,19 @@ def evolve_density(
     region : ((float, float), (float, float))
         Bounds of x and v. What leaves them is lost, and `DensityHistory.mass` shows how much.
     intervals : sequence of float
-        Times, in section intervals since the start; each is rounded to a whole number of steps.
-    start : array_like (2,) or (2, 2), optional
-        A state on the section, about which the start is a normal distribution with a standard deviation of 1.5 node
-        spacings; or bounds of x and v, between which the start is uniform; by default those of the region.
+        Times, in section intervals since the start.
+    start : array_like (2,) or (2, 2), or Attractor, optional
+        A state, about which the start is a normal distribution with a standard deviation of 1.5 node spacings; the
+        points of an attractor, about each of which it is the same; or bounds of x and v, between which the start is
+        uniform; by default those of the region.
+    phase : float
+        When it starts, in section intervals since a section, from 0 to 1.
     nodes : (int, int)
         Nodes in x and in v.
     steps : int, optional
-        Steps of time in a section interval; by default 1.5 per radian of the fastest oscillation or decay.
+        How often noise acts in a section interval; even. By default 2 per radian of the fastest oscillation or decay.
+    max_memory_gib : float
+        Memory that the flow between the nodes may take (GiB).
     stepper : Stepper, optional
     executor : concurrent.futures.Executor, optional
         Threads of this process by default; the result is the same to the last bit.
@@ -89,31 +99,38 @@ def evolve_density(
     shape = checked_nodes("evolve_density", nodes)
     wanted = _checked_times(intervals)
     area = Region.of(region)
+    begins = _checked_phase(phase)
     grid = DensityGrid.of(osc, area, shape)
     count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
-    whole("evolve_density: steps", count, 1, MOST_STEPS)
+    check_steps("evolve_density", count)
+    check_memory(shape, DensityFlow.memory(shape, count, osc.autonomous), count, max_memory_gib)
     begun = _start(grid, start)
-    ends = np.maximum(np.rint(np.array(wanted) * count).astype(int), 1)
     kept: list[Array] = []
     masses: list[float] = []
+    changes: list[float] = []
     findings: list[Finding] = []
     with working(progress, time_limit) as work, ExitStack() as stack:
         pool = executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
         try:
             chosen = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
-            propagator = Propagator(FlowTables.of(osc, chosen, grid, count), noise.intensity, pool)
-            for carried in _at(ends.tolist(), propagator, begun):
+            flow = DensityFlow(osc, chosen, grid, count, watches_edge=True)
+            propagator = Propagator(flow, noise.intensity, pool)
+            for carried, change in _at([begins + time for time in wanted], begins, propagator, begun):
                 kept.append(resolved(carried))
                 masses.append(math.exp(grid.mass(carried)))
+                changes.append(change)
         except KeyboardInterrupt as stopped:
             findings.append(Finding.stopped("evolve_density", stopped))
-        times = ends[: len(kept)] / count * osc.section_interval
-        findings += [
-            Finding.of(Code.MASS_NOT_KEPT, time=float(time), mass=mass)
-            for time, mass in zip(times, masses, strict=True)
-            if abs(mass - 1) > _KEPT
-        ][-1:]
-        arguments = {"region": area, "intervals": wanted, "start": start, "nodes": shape, "steps": count}
+        times = np.array(wanted[: len(kept)]) * osc.section_interval
+        findings += _findings(times, masses, changes)
+        arguments = {
+            "region": area,
+            "intervals": wanted,
+            "start": _plain_start(start),
+            "phase": phase,
+            "nodes": shape,
+            "steps": count,
+        }
         return DensityHistory(
             times=times,
             x=grid.x,
@@ -129,17 +146,40 @@ def evolve_density(
         )
 
 
-def _at(ends: list[int], propagator: Propagator, phi: Array) -> Iterator[Array]:
-    """Yield ln p after some numbers of steps since a section."""
-    done, steps = 0, propagator.tables.steps
-    with stage("density", unit="steps", total=ends[-1]):
+def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> Iterator[tuple[Array, float]]:
+    """Yield ln p at some times, in section intervals, and ln of what truncation has changed in its probability."""
+    flow, change = propagator.flow, 0.0
+    interval = flow.scene.section_interval
+    with stage("density", unit="section intervals", total=math.ceil(ends[-1])):
         for end in ends:
-            while done < end:
-                now = min(end - done, steps - done % steps)
-                phi = propagator.over(phi, done % steps, now, float(phi.max()) - _DEPTH)
-                done += now
-                advance(now)
-            yield phi
+            while now < end - _SAME:
+                section = math.floor(now + _SAME)
+                until = min(section + 1.0, end)
+                whole_interval = now < section + _SAME and until > section + 1 - _SAME
+                legs = flow.legs if whole_interval else flow.between(*(interval * (t - section) for t in (now, until)))
+                phi, added = propagator.along(legs, phi, float(phi.max()) - _DEPTH)
+                change, now = change + added, until
+                advance()
+            yield phi, change
+
+
+def _findings(times: Array, masses: list[float], changes: list[float]) -> list[Finding]:
+    """What was lost over the edge, and what truncation would have changed, where they are largest."""
+    found = [
+        Finding.of(Code.MASS_NOT_KEPT, time=float(time), mass=mass)
+        for time, mass in zip(times, masses, strict=True)
+        if abs(mass - 1) > _KEPT
+    ][-1:]
+    if changes and max(map(abs, changes)) > _KEPT:
+        worst = int(np.argmax(np.abs(changes)))
+        found.append(Finding.of(Code.DENSITY_TRUNCATED, time=float(times[worst]), change=math.expm1(changes[worst])))
+    return found
+
+
+def _checked_phase(phase: object) -> float:
+    if isinstance(phase, bool) or not isinstance(phase, Real) or not 0 <= float(phase) < 1:
+        raise StructureError(f"evolve_density: phase must be a number from 0 to below 1, got {shown(phase)}.")
+    return float(phase)
 
 
 def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
@@ -156,18 +196,25 @@ def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
 
 def _start(grid: DensityGrid, start: Any) -> Array:
     """ln p at the start, of probability 1."""
-    point = np.asarray(grid.region.bounds if start is None else start, dtype=float)
-    whole_box = point.shape == (2, 2) and bool(np.all(point[:, 0] < point[:, 1]))
-    corners = point.T if whole_box else point.reshape(-1, 2) if point.shape == (2,) else np.full((1, 2), np.nan)
+    if isinstance(start, Attractor):
+        corners, box = start.points[:, :2], None
+    else:
+        given = np.asarray(grid.region.bounds if start is None else start, dtype=float)
+        box = given if given.shape == (2, 2) and bool(np.all(given[:, 0] < given[:, 1])) else None
+        corners = box.T if box is not None else given[None] if given.shape == (2,) else np.full((1, 2), np.nan)
     if not grid.region.contains(corners).all():
         raise StructureError(
-            "evolve_density: start must be a state (x, v) or bounds ((x, x), (v, v)), inside the region x "
-            f"{grid.region.x}, v {grid.region.v}, got {shown(start)}."
+            "evolve_density: start must be a state (x, v), an Attractor, or bounds ((x, x), (v, v)), inside the region "
+            f"x {grid.region.x}, v {grid.region.v}, got {shown(start)}."
         )
-    if whole_box:
-        inside = ((grid.nodes >= point[:, 0]) & (grid.nodes <= point[:, 1])).all(axis=-1)
+    if box is not None:
+        inside = ((grid.nodes >= box[:, 0]) & (grid.nodes <= box[:, 1])).all(axis=-1)
         phi = np.where(inside, 0.0, -_DEPTH)
     else:
-        roots = np.eye(2)[None] / (_START * grid.local_spacing(corners))[:, None, :]
+        roots = np.eye(2) / (_START * grid.local_spacing(corners))[:, None, :]
         phi = -0.5 * grid.nearest(corners, roots)
     return phi - grid.mass(phi)
+
+
+def _plain_start(start: Any) -> Any:
+    return start.points[:, :2].tolist() if isinstance(start, Attractor) else start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from concurrent.futures import Executor
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +38,8 @@ class ExitProblem:
     exit : Exit
     stepper : Stepper or None
         The one that the user asked for; None for the defaults.
+    executor : Executor or None
+        Where a method may do parts of its work; None for threads of this process.
     """
 
     osc: Oscillator
@@ -44,6 +47,7 @@ class ExitProblem:
     attractor: Attractor
     exit: Exit
     stepper: Stepper | None = None
+    executor: Executor | None = None
 
     @property
     def source(self) -> int:

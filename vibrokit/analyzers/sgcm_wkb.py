@@ -11,10 +11,11 @@ import xarray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes
 from vibrokit.analyzers.sgcm.energies import extrapolated
-from vibrokit.analyzers.sgcm.propagator import MOST_STEPS, FlowTables, checked_noise, steps_for
-from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
+from vibrokit.analyzers.sgcm.propagator import checked_noise
+from vibrokit.analyzers.sgcm.solution import CONVERGED, AtIntensity, DensitySolver
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
@@ -24,9 +25,9 @@ from vibrokit.structure.validation import whole
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
+_MOST_SAMPLES = 1_000_000
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
-_ALL_GRIDS = 1.6  # memory of all grids together, in units of the finest
 
 
 class SGCM(Analyzer):
@@ -45,12 +46,16 @@ class SGCM(Analyzer):
     ----------
     intensities : tuple of float, optional
         Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
-    nodes : (int, int)
-        Nodes in x and in v.
+    nodes : (int, int), optional
+        Nodes in x and in v; by default so many that the narrowest density around the attractor is 4 node spacings wide.
     steps : int, optional
-        Steps of time in a section interval; even. By default 1.5 per radian of the fastest oscillation or decay.
+        How often noise acts in a section interval; even. By default 2 per radian of the fastest oscillation or decay.
     max_memory_gib : float
         Memory that the tables may take (GiB).
+    samples : int, optional
+        If given, the transition over one section interval is a matrix of sampled transitions, as published, with so
+        many trajectories from each cell. It is there for comparison: it does not see what is less likely than one in
+        `samples`.
 
     Raises
     ------
@@ -59,8 +64,10 @@ class SGCM(Analyzer):
 
     Notes
     -----
-    Each rate has an error estimate: what 0.7 times the nodes change, and a third of what doubling the steps changes.
-    An activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
+    A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
+    reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
+    Their difference is its error estimate, with a third of what halving the steps, or another sample, changes. An
+    activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
     1990), without its matrix of sampled transitions, which cannot contain a probability of 1e-9.
@@ -69,18 +76,18 @@ class SGCM(Analyzer):
     result: ClassVar[type[Result]] = SGCMResult
 
     intensities: tuple[float, ...] | None = None
-    nodes: tuple[int, int] = (240, 240)
+    nodes: tuple[int, int] | None = None
     steps: int | None = None
     max_memory_gib: float = 2.0
+    samples: int | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", checked_nodes("SGCM", self.nodes))
+        if self.nodes is not None:
+            object.__setattr__(self, "nodes", checked_nodes("SGCM", self.nodes))
         if self.steps is not None:
-            whole("SGCM: steps", self.steps, 2, MOST_STEPS)
-            if self.steps % 2:
-                raise StructureError(
-                    f"SGCM: steps must be an even number, got {self.steps}; the error is estimated with half as many."
-                )
+            check_steps("SGCM", self.steps)
+        if self.samples is not None:
+            whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
         memory = self.max_memory_gib
         if isinstance(memory, bool) or not isinstance(memory, Real) or not memory > 0:
             raise StructureError(f"SGCM: max_memory_gib must be a positive number of GiB, got {shown(memory)}.")
@@ -94,12 +101,12 @@ class SGCM(Analyzer):
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
         orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
         steps = self.steps or steps_for(problem.osc, np.concatenate(orbits))
-        self._check_memory(problem, steps)
         intensities = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
+        solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
         solved: list[AtIntensity] = []
         stopped: tuple[Finding, ...] = ()
         try:
-            solved.extend(DensitySolver(problem, self.nodes, steps).solve(intensities))
+            solved.extend(solver.solve(intensities))
         except KeyboardInterrupt as interrupt:
             if not solved:
                 raise
@@ -110,15 +117,6 @@ class SGCM(Analyzer):
             (*_findings(problem, solved), *stopped),
             complete=not stopped,
         )
-
-    def _check_memory(self, problem: ExitProblem, steps: int) -> None:
-        needed = _ALL_GRIDS * FlowTables.memory(self.nodes, 1 if problem.scene.autonomous else steps)
-        if needed > self.max_memory_gib:
-            nx, nv = self.nodes
-            raise StructureError(
-                f"tables of {nx} × {nv} nodes and {steps} steps need {needed:.3g} GiB of memory, and max_memory_gib is "
-                f"{self.max_memory_gib:.3g}; lower nodes or steps, or raise max_memory_gib."
-            )
 
 
 def _checked_intensities(intensities: tuple[float, ...]) -> tuple[float, ...]:
@@ -137,7 +135,7 @@ def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Activati
     for target in solved[0].errors:
         if not all(target in one.errors for one in solved):
             continue
-        times = [-one.found.log_rates[target] for one in solved]
+        times = [-one.log_rates[target] for one in solved]
         value, error = extrapolated([s.intensity for s in solved], times, [one.errors[target] for one in solved])
         lower, upper = max(value - error, 0.0), max(value + error, 0.0)
         found.append(
@@ -158,7 +156,7 @@ def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Activati
 def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
     targets = sorted({target for one in solved for target in one.errors})
     interval = problem.osc.section_interval
-    logs = np.array([[one.found.log_rates.get(target, np.nan) for target in targets] for one in solved])
+    logs = np.array([[one.log_rates.get(target, np.nan) for target in targets] for one in solved])
     errors = np.array([[one.errors.get(target, np.nan) for target in targets] for one in solved])
     last = solved[-1]
     uniform = DensityGrid(np.linspace(*last.grid.region.x, last.grid.shape[0]), last.grid.v)
@@ -205,17 +203,17 @@ def _findings(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Finding,
     """What limits the rates."""
     found = []
     for one in solved:
-        if not one.found.converged:
+        if one.change > CONVERGED:
             found.append(
                 Finding.of(
                     Code.DENSITY_NOT_CONVERGED,
                     problem.source,
                     intensity=one.intensity,
                     intervals=one.found.intervals,
-                    change=one.found.change,
+                    change=one.change,
                 )
             )
-        if one.at_edge > max(one.found.log_rates.values()) + math.log(_EDGE):
+        if one.at_edge > max(one.found.log_rates.values(), default=0.0) + math.log(_EDGE):
             found.append(
                 Finding.of(Code.DENSITY_AT_EDGE, problem.source, intensity=one.intensity, share=math.exp(one.at_edge))
             )

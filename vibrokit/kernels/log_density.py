@@ -7,7 +7,9 @@ densities of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no 
 Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) polynomials
 would oscillate. There p, not ln p, is interpolated linearly at jumps, curvatures of ridges are limited as in
 essentially non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and the diffusion is a sum over
-nodes, which has no overshoot.
+nodes, which has no overshoot. Where the diffusion is wider than a node spacing it is that sum everywhere.
+
+Most nodes hold no probability that matters at a time: φ has a floor there, and nothing is computed.
 """
 
 import math
@@ -24,12 +26,25 @@ With 10 and 3 the corners of a grid become unstable on a forced linear scene, wh
 rounding.
 """
 WIDEST = 0.55  # spread of a part of the diffusion in node spacings: the closed form is unstable from about 0.7 on
+SUMMED = 1.1
+"""Spread in node spacings from which the diffusion is a sum over nodes: the trapezoidal rule is exact to 1e-7 there.
+
+The closed form, in parts of `WIDEST`, takes longer from about the same spread on.
+"""
+SMOOTH, ROUGH, EMPTY = 0, 1, 2
+"""What a quintic would reach: a smooth φ, a rough one, or none above the floor."""
 _JUMP = 3.0  # in φ between neighbouring nodes: beyond it p, not ln p, is interpolated linearly if φ is rough
-_REACH = 6  # nodes on each side in the sum that replaces the closed form; ten spreads at the widest
+_REACH = 10.0  # spreads on each side of a density that diffusion may reach
+_NEGLIGIBLE = 40.0  # in the exponent: e⁻⁴⁰ of a sum is less than its rounding errors
+_UNDERFLOW = 600.0  # in the exponent: sums over a row are taken relative to its maximum, in floating point
+_CUT = 1.0  # in φ: the flow compresses areas by less in a step, so that what is at the floor stays there
+_SMALLEST = 1e-280  # sums below it may have lost terms to underflow
+_NARROWEST = 0.3  # 1 − s²φ″ in the closed form: it is less only where p has a cusp below the spread
 _SERIES = 0.05  # below it, ln(1 − x) is a series of eight terms, whose error is less than 1e-12
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Marks = NDArray[np.uint8]
 
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
@@ -74,12 +89,16 @@ def _row_value(row: Array, b: int, place: float) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _mark_row(row: Array, rough: Flags) -> None:
-    """Mark between which nodes of a row φ is rough; the outermost places count as rough."""
-    last = len(row) - 2
-    rough[0] = rough[last] = rough[last + 1] = True
-    for b in range(1, last):
-        rough[b] = _rough(row[b - 1] - 2.0 * row[b] + row[b + 1], row[b] - 2.0 * row[b + 1] + row[b + 2])
+def _mark_row(row: Array, first: int, last: int, rough: Flags) -> None:
+    """Mark after which of the nodes from first to last of a row φ is rough; the outermost places count as rough."""
+    nv = len(row)
+    rough[0] = rough[nv - 2] = rough[nv - 1] = True
+    first, last = max(first, 1), min(last, nv - 3)
+    part, marked = row[first - 1 : last + 3], rough[first : last + 1]
+    for k in range(len(marked)):  # `_rough` without branches, which the processor does for several nodes at once
+        a, b = part[k] - 2.0 * part[k + 1] + part[k + 2], part[k + 1] - 2.0 * part[k + 2] + part[k + 3]
+        common = 0.5 * (abs(a + b) - abs(a - b))
+        marked[k] = abs(a - b) > ROUGH_RATIO * max(common, 0.0) + ROUGH_CHANGE
 
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
@@ -98,7 +117,7 @@ def _weights(t: float) -> tuple[float, float, float, float, float, float]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _transport_row(phi: Array, rough: Flags, feet: Array, growth: Array, floor: float, out: Array) -> None:
+def _transport_row(phi: Array, marks: Marks, feet: Array, growth: Array, floor: float, out: Array) -> None:
     """Apply the flow, for the nodes of one row of `out`: by quintics where φ is smooth, by limited cubics elsewhere."""
     nx, nv = phi.shape
     lines = np.empty(6)
@@ -108,10 +127,15 @@ def _transport_row(phi: Array, rough: Flags, feet: Array, growth: Array, floor: 
             out[j] = floor
             continue
         a, b = min(int(s), nx - 2), min(int(t), nv - 2)
+        if marks[a, b] == EMPTY and marks[a + 1, b] == EMPTY:
+            out[j] = floor
+            continue
         smooth = 2 <= a < nx - 3
         if smooth:
-            for k in range(6):
-                smooth = smooth and not rough[a - 2 + k, b]
+            worst = (
+                marks[a - 2, b] | marks[a - 1, b] | marks[a, b] | marks[a + 1, b] | marks[a + 2, b] | marks[a + 3, b]
+            )
+            smooth = worst == SMOOTH
         if smooth:
             u0, u1, u2, u3, u4, u5 = _weights(t - b)
             for k in range(6):
@@ -134,72 +158,136 @@ def _transport_row(phi: Array, rough: Flags, feet: Array, growth: Array, floor: 
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _widen(marks: Flags, rough: Flags) -> None:
-    """Mark where a quintic would reach across a place where φ is rough, or over the edge."""
-    last = len(marks) - 1
-    for b in range(1, last):
-        rough[b] = marks[b - 1] | marks[b] | marks[b + 1]
-    rough[0] = rough[1] = rough[last - 2] = rough[last - 1] = rough[last] = True
+def _mark_reach(rough: Flags, first: int, last: int, marks: Marks) -> None:
+    """Mark what a quintic between the nodes b and b + 1 would reach; only nodes from first to last exceed the floor."""
+    nv = len(rough)
+    marks[:] = EMPTY
+    if last < first:
+        return
+    for b in range(max(first - 3, 0), min(last + 3, nv)):
+        smooth = 2 <= b < nv - 3 and not (rough[b - 1] | rough[b] | rough[b + 1])
+        marks[b] = SMOOTH if smooth else ROUGH
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _summed(row: Array, j: int, spread: float) -> float:
-    """Diffusion as a sum over nodes, with Gaussian weights that add up to 1."""
+def _summed(row: Array, j: int, spread: float, reach: int) -> float:
+    """Diffusion at one node as a sum over nodes in logarithms, with Gaussian weights that add up to 1."""
     top = -math.inf
-    low, high = max(-_REACH, -j), min(_REACH, len(row) - 1 - j)
+    low, high = max(-reach, -j), min(reach, len(row) - 1 - j)
     for k in range(low, high + 1):
         top = max(top, row[j + k] - 0.5 * (k / spread) ** 2)
     total = weights = 0.0
-    for k in range(-_REACH, _REACH + 1):
+    for k in range(-reach, reach + 1):
         exponent = -0.5 * (k / spread) ** 2
-        if exponent > -40.0:
+        if exponent > -_NEGLIGIBLE:
             weights += math.exp(exponent)
-        if low <= k <= high and row[j + k] + exponent - top > -40.0:
+        if low <= k <= high and row[j + k] + exponent - top > -_NEGLIGIBLE:
             total += math.exp(row[j + k] + exponent - top)
     return top + math.log(total / weights)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _diffuse_row(row: Array, spreads: Array, out: Array, rough: Flags, summed: Flags) -> None:
-    """Apply a part of the diffusion to a row that is marked; `summed` is a workspace."""
+def _sum_row(row: Array, spreads: Array, wanted: Flags, first: int, last: int, floor: float, out: Array) -> None:
+    """Diffusion at the wanted nodes as sums over the nodes from first to last; p is 0 elsewhere."""
     nv = len(row)
-    summed[:2] = summed[nv - 2 :] = True
-    for j in range(2, nv - 2):
-        below = row[j - 2] - 2.0 * row[j - 1] + row[j]
-        here = row[j - 1] - 2.0 * row[j] + row[j + 1]
-        above = row[j] - 2.0 * row[j + 1] + row[j + 2]
-        slope = 0.5 * (row[j + 1] - row[j - 1]) - (above - below) / 12.0
-        variance = spreads[j] * spreads[j]
-        x = variance * (here - (above - 2.0 * here + below) / 12.0)
-        tail = 1.0 / 3.0 + x * (0.25 + x * (0.2 + x * (1.0 / 6.0 + x * (1.0 / 7.0 + x * 0.125))))
-        logarithm = x * (1.0 + x * (0.5 + x * tail))  # −ln(1 − x)
-        out[j] = row[j] + 0.5 * (variance * slope * slope / (1.0 - x) + logarithm)
-        summed[j] = rough[j - 1] | rough[j] | (abs(x) > _SERIES)
+    top = row[first : last + 1].max()
+    depth = _NEGLIGIBLE + min(top - floor, _UNDERFLOW)
+    density, weights = np.empty(nv), np.empty(nv)
+    density[:] = -1.0  # not known yet
+    whole, tabulated, reach = 1.0, 0.0, 0
     for j in range(nv):
-        if summed[j]:
-            out[j] = _where_rough(row, j, spreads[j], rough)
+        if not wanted[j]:
+            continue
+        spread = spreads[j]
+        if spread != tabulated:
+            tabulated, whole = spread, -1.0
+            reach = min(int(spread * math.sqrt(2.0 * depth)) + 1, nv - 1)
+            for k in range(reach + 1):
+                weights[k] = math.exp(-0.5 * (k / spread) ** 2)
+                whole += 2.0 * weights[k]
+        total, low, high = 0.0, max(first, j - reach), min(last, j + reach)
+        for k in range(low, high + 1):
+            if density[k] < 0.0:
+                density[k] = math.exp(row[k] - top)
+        for k in range(low, min(j, high + 1)):
+            total += density[k] * weights[j - k]
+        for k in range(max(low, j), high + 1):
+            total += density[k] * weights[k - j]
+        out[j] = top + math.log(total / whole) if total > 0.0 else floor
+        if total < _SMALLEST and top - floor > _UNDERFLOW:
+            out[j] = _summed(row, j, spread, reach)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _where_rough(row: Array, j: int, spread: float, rough: Flags) -> float:
-    """Diffusion at one node, where the series does not apply."""
-    if spread == 0.0:
-        return row[j]
-    if 2 <= j < len(row) - 2 and not (rough[j - 1] or rough[j]):
-        below = row[j - 2] - 2.0 * row[j - 1] + row[j]
-        here = row[j - 1] - 2.0 * row[j] + row[j + 1]
-        above = row[j] - 2.0 * row[j + 1] + row[j + 2]
-        slope = 0.5 * (row[j + 1] - row[j - 1]) - (above - below) / 12.0
-        narrowing = 1.0 - spread * spread * (here - (above - 2.0 * here + below) / 12.0)
-        if narrowing > 0.3:  # it is less only where p has a cusp below the spread
-            return row[j] + 0.5 * ((spread * slope) ** 2 / narrowing - math.log(narrowing))
-    return _summed(row, j, spread)
+def _closed_row(
+    row: Array, spreads: Array, first: int, last: int, out: Array, rough: Flags, summed: Flags, curvatures: Array
+) -> bool:
+    """Apply diffusion in closed form to the nodes from first to last of a row that is marked.
+
+    Nodes that need a sum are marked in `summed`; `curvatures` is a workspace. Returns whether there are any.
+    """
+    nv, some = len(row), False
+    out[:] = row
+    summed[:] = False
+    summed[first : last + 1] = True
+    low, high = max(first, 2), min(last, nv - 3)
+    part, closed, own = row[low - 2 : high + 3], out[low : high + 1], spreads[low : high + 1]
+    bent = curvatures[low : high + 1]
+    for k in range(len(closed)):  # without branches, which the processor does for several nodes at once
+        a, b, c, d, e = part[k], part[k + 1], part[k + 2], part[k + 3], part[k + 4]
+        slope = (8.0 * (d - b) - (e - a)) / 12.0
+        variance = own[k] * own[k]
+        x = variance * (16.0 * (b + d) - (a + e) - 30.0 * c) / 12.0
+        tail = 1.0 / 3.0 + x * (0.25 + x * (0.2 + x * (1.0 / 6.0 + x * (1.0 / 7.0 + x * 0.125))))
+        logarithm = x * (1.0 + x * (0.5 + x * tail))  # −ln(1 − x)
+        closed[k] = c + 0.5 * (variance * slope * slope / (1.0 - x) + logarithm)
+        bent[k] = x
+    for j in range(first, last + 1):
+        spread = spreads[j]
+        if spread == 0.0:
+            out[j] = row[j]
+            summed[j] = False
+        elif low <= j <= high and spread <= WIDEST and not (rough[j - 1] or rough[j]):
+            narrowing = 1.0 - curvatures[j]
+            summed[j] = narrowing < _NARROWEST
+            if abs(curvatures[j]) > _SERIES and not summed[j]:
+                slope = (8.0 * (row[j + 1] - row[j - 1]) - (row[j + 2] - row[j - 2])) / 12.0
+                out[j] = row[j] + 0.5 * ((spread * slope) ** 2 / narrowing - math.log(narrowing))
+        some |= summed[j]
+    return some
+
+
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _above(row: Array, floor: float) -> tuple[int, int]:
+    """The first and the last node of a row above the floor; the last is before the first if there is none."""
+    first, last = 0, len(row) - 1
+    while first <= last and not row[first] > floor:
+        first += 1
+    while last > first and not row[last] > floor:
+        last -= 1
+    return first, last
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def mark_rows(phi: Array, floor: float, marks: Marks) -> None:
+    """Mark what a quintic between the nodes would reach, in each row of φ."""
+    rough = np.empty(phi.shape[1], dtype=np.bool_)
+    for i in range(len(phi)):
+        low, high = _above(phi[i], floor)
+        if high >= low:
+            _mark_row(phi[i], low - 5, high + 5, rough)
+        _mark_reach(rough, low, high, marks[i])
+
+
+def parts_of(widest: float) -> int:
+    """Return the number of parts of a diffusion with a largest spread (node spacings); 0 if it is a sum over nodes."""
+    return 0 if widest > SUMMED else max(1, math.ceil((widest / WIDEST) ** 2))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def step_rows(
     phi: Array,
-    rough: Flags,
+    marks: Marks,
     feet: Array,
     growth: Array,
     weight: Array,
@@ -207,49 +295,54 @@ def step_rows(
     parts: int,
     floor: float,
     out: Array,
-    out_rough: Flags,
+    out_marks: Marks,
     first: int,
     last: int,
 ) -> None:
-    """Apply the flow, if there are feet, and then diffusion to rows of φ.
+    """Apply the flow and then diffusion to rows of φ.
 
     Parameters
     ----------
     phi : array (nx, nv)
-    rough : bool array (nx, nv)
-        Where φ is not smooth enough for quintics, as an earlier call left it in `out_rough`; used with feet only.
-    feet : array (nx, nv, 2) or (0, 0, 2)
-        Where the motion that ends at each node comes from, in node spacings; NaN if it diverges.
+    marks : uint8 array (nx, nv)
+        What a quintic would reach, as an earlier call left it in `out_marks`, or `mark_rows`.
+    feet : array (nx, nv, 2)
+        Where φ is taken from for each node, in node spacings; NaN if it is nowhere.
     growth : array (nx, nv)
-        ln of the factor by which the flow compresses areas there.
+        Added to it.
     weight : array (nx, nv) or (0, 0)
         Added to φ while it diffuses.
     spreads : array (nx, nv)
-        Standard deviation of the velocity that noise adds in each part, in node spacings, at most `WIDEST`.
+        Standard deviation of the velocity that noise adds in each part, in node spacings.
     parts : int
-        How often that diffusion is applied.
+        How often that diffusion is applied, see `parts_of`.
     floor : float
         φ outside the grid, and the least φ inside.
-    out, out_rough : arrays (last - first, nv)
-        φ in the rows from `first` to `last`, and where it is not smooth.
+    out, out_marks : arrays (last - first, nv)
+        φ in the rows from `first` to `last`, and what a quintic would reach there.
     first, last : int
     """
     nv = phi.shape[1]
-    row, other = np.empty(nv), np.empty(nv)
-    marks, summed = np.empty(nv, dtype=np.bool_), np.empty(nv, dtype=np.bool_)
+    row, other, curvatures = np.empty(nv), np.empty(nv), np.empty(nv)
+    rough, summed = np.empty(nv, dtype=np.bool_), np.empty(nv, dtype=np.bool_)
     for i in range(first, last):
-        if len(feet) > 0:
-            _transport_row(phi, rough, feet[i], growth[i], floor, row)
-        else:
-            row[:] = phi[i]
+        _transport_row(phi, marks, feet[i], growth[i], floor, row)
+        low, high = _above(row, floor)
+        if high < low:
+            out[i - first] = floor
+            continue
         if len(weight) > 0:
             row += weight[i]
-        for _ in range(parts):
-            _mark_row(row, marks)
-            _diffuse_row(row, spreads[i], other, marks, summed)
+        for _ in range(max(parts, 1)):
+            reach = int(_REACH * max(spreads[i].max(), 0.5)) + 1
+            from_node, to_node = max(low - reach, 0), min(high + reach, nv - 1)
+            _mark_row(row, from_node - 1, to_node, rough)
+            if _closed_row(row, spreads[i], from_node, to_node, other, rough, summed, curvatures):
+                _sum_row(row, spreads[i], summed, low, high, row[low : high + 1].min(), other)
+            low, high = from_node, to_node
             row, other = other, row
         for j in range(nv):
             lighter = weight[i, j] if len(weight) > 0 else 0.0
-            out[i - first, j] = max(row[j] - lighter, floor)
-        _mark_row(out[i - first], marks)
-        _widen(marks, out_rough[i - first])
+            left = row[j] - lighter
+            out[i - first, j] = left if left > floor + _CUT else floor
+    mark_rows(out, floor, out_marks)

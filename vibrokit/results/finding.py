@@ -196,8 +196,13 @@ class Code(StrEnum):
     )  # fmt: skip
     MASS_NOT_KEPT = (
         "mass-not-kept", WARNING,
-        "At t = {time:.4g} s the probability on the nodes is {mass:.4g}, not 1.",
-        "Some left the region, or the nodes are too far apart: widen the region, or raise the number of nodes.",
+        "At t = {time:.4g} s the probability on the nodes is {mass:.4g}; the rest has left the region.",
+        "Widen the region.",
+    )  # fmt: skip
+    DENSITY_TRUNCATED = (
+        "density-truncated", WARNING,
+        "Until t = {time:.4g} s truncation errors changed the probability by {change:+.1%}, which was divided out.",
+        "Raise the number of nodes: the density is narrow against their distances.",
     )  # fmt: skip
     RATE_UNCERTAIN = (
         "rate-uncertain", WARNING,

@@ -1,6 +1,10 @@
-"""Cores: sets around attractors in which a state has settled, and the densities that start there."""
+"""Cores: sets around attractors in which a state has settled, and what the density around them needs."""
 
 from __future__ import annotations
+
+import dataclasses
+import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,14 +13,90 @@ from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.region import Region
 from vibrokit.structure.linear_map import gaussian_map
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
 _SIZE = 0.5  # semi-axes of a core in standard deviations of the density around the attractor
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
+_DEVIATIONS = 5.0  # of the density around the orbit that the region covers
+_WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
+_RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
 Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Cores:
+    """The cores of all attractors, as one of them is left.
+
+    Attributes
+    ----------
+    problem : ExitProblem
+    """
+
+    problem: ExitProblem
+
+    @cached_property
+    def covariances(self) -> dict[int, Array]:
+        """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
+        return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
+
+    def own(self, grid: DensityGrid, intensity: float) -> Array:
+        """Return how much of each cell belongs to the core of the attractor that is left, shape (nx, nv)."""
+        return self._core(self.problem.attractor, grid, intensity)
+
+    def others(self, grid: DensityGrid, intensity: float) -> dict[int, Array]:
+        """Return the same for those that can be reached, by label; nothing if position decides."""
+        if self.problem.exit.by_position:
+            return {}
+        others = [a for a in self.problem.structure.attractors if a.label != self.problem.source]
+        return {a.label: self._core(a, grid, intensity) for a in others}
+
+    def start(self, grid: DensityGrid, intensity: float) -> Array:
+        """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
+        attractor = self.problem.attractor
+        return -0.5 * grid.nearest(*_ellipses(attractor, intensity * self.covariances[attractor.label], 1.0, grid))
+
+    def resolved(self, grid: DensityGrid, nodes: float) -> float:
+        """Return the least intensity at which the density around the attractor is wider than some node spacings.
+
+        What counts is its width in x at fixed v, and in v at fixed x. 0 for an attractor that never repeats, whose
+        density is as wide as itself.
+        """
+        attractor = self.problem.attractor
+        if not attractor.is_fixed:
+            return 0.0
+        inverse = np.linalg.inv(self.covariances[attractor.label])
+        deviations = 1 / np.sqrt(np.diagonal(inverse, axis1=1, axis2=2)).max(axis=0)
+        spacings = grid.local_spacing(attractor.points).max(axis=0)
+        return float(((nodes * spacings / deviations) ** 2).max())
+
+    def region(self, intensity: float) -> Region:
+        """Return the region of the structure, and the orbits of all attractors at all times with the density there."""
+        structure = self.problem.structure
+        orbits = np.concatenate([attractor.orbit[:, :2] for attractor in structure.attractors])
+        around_orbits = Region.around(orbits, _WIDER).bounds
+        spread = np.diagonal(self.covariances[self.problem.source], axis1=1, axis2=2).max(axis=0)
+        beyond = _DEVIATIONS * np.sqrt(intensity * spread)
+        low = np.minimum(around_orbits[:, 0], orbits.min(axis=0) - beyond)
+        high = np.maximum(around_orbits[:, 1], orbits.max(axis=0) + beyond)
+        own = structure.basins.region.bounds
+        return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
+
+    @property
+    def relaxation(self) -> float:
+        """Section intervals in which deviations of the density fall by a factor e."""
+        attractor = self.problem.attractor
+        largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
+        if not 0.0 < largest < 1.0 or not attractor.is_fixed:
+            return _RELAXATION
+        return max(1.0, -max(attractor.period, 1) / math.log(largest))
+
+    def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float) -> Array:
+        covariances = _SIZE**2 * intensity * self.covariances[attractor.label]
+        return grid.covered(*_ellipses(attractor, covariances, _LEAST, grid))
 
 
 def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
@@ -38,25 +118,6 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
         step = gaussian_map(problem.osc, point[None], stepper)
         covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
     return np.array(covariances)
-
-
-def core(attractor: Attractor, covariances: Array, intensity: float, grid: DensityGrid) -> Array:
-    """Return how much of each cell belongs to the core of an attractor, from 0 to 1, shape (nx, nv)."""
-    return grid.covered(*_ellipses(attractor, _SIZE**2 * intensity * covariances, _LEAST, grid))
-
-
-def around(attractor: Attractor, covariances: Array, intensity: float, grid: DensityGrid) -> Array:
-    """Return ln p, up to a constant, of normal distributions around the points of an attractor."""
-    return -0.5 * grid.nearest(*_ellipses(attractor, intensity * covariances, 1.0, grid))
-
-
-def deviations(covariances: Array) -> Array:
-    """Return the least conditional standard deviations of x and of v around an attractor per √D, shape (2,).
-
-    They are what a grid has to resolve: the width of the density in x at fixed v, and in v at fixed x.
-    """
-    narrowest: Array = 1 / np.sqrt(np.diagonal(np.linalg.inv(covariances), axis1=1, axis2=2)).max(axis=0)
-    return narrowest
 
 
 def _ellipses(attractor: Attractor, covariances: Array, least: float, grid: DensityGrid) -> tuple[Array, Array]:

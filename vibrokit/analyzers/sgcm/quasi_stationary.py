@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.propagator import ABSORBED, Propagator
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.progress import advance, stage
 
-_CONVERGED = 3e-3  # change of ln rate that is left; the error of 200² nodes is larger
+_WINDOW = 4  # section intervals, at least: the largest changes of two windows give how fast they fall
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
-_BELOW = 25.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻²⁵ of the rate
+ABSORBED = 1 - 1e-9
+"""Share of the probability that a set takes up where it covers a cell."""
+_BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
 
 Array = NDArray[np.float64]
+
+
+class Transition(Protocol):
+    """What carries ln p over a section interval, and expected values back."""
+
+    @property
+    def grid(self) -> DensityGrid:
+        """The nodes."""
+
+    @property
+    def by_position(self) -> bool:
+        """Whether probability leaves by position, at any time."""
+
+    def interval(self, phi: Array, floor: float, highest: Array | None = None) -> tuple[Array, float]:
+        """Return φ one section interval later, and the logarithm of the probability that left by position.
+
+        φ is at least `floor`; `highest`, if given, keeps the largest φ at each node at all times in between.
+        """
+
+    def backward(self, density: QuasiStationary, sets: Sequence[Array]) -> Callable[[Array, float], Array]:
+        """Return what gives ln of an expected value one section interval earlier, at least a floor.
+
+        It may leave out what a density does not reach; the sets absorb, or are where the density lives.
+        """
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,20 +76,15 @@ class QuasiStationary:
     drift: float
     intervals: int
 
-    @property
-    def converged(self) -> bool:
-        """Whether iteration has ended by itself."""
-        return self.change <= _CONVERGED
-
 
 def quasi_stationary(
-    propagator: Propagator, start: Array, sets: Mapping[int, Array], relaxation: float
+    transition: Transition, start: Array, sets: Mapping[int, Array], relaxation: float, converged: float
 ) -> QuasiStationary:
     """Iterate until the rates stay the same.
 
     Parameters
     ----------
-    propagator : Propagator
+    transition : Transition
     start : array (nx, nv)
         ln p.
     sets : mapping of int to array (nx, nv)
@@ -69,22 +92,24 @@ def quasi_stationary(
         by position, with target −1.
     relaxation : float
         Section intervals in which deviations of the density fall by a factor e.
+    converged : float
+        Change of ln rate that may be left.
     """
-    grid = propagator.tables.grid
+    grid = transition.grid
     phi, rates, change, intervals = start - grid.mass(start), list[float](), np.inf, 0
     most = int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
-    remaining = 1 / -np.expm1(-1 / relaxation)  # sum of a geometric series of changes
     areas = {target: float(np.log((covered * grid.areas).sum())) for target, covered in sets.items()}
     areas = areas or {-1: float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))}
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
     highest = np.empty_like(phi)
     with stage("density", unit="section intervals"):
-        while intervals < most and change > _CONVERGED:
+        while intervals < most and change > converged:
             highest = np.full_like(phi, -np.inf)
-            phi, lost = propagator.interval(phi, floor, highest)
+            phi, lost = transition.interval(phi, floor, highest)
+            empty = phi <= floor
             mass = grid.mass(phi)
-            if propagator.tables.crossed:
+            if transition.by_position:
                 mass = float(np.logaddexp(mass, lost))
                 log_rates = {-1: lost - mass}
             drift = float(np.expm1(mass))
@@ -99,9 +124,25 @@ def quasi_stationary(
             level = max(log_rates[target] - areas[target] for target in areas)
             least = min(log_rates[target] - areas[target] for target in areas)
             floor = max(least, level - _RAREST) - _BELOW
+            phi[empty] = floor
             intervals += 1
-            if intervals > 3 and np.isfinite(rates[-1]):
-                change = max(abs(rates[-1] - rates[-2]), abs(rates[-2] - rates[-3])) * remaining
+            change = remaining(rates, relaxation)
             advance()
     resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
     return QuasiStationary(phi, highest, resolved, level, float(change), drift, intervals)
+
+
+def remaining(rates: list[float], relaxation: float) -> float:
+    """Return the change of the last of some ln rates that further iteration would make.
+
+    It is the sum of a geometric series. Its ratio is measured over two windows, as wide as the relaxation, since a rate
+    may change little for shorter times by chance. It is not above that of the slowest mode, and not below its square,
+    because the covariance of a density relaxes twice as fast as its mean.
+    """
+    window, slowest = max(_WINDOW, math.ceil(relaxation)), math.exp(-1 / relaxation)
+    if len(rates) <= 2 * window or not np.isfinite(rates[-2 * window - 1 :]).all():
+        return math.inf
+    changes = np.abs(np.diff(rates[-2 * window - 1 :])).reshape(2, window).max(axis=1)
+    ratio = (changes[1] / changes[0]) ** (1 / window) if changes[0] > 0 else 0.0
+    ratio = min(max(ratio, slowest**2), slowest)
+    return float(changes[1] * ratio / (1 - ratio))

@@ -1,38 +1,43 @@
-"""Quasi-stationary densities of an attractor on finer and coarser grids, whose differences give the errors."""
+"""Quasi-stationary densities and committors of an attractor, whose rates differ by what their errors are."""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.cores import around, core, covariances_of, deviations
+from vibrokit.analyzers.sgcm.committor import Committor, committor
+from vibrokit.analyzers.sgcm.cores import Cores
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, resolved
-from vibrokit.analyzers.sgcm.propagator import FlowTables, Propagator
-from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, quasi_stationary
+from vibrokit.analyzers.sgcm.propagator import Propagator
+from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, Transition, quasi_stationary
+from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
 from vibrokit.errors import StructureError
-from vibrokit.results.region import Region
 from vibrokit.symbolic.flow_kind import Flow
 
+CONVERGED = 1e-2
+"""Change of ln rate that may be left by iteration."""
+_ROUGHLY, _EXPLORED_TO = 0.03, 0.1  # the same with half the steps, and in exploration
+_STEP_ERROR = 1 / 3  # of what halving the steps changes: the splitting has an error of second order or higher
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
 _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
 _NARROWEST = 2.0  # the same on the finest grid, at least
-_COARSER = 0.7  # nodes of the grid for the error estimate, and for exploration, in those of the finest
+_WANTED = 4.0  # the same on the finest grid, by default
+_FEWEST = 120  # nodes along each side, by default
+_EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
-_DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _MARGIN = 3  # nodes around it
-_WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
-_STEP_ERROR = 1 / 3  # Strang's splitting has an error of second order: a third of what doubling the steps changes
-_RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
+_ALL_FLOWS = 2.6  # memory of all flows together, in units of the one with all steps
 
 Array = NDArray[np.float64]
 
@@ -46,16 +51,38 @@ class AtIntensity:
     intensity : float
     grid : DensityGrid
     found : QuasiStationary
-        On all nodes.
-    errors : mapping of int to float
-        By target: error estimate of ln rate, which is what 0.7 times the nodes change and a third of what doubling the
-        steps changes.
+    committors : mapping of int to Committor
+        By target.
+    step_errors : mapping of int to float
+        By target: a third of what halving the steps changes in ln rate.
     """
 
     intensity: float
     grid: DensityGrid
     found: QuasiStationary
-    errors: Mapping[int, float]
+    committors: Mapping[int, Committor] = dataclasses.field(default_factory=dict)
+    step_errors: Mapping[int, float] = dataclasses.field(default_factory=dict)
+
+    @property
+    def log_rates(self) -> dict[int, float]:
+        """By target: ln of the probability that leaves in one section interval, the mean of density and committor."""
+        return {target: 0.5 * (self.found.log_rates[target] + c.log_rate) for target, c in self.committors.items()}
+
+    @property
+    def errors(self) -> dict[int, float]:
+        """By target: error estimate of ln rate, which is the difference of both, and what steps and iteration add."""
+        return {
+            target: abs(self.found.log_rates[target] - c.log_rate)
+            + self.step_errors[target]
+            + self.found.change
+            + c.change
+            for target, c in self.committors.items()
+        }
+
+    @property
+    def change(self) -> float:
+        """Change of ln rate that further iteration would make."""
+        return max([self.found.change, *(c.change for c in self.committors.values())])
 
     @property
     def log_density(self) -> Array:
@@ -70,6 +97,15 @@ class AtIntensity:
         outermost[1:-1, 1:-1] = False
         return self.grid.mass(phi, outermost)
 
+    def begun(self, grid: DensityGrid, intensity: float) -> tuple[Array, dict[int, Array]]:
+        """Return ln p and, by target, ln of the committor to begin iteration from on another grid, at less noise.
+
+        The shape of −D ln p and of −D ln c depends little on D.
+        """
+        ratio = self.intensity / intensity
+        committors = {target: grid.resampled(c.log_values, self.grid) * ratio for target, c in self.committors.items()}
+        return grid.resampled(self.found.phi, self.grid) * ratio, committors
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DensitySolver:
@@ -78,75 +114,84 @@ class DensitySolver:
     Attributes
     ----------
     problem : ExitProblem
-    shape : (int, int)
-        Nodes in x and in v.
+    shape : (int, int) or None
+        Nodes in x and in v; by default as many as the narrowest density needs.
     steps : int
-        In a section interval; even.
+        How often noise acts in a section interval; even.
+    max_memory_gib : float
+        Memory that the legs of all flows may take (GiB).
+    samples : int or None
+        If given, transitions are those of so many simulated trajectories from each cell.
     """
 
     problem: ExitProblem
-    shape: tuple[int, int]
+    shape: tuple[int, int] | None
     steps: int
+    max_memory_gib: float
+    samples: int | None = None
 
     def solve(self, intensities: Sequence[float]) -> Iterator[AtIntensity]:
         """Yield the solutions at some intensities, which must descend.
 
-        Raises StructureError if the nodes are too far apart for the narrowest density.
+        Raises StructureError if the nodes are too far apart for the narrowest density, or need too much memory.
         """
-        with ThreadPoolExecutor(os.cpu_count()) as executor:
-            coarse, start = self._explored(intensities[0], executor)
-            fine = DensityGrid.of(self.problem.osc, coarse.region, self.shape)
-            self._check_resolution(fine, intensities[-1])
-            tables = {
-                "long": self._tables(coarse, self.steps // 2),
-                "coarse": self._tables(coarse, self.steps),
-                "fine": self._tables(fine, self.steps),
-            }
-            for intensity, following in itertools.zip_longest(intensities, intensities[1:]):
-                known: dict[str, QuasiStationary] = {}
-                for name, table in tables.items():
-                    if table.grid.shape != start.shape:
-                        start = table.grid.resampled(start, coarse)
-                    known[name] = self._found(table, intensity, executor, start)
-                    start = known[name].phi
-                yield AtIntensity(intensity, fine, known["fine"], _errors(known))
-                if following:
-                    start = known["coarse"].phi * (intensity / following)
+        with ExitStack() as stack:
+            executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
+            explored, closer = self._explored(intensities[0], executor)
+            grid = DensityGrid.of(self.problem.osc, closer.region, self._shape(closer, intensities[-1]))
+            self._check_resolution(grid, intensities[-1])
+            needed = _ALL_FLOWS * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
+            check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
+            flows = self._flow(grid, self.steps), self._flow(grid, self._half)
+            before = explored
+            for intensity in intensities:
+                start, committors = before.begun(grid, intensity)
+                transition, other = (self._transition(flow, intensity, executor) for flow in flows)
+                found = self._found(transition, intensity, start)
+                long = self._found(other, intensity, found.phi, _ROUGHLY)
+                steps = {
+                    target: _STEP_ERROR * abs(rate - long.log_rates[target])
+                    for target, rate in found.log_rates.items()
+                    if target in long.log_rates
+                }
+                solved = self._committors(transition, intensity, found, committors)
+                before = AtIntensity(intensity, grid, found, {target: solved[target] for target in steps}, steps)
+                yield before
 
-    def _explored(self, intensity: float, executor: Executor) -> tuple[DensityGrid, Array]:
-        """A coarse grid around what has probability enough to matter, and ln p on it to start from.
+    def _explored(self, intensity: float, executor: Executor) -> tuple[AtIntensity, DensityGrid]:
+        """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
-        Where the nodes of the whole region are too far apart for the density, a stronger noise is used: the shape of
-        −D ln p depends little on D.
+        Where the nodes of the whole region are too far apart for the density, a stronger noise is used.
         """
-        coarser = (round(_COARSER * self.shape[0]), round(_COARSER * self.shape[1]))
-        grid = DensityGrid.of(self.problem.osc, self._region(intensity), coarser)
-        steps = max(self.steps // 2, 2)
+        wanted_shape = self.shape or (_EXPLORING, _EXPLORING)
+        shape = min(_EXPLORING, wanted_shape[0]), min(_EXPLORING, wanted_shape[1])
+        grid = DensityGrid.of(self.problem.osc, self._cores.region(intensity), shape)
         for _ in range(_ZOOMS):
-            stronger = max(intensity, self._resolved(grid, _EXPLORED))
-            found = self._found(self._tables(grid, steps), stronger, executor)
+            stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
+            propagator = Propagator(self._flow(grid, self._half), stronger, executor)
+            found = self._found(propagator, stronger, self._cores.start(grid, stronger), _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
-            for covered in self._sets(grid, intensity).values():
+            for covered in self._cores.others(grid, intensity).values():
                 wanted |= covered > 0
-            closer = DensityGrid.of(self.problem.osc, grid.around(wanted, _MARGIN), coarser)
-            start = closer.resampled(found.phi, grid) * (stronger / intensity)
+            closer = DensityGrid.of(self.problem.osc, grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
-            grid = closer
             if stronger == intensity or not smaller:
                 break
-        return grid, start
+            grid = closer
+        committors = self._committors(propagator, stronger, found, {}, _EXPLORED_TO)
+        return AtIntensity(stronger, propagator.grid, found, committors), closer
 
-    def _resolved(self, grid: DensityGrid, nodes: float) -> float:
-        """The least intensity at which the density around the attractor is wider than some node spacings."""
-        attractor = self.problem.attractor
-        if not attractor.is_fixed:
-            return 0.0
-        spacings = grid.local_spacing(attractor.points).max(axis=0)
-        return float(((nodes * spacings / deviations(self._covariances[attractor.label])) ** 2).max())
+    def _shape(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
+        """The nodes that are wanted, or those that the narrowest density needs."""
+        if self.shape is not None:
+            return self.shape
+        needed = math.sqrt(self._cores.resolved(explored, _WANTED) / intensity)
+        nx, nv = (max(math.ceil(needed * count), _FEWEST) for count in explored.shape)
+        return nx, nv
 
     def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:
-        least = self._resolved(grid, _NARROWEST)
+        least = self._cores.resolved(grid, _NARROWEST)
         if intensity < least:
             factor = math.sqrt(least / intensity)
             nx, nv = (math.ceil(factor * count) for count in grid.shape)
@@ -155,60 +200,44 @@ class DensitySolver:
                 f"{grid.shape[1]} nodes are enough for D = {least:.3g}, and this D needs {nx} × {nv}."
             )
 
-    def _region(self, intensity: float) -> Region:
-        """The region of the structure, and the orbits of all attractors at all times with the density around them."""
-        structure = self.problem.structure
-        orbits = np.concatenate([attractor.orbit[:, :2] for attractor in structure.attractors])
-        around_orbits = Region.around(orbits, _WIDER).bounds
-        spread = np.diagonal(self._covariances[self.problem.source], axis1=1, axis2=2).max(axis=0)
-        beyond = _DEVIATIONS * np.sqrt(intensity * spread)
-        low = np.minimum(around_orbits[:, 0], orbits.min(axis=0) - beyond)
-        high = np.maximum(around_orbits[:, 1], orbits.max(axis=0) + beyond)
-        own = structure.basins.region.bounds
-        return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
-
-    def _tables(self, grid: DensityGrid, steps: int) -> FlowTables:
-        stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
-        is_out = self.problem.is_out if self.problem.exit.by_position else None
-        return FlowTables.of(self.problem.scene, stepper, grid, steps, is_out)
-
-    def _found(
-        self, tables: FlowTables, intensity: float, executor: Executor, start: Array | None = None
-    ) -> QuasiStationary:
-        if start is None:
-            attractor = self.problem.attractor
-            start = around(attractor, self._covariances[attractor.label], intensity, tables.grid)
-        propagator = Propagator(tables, intensity, executor)
-        return quasi_stationary(propagator, start, self._sets(tables.grid, intensity), self._relaxation)
-
-    def _sets(self, grid: DensityGrid, intensity: float) -> dict[int, Array]:
-        """By target: how much of each cell belongs to the core of the attractor."""
-        if self.problem.exit.by_position:
-            return {}
-        others = [a for a in self.problem.structure.attractors if a.label != self.problem.source]
-        return {a.label: core(a, self._covariances[a.label], intensity, grid) for a in others}
-
     @cached_property
-    def _covariances(self) -> dict[int, Array]:
-        """Around each attractor, by label."""
-        return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
+    def _cores(self) -> Cores:
+        return Cores(self.problem)
 
     @property
-    def _relaxation(self) -> float:
-        attractor = self.problem.attractor
-        largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
-        if not 0.0 < largest < 1.0 or not attractor.is_fixed:
-            return _RELAXATION
-        return max(1.0, -max(attractor.period, 1) / math.log(largest))
+    def _half(self) -> int:
+        """Half of the steps, to an even number."""
+        return max(2 * (self.steps // 4), 2)
 
+    def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
+        stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
+        is_out = self.problem.is_out if self.problem.exit.by_position else None
+        return DensityFlow(self.problem.scene, stepper, grid, steps, is_out)
 
-def _errors(known: Mapping[str, QuasiStationary]) -> dict[int, float]:
-    """Error estimates of ln rate."""
-    fine, coarse, long = (known[name].log_rates for name in ("fine", "coarse", "long"))
-    return {
-        target: abs(fine[target] - coarse[target])
-        + _STEP_ERROR * abs(coarse[target] - long[target])
-        + known["fine"].change
-        for target in fine
-        if target in coarse and target in long
-    }
+    def _transition(self, flow: DensityFlow, intensity: float, executor: Executor) -> Transition:
+        if self.samples is None:
+            return Propagator(flow, intensity, executor)
+        scene = flow.scene.replace({"noise.intensity": intensity})
+        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.is_out, executor)
+
+    def _found(
+        self, transition: Transition, intensity: float, start: Array, converged: float = CONVERGED
+    ) -> QuasiStationary:
+        sets = self._cores.others(transition.grid, intensity)
+        return quasi_stationary(transition, start, sets, self._cores.relaxation, converged)
+
+    def _committors(
+        self,
+        transition: Transition,
+        intensity: float,
+        found: QuasiStationary,
+        starts: Mapping[int, Array],
+        converged: float = CONVERGED,
+    ) -> dict[int, Committor]:
+        """The committor of each target whose rate is known."""
+        own, sets = self._cores.own(transition.grid, intensity), self._cores.others(transition.grid, intensity)
+        relaxation = self._cores.relaxation
+        return {
+            target: committor(transition, found, own, sets, target, relaxation, converged, starts.get(target))
+            for target in found.log_rates
+        }

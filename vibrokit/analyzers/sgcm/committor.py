@@ -1,0 +1,95 @@
+"""Committors: the probability to reach one exit before the own core, by the backward equation, and the rate it gives.
+
+On its way up to the edge of the basin a density is smooth; beyond, it falls into thin arms, in which interpolation
+loses or adds some of it. A committor is 1 beyond the edge. So the rate that follows from it and the one that follows
+from the density have different errors, and their difference tells how large these are.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, QuasiStationary, Transition, remaining
+from vibrokit.progress import advance, stage
+
+_INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
+_BELOW = 20.0  # in ln c: the floor lies that far below the rate
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Committor:
+    """The probability to reach one exit before the core of the own attractor, and the rate that follows.
+
+    Attributes
+    ----------
+    log_values : array (nx, nv)
+        Its logarithm, for a start at each node on the section; at its least where the density is too small to matter.
+    log_rate : float
+        ln of the probability that leaves in one section interval for good.
+    change : float
+        Change of it that further iteration would make.
+    """
+
+    log_values: Array
+    log_rate: float
+    change: float
+
+
+def committor(
+    transition: Transition,
+    density: QuasiStationary,
+    own: Array,
+    sets: dict[int, Array],
+    target: int,
+    relaxation: float,
+    converged: float,
+    start: Array | None = None,
+) -> Committor:
+    """Iterate the backward equation until the rate stays the same.
+
+    The rate is the probability of the own core in the quasi-stationary density times the committor one section interval
+    later: each exit begins with a last visit to the core (transition-path theory; E & Vanden-Eijnden, Annu. Rev. Phys.
+    Chem. 61, 391, 2010).
+
+    Parameters
+    ----------
+    transition : Transition
+    density : QuasiStationary
+        On the same nodes.
+    own : array (nx, nv)
+        How much of each cell belongs to the core of the attractor that is left.
+    sets : dict of int to array (nx, nv)
+        By target: the same for the sets that absorb on the section. If empty, the exit is one by position.
+    target : int
+    relaxation : float
+        Section intervals in which deviations of the density fall by a factor e.
+    converged : float
+        Change of ln rate that may be left.
+    start : array (nx, nv), optional
+        ln c, for example of stronger noise.
+    """
+    floor = density.log_rates[target] - _BELOW
+    reached = sets.get(target, np.zeros_like(own))
+    elsewhere = sum((covered for label, covered in sets.items() if label != target), own)
+    with np.errstate(divide="ignore"):
+        reached_log, stays = np.log(reached), np.log(1 - ABSORBED * np.minimum(elsewhere + reached, 1.0))
+    in_core = density.phi + np.log(transition.grid.areas) + np.log(np.where(own > 0, own, 1.0))
+    found = np.maximum(reached_log if start is None else start, floor)
+    rates, change = list[float](), np.inf
+    most = int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
+    earlier = transition.backward(density, [own, *sets.values()])
+    with stage("committor", unit="section intervals"):
+        while len(rates) < most and change > converged:
+            later = np.minimum(earlier(found, floor), 0.0)
+            rate = float(np.logaddexp.reduce((in_core + later)[own > 0]))
+            rates.append(rate if rate > floor + 0.5 * _BELOW else -math.inf)
+            found = np.clip(np.logaddexp(reached_log, later + stays), floor, 0.0)
+            change = remaining(rates, relaxation)
+            advance()
+    return Committor(found, rates[-1], change)
