@@ -1,5 +1,7 @@
 """SGCM: results, errors and bad input."""
 
+import concurrent.futures as futures
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,48 @@ def test_density_has_probability_1(result):
     widths = [np.gradient(data[f"density_{axis}"].values) for axis in ("x", "v")]
     for density in np.exp(data["log_density"].values):
         assert np.nansum(density * np.outer(*widths)) == pytest.approx(1.0, rel=1e-6)
+
+
+def test_committor_of_a_symmetric_well_is_one_half_on_the_symmetric_saddle(result):
+    """By symmetry; in the opposite core it is 1, and its value and that of the mirrored state add up to 1."""
+    found = result.committor(0).sel(intensity=6e-3)
+    sign = np.sign(result.section.points[0][0, 0])
+    assert float(found.interp(x=0.0, v=0.0)) == pytest.approx(0.5, abs=0.01)
+    assert float(found.interp(x=-sign * 0.97, v=0.0)) == pytest.approx(1.0, abs=1e-3)
+    for x, v in [(0.2, 0.1), (0.1, -0.3), (0.4, 0.2)]:
+        both = float(found.interp(x=x, v=v)) + float(found.interp(x=-x, v=-v))
+        assert both == pytest.approx(1.0, abs=0.01)
+    np.testing.assert_array_equal(found, result.committor("left" if sign < 0 else 0, 1).sel(intensity=6e-3))
+
+
+def test_mean_exit_time_of_the_saddle_is_half_that_of_the_attractor(result):
+    times = result.mean_exit_time(0).sel(intensity=6e-3)
+    (rate,) = (rate for rate in result.rates if rate.intensity == 6e-3)
+    assert float(times.interp(x=0.0, v=0.0)) == pytest.approx(0.5 * rate.mean_time, rel=0.02)
+
+
+@pytest.mark.parametrize("pool", [futures.ThreadPoolExecutor, futures.ProcessPoolExecutor])
+def test_any_executor_gives_the_same_bits(pool, structure):
+    analyzer = vk.SGCM(source=0, intensities=(2e-2,), nodes=(48, 48), steps=8)
+    alone = analyzer.run(WELL, structure)
+    with pool(3) as executor:
+        shared = analyzer.run(WELL, structure, executor=executor)
+    for name in ("log_density", "log_rate", "log_committor"):
+        np.testing.assert_array_equal(shared.data[name], alone.data[name])
+
+
+def test_a_sampled_matrix_agrees_where_it_sees_enough(structure):
+    """At the barrier over 4 D, within what cells of finite size and samples add."""
+    given = {"source": 0, "intensities": (1.25e-2,), "nodes": (64, 64)}
+    (sampled,) = vk.SGCM(samples=200, **given).run(WELL, structure).rates
+    (rate,) = vk.SGCM(**given).run(WELL, structure).rates
+    assert sampled.value == pytest.approx(rate.value, rel=0.25)
+    assert sampled.value != rate.value
+
+
+def test_a_sampled_matrix_does_not_see_a_rare_exit(structure):
+    found = vk.SGCM(source=0, intensities=(1.5e-3,), nodes=(100, 100), samples=4).run(WELL, structure)
+    assert not found.rates or found.rates[0].log_error > 1
 
 
 def test_result_is_saved_and_reopened(result, tmp_path):
@@ -73,6 +117,7 @@ def test_time_limit_keeps_what_was_solved(structure):
         ({"nodes": (1, 1)}, "(1, 1)"),
         ({"steps": 7}, "7"),
         ({"steps": 0}, "0"),
+        ({"samples": 0}, "0"),
         ({"intensities": (1e-3, 0.0)}, "0"),
         ({"intensities": ()}, "()"),
         ({"intensities": (float("nan"),)}, "nan"),

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import vibrokit as vk
 from tests.scenes import scene
@@ -37,15 +38,23 @@ def test_density_of_a_forced_linear_scene_is_gaussian_to_a_depth_of_40():
 
 
 def kramers_rate(damping, intensity):
-    """Kramers' rate for moderate and strong damping; well and barrier of x⁴/4 − x²/2."""
+    """Kramers' rate for moderate and strong damping; well and barrier of x⁴/4 − x²/2.
+
+    The formula is the limit of weak noise. Its relative error is of the order of the temperature over the barrier; that
+    of the overdamped limit, where the rate is a ratio of integrals, is divided out: 5 % at a ratio of 8, 2 % at 25.
+    """
     prefactor = (math.sqrt(damping**2 + 1) - damping) * math.sqrt(2) / (2 * math.pi)
-    return prefactor * math.exp(-damping / intensity)
+    temperature = intensity / (4 * damping)
+    well = quad(lambda x: math.exp(-((x**2 - 1) ** 2) / 4 / temperature), -3, 0)[0]
+    top = quad(lambda x: math.exp((x**4 / 4 - x**2 / 2) / temperature), -1, 1)[0]
+    parabolic = 2 * math.pi * temperature / math.sqrt(2)
+    return prefactor * parabolic / (well * top) * math.exp(-damping / intensity)
 
 
 @pytest.mark.parametrize("damping", [0.2, 1.0])
 def test_rates_of_a_double_well(damping):
     barrier = damping  # ΔU = 4ζ times the barrier of 1/4
-    intensities = tuple(barrier / ratio for ratio in (12.0, 16.0, 20.0))
+    intensities = tuple(barrier / ratio for ratio in (8.0, 12.0, 16.0, 20.0, 25.0))
     osc = scene(
         damping_ratio=damping,
         spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
@@ -54,10 +63,12 @@ def test_rates_of_a_double_well(damping):
     structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
     found = vk.SGCM(source=0, intensities=intensities, nodes=(120, 120)).run(osc, structure)
     for rate in found.rates:
-        assert rate.value == pytest.approx(kramers_rate(damping, rate.intensity), rel=0.03)
+        expected = kramers_rate(damping, rate.intensity)
+        assert rate.value == pytest.approx(expected, rel=0.03)
+        assert rate.lower <= expected <= rate.upper
     (energy,) = found.energies
     assert energy.lower <= barrier <= energy.upper
-    assert energy.value == pytest.approx(barrier, rel=0.02)
+    assert energy.value == pytest.approx(barrier, rel=0.01)
 
 
 def test_transients_of_the_paper_s_scene_are_those_of_simulated_trajectories():

@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import CONVERGED, AtIntensity, DensitySolver
@@ -39,7 +40,7 @@ class SGCM(Analyzer):
     one; what is lost in a section interval is the exit rate.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
-    shape of the density there and half its standard deviations, or 2.5 node spacings if that is more. With an exit by
+    shape and the standard deviations of the density there, or 2.5 node spacings where that is more. With an exit by
     position it has left at the first time that satisfies the condition.
 
     Parameters
@@ -66,7 +67,7 @@ class SGCM(Analyzer):
     -----
     A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
     reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Their difference is its error estimate, with a third of what halving the steps, or another sample, changes. An
+    Their difference is its error estimate, with a seventh of what halving the steps, or another sample, changes. An
     activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
@@ -169,6 +170,11 @@ def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
                 ("intensity_index", "density_node_x", "density_node_v"), np.array([one.log_density for one in solved]),
                 {"long_name": "logarithm of the quasi-stationary density (s m-2)", "units": "1"},
             ),
+            "log_committor": (
+                ("intensity_index", "exit_index", "density_node_x", "density_node_v"),
+                np.array([[_committor(one, target) for target in targets] for one in solved]),
+                {"long_name": "logarithm of the probability to reach an exit before the own core", "units": "1"},
+            ),
             "mass_drift": (
                 ("intensity_index",), np.array([one.found.drift for one in solved]),
                 {"long_name": "relative change of probability in a section interval by truncation", "units": "1"},
@@ -197,6 +203,12 @@ def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
             "quasi_potential_v": ("node_v", uniform.v, {"long_name": "velocity", "units": "m s-1"}),
         },
     )  # fmt: skip
+
+
+def _committor(one: AtIntensity, target: int) -> NDArray[np.float64]:
+    """ln of the committor, NaN where it is not known."""
+    known = one.committors.get(target)
+    return np.full(one.grid.shape, np.nan) if known is None else resolved(known.log_values)
 
 
 def _findings(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Finding, ...]:

@@ -18,7 +18,7 @@ from vibrokit.structure.linear_map import gaussian_map
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
-_SIZE = 0.5  # semi-axes of a core in standard deviations of the density around the attractor
+_SIZE = 1.0  # semi-axes of a core in standard deviations of the density around the attractor: it holds 39 % of it
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
@@ -58,6 +58,12 @@ class Cores:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
         attractor = self.problem.attractor
         return -0.5 * grid.nearest(*_ellipses(attractor, intensity * self.covariances[attractor.label], 1.0, grid))
+
+    def entry(self, grid: DensityGrid, intensity: float) -> Array:
+        """Return the same inside the core of the attractor, −∞ elsewhere."""
+        with np.errstate(divide="ignore"):
+            inside: Array = np.log(self.own(grid, intensity))
+        return self.start(grid, intensity) + inside
 
     def resolved(self, grid: DensityGrid, nodes: float) -> float:
         """Return the least intensity at which the density around the attractor is wider than some node spacings.
@@ -121,10 +127,12 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
 
 
 def _ellipses(attractor: Attractor, covariances: Array, least: float, grid: DensityGrid) -> tuple[Array, Array]:
-    """Centres, and matrices R with Rᵀ R the inverse of the covariances, widened by `least` node spacings."""
+    """Centres, and matrices R with Rᵀ R the inverse of the covariances; no semi-axis is below `least` node spacings."""
     points = attractor.points[:, :2]
     spacings = grid.local_spacing(points)
     if not attractor.is_fixed:
         spacings[:] = spacings.max(axis=0)
-    widened = covariances + ((least * spacings) ** 2)[:, :, None] * np.eye(2)
+    scales = spacings[:, :, None] * spacings[:, None, :]
+    variances, axes = np.linalg.eigh(covariances / scales)
+    widened = np.einsum("nij,nj,nkj->nik", axes, np.maximum(variances, least**2), axes) * scales
     return points, np.linalg.cholesky(np.linalg.inv(widened)).transpose(0, 2, 1)

@@ -1,4 +1,9 @@
-"""Quasi-stationary densities: how probability is distributed that has not left yet, and how fast it leaves."""
+"""Quasi-stationary densities: how states are distributed that last came from an attractor, and how fast they leave.
+
+What leaves is put back into the core of the attractor. So the density stays the same, and what leaves in a section
+interval is the inverse of the mean exit time from the core, also where exits are no rare events. Where they are rare,
+the density is that of states that have not left.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +54,7 @@ class Transition(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class QuasiStationary:
-    """A density that keeps its shape while probability leaves it.
+    """The density of states that last came from the attractor.
 
     Attributes
     ----------
@@ -78,7 +83,12 @@ class QuasiStationary:
 
 
 def quasi_stationary(
-    transition: Transition, start: Array, sets: Mapping[int, Array], relaxation: float, converged: float
+    transition: Transition,
+    start: Array,
+    entry: Array,
+    sets: Mapping[int, Array],
+    relaxation: float,
+    converged: float,
 ) -> QuasiStationary:
     """Iterate until the rates stay the same.
 
@@ -87,6 +97,8 @@ def quasi_stationary(
     transition : Transition
     start : array (nx, nv)
         ln p.
+    entry : array (nx, nv)
+        ln p, up to a constant, with which what has left is put back.
     sets : mapping of int to array (nx, nv)
         By target: how much of each cell belongs to the set that absorbs on the section. If empty, probability leaves
         by position, with target −1.
@@ -103,6 +115,7 @@ def quasi_stationary(
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
     highest = np.empty_like(phi)
+    entry = entry - grid.mass(entry)
     with stage("density", unit="section intervals"):
         while intervals < most and change > converged:
             highest = np.full_like(phi, -np.inf)
@@ -125,6 +138,9 @@ def quasi_stationary(
             least = min(log_rates[target] - areas[target] for target in areas)
             floor = max(least, level - _RAREST) - _BELOW
             phi[empty] = floor
+            left = min(math.exp(np.logaddexp.reduce(list(log_rates.values()))), 1.0) if log_rates else 0.0
+            if left > 0:
+                phi = np.logaddexp(phi + math.log1p(-left * ABSORBED), entry + math.log(left))
             intervals += 1
             change = remaining(rates, relaxation)
             advance()
@@ -136,13 +152,15 @@ def remaining(rates: list[float], relaxation: float) -> float:
     """Return the change of the last of some ln rates that further iteration would make.
 
     It is the sum of a geometric series. Its ratio is measured over two windows, as wide as the relaxation, since a rate
-    may change little for shorter times by chance. It is not above that of the slowest mode, and not below its square,
-    because the covariance of a density relaxes twice as fast as its mean.
+    may change little for shorter times by chance. It is not below the square of that of the slowest mode around the
+    attractor, because the covariance of a density relaxes twice as fast as its mean; it is above where a density takes
+    longer to arrive than to relax.
     """
-    window, slowest = max(_WINDOW, math.ceil(relaxation)), math.exp(-1 / relaxation)
+    window = max(_WINDOW, math.ceil(relaxation))
     if len(rates) <= 2 * window or not np.isfinite(rates[-2 * window - 1 :]).all():
         return math.inf
     changes = np.abs(np.diff(rates[-2 * window - 1 :])).reshape(2, window).max(axis=1)
-    ratio = (changes[1] / changes[0]) ** (1 / window) if changes[0] > 0 else 0.0
-    ratio = min(max(ratio, slowest**2), slowest)
-    return float(changes[1] * ratio / (1 - ratio))
+    if changes[1] == 0:
+        return 0.0
+    ratio = max((changes[1] / changes[0]) ** (1 / window), math.exp(-2 / relaxation)) if changes[0] > 0 else 1.0
+    return float(changes[1] * ratio / (1 - ratio)) if ratio < 1 else math.inf
