@@ -22,6 +22,7 @@ _WINDOW = 4  # section intervals, at least: the largest changes of two windows g
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
+_STILL = 2e-3  # of ln rate: cycles of 1e-3 were seen, and errors of rates are above 1e-2
 _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
 
@@ -151,16 +152,17 @@ def quasi_stationary(
 def remaining(rates: list[float], relaxation: float) -> float:
     """Return the change of the last of some ln rates that further iteration would make.
 
-    It is the sum of a geometric series. Its ratio is measured over two windows, as wide as the relaxation, since a rate
-    may change little for shorter times by chance. It is not below the square of that of the slowest mode around the
-    attractor, because the covariance of a density relaxes twice as fast as its mean; it is above where a density takes
-    longer to arrive than to relax.
+    It is the sum of a geometric series. Its ratio is that of how far the rates vary in two windows, as wide as the
+    relaxation, since a rate may change little for shorter times by chance. It is not below the square of that of the
+    slowest mode around the attractor, because the covariance of a density relaxes twice as fast as its mean; it is
+    above where a density takes longer to arrive than to relax. Rates that hardly vary in either window have ended in a
+    cycle between limits of interpolation, and do not change any further.
     """
     window = max(_WINDOW, math.ceil(relaxation))
-    if len(rates) <= 2 * window or not np.isfinite(rates[-2 * window - 1 :]).all():
+    if len(rates) < 2 * window or not np.isfinite(rates[-2 * window :]).all():
         return math.inf
-    changes = np.abs(np.diff(rates[-2 * window - 1 :])).reshape(2, window).max(axis=1)
-    if changes[1] == 0:
-        return 0.0
-    ratio = max((changes[1] / changes[0]) ** (1 / window), math.exp(-2 / relaxation)) if changes[0] > 0 else 1.0
-    return float(changes[1] * ratio / (1 - ratio)) if ratio < 1 else math.inf
+    before, now = np.ptp(np.reshape(rates[-2 * window :], (2, window)), axis=1).tolist()
+    if max(before, now) <= _STILL:
+        return float(now)
+    ratio = max(now / before, math.exp(-2 * window / relaxation)) if before > 0 else 1.0
+    return float(now * ratio / (1 - ratio)) if ratio < 1 else math.inf
