@@ -114,7 +114,7 @@ class SGCM(Analyzer):
             stopped = (Finding.stopped("density", interrupt, problem.source),)
         return Analysis(
             _energies(problem, solved),
-            _data(problem, solved),
+            _data(problem, solver, solved),
             (*_findings(problem, solved), *stopped),
             complete=not stopped,
         )
@@ -154,7 +154,7 @@ def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Activati
     return tuple(found)
 
 
-def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
+def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]) -> xarray.Dataset:
     targets = sorted({target for one in solved for target in one.errors})
     interval = problem.osc.section_interval
     logs = np.array([[one.log_rates.get(target, np.nan) for target in targets] for one in solved])
@@ -191,6 +191,7 @@ def _data(problem: ExitProblem, solved: list[AtIntensity]) -> xarray.Dataset:
                 ("exit_index",), np.array(targets), {"long_name": "label of the attractor that is reached"},
             ),
             "rate_event": ((), event, {"long_name": "what counts as an exit"}),
+            "rate_steps": ((), solver.steps, {"long_name": "how often noise acts in a section interval"}),
             "rate_intensity": (
                 ("intensity_index",), np.array([one.intensity for one in solved]),
                 {"long_name": "noise intensity", "units": "m2 s-3"},

@@ -174,6 +174,7 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.results.pictures import save_figure
     from vibrokit.scene_file import load_scene
     from vibrokit.trade.basins import measure_basins
+    from vibrokit.trade.densities import measure_densities
     from vibrokit.trade.energies import measure_energies
     from vibrokit.trade.steppers import measure_steppers
 
@@ -182,7 +183,11 @@ def _trade(options: argparse.Namespace) -> None:
     with working(True):
         table = measure_steppers(osc)
         print(table, flush=True)
-        for measure in (measure_basins, partial(measure_energies, source=source)):
+        for measure in (
+            measure_basins,
+            partial(measure_energies, source=source),
+            partial(measure_densities, source=source),
+        ):
             try:
                 print(f"\n{measure(osc)}", flush=True)
             except VibrokitError as error:  # what was measured so far is worth its table
