@@ -23,7 +23,7 @@ def stepped(phi, feet=NODES, spread=0.0, parts=1, rough=EVERYWHERE_ROUGH):
     return out, marks
 
 
-@pytest.mark.parametrize(("depth", "spread", "parts"), [(1.0, 0.5, 1), (1.0, WIDEST, 5), (1e3, 0.02, 1)])
+@pytest.mark.parametrize(("depth", "spread", "parts"), [(1.0, 0.3, 1), (1.0, WIDEST, 5), (1e3, 0.02, 1)])
 def test_diffusion_of_a_gaussian_widens_it_by_the_variance(depth, spread, parts):
     variances = np.array([30.0, 40.0]) / depth
     found, _ = stepped(gaussian([20.0, 25.0], variances), spread=spread, parts=parts)
@@ -36,7 +36,7 @@ def test_diffusion_of_a_gaussian_widens_it_by_the_variance(depth, spread, parts)
 
 def test_diffusion_keeps_the_probability_of_a_step():
     phi = np.where(NODES[..., 1] < 25, 0.0, FLOOR)
-    found, _ = stepped(phi, spread=0.5, parts=1)
+    found, _ = stepped(phi, spread=0.9 * WIDEST)
     assert np.exp(found[:, 8:-8]).sum() == pytest.approx(np.exp(phi[:, 8:-8]).sum(), rel=1e-3)
     assert found.max() <= 1e-12
 
@@ -53,18 +53,18 @@ def test_wide_diffusion_is_a_sum_that_is_exact_at_any_depth(spread):
 
 
 def test_parts_are_narrow_enough_or_the_diffusion_is_summed():
-    assert [parts_of(WIDEST), parts_of(1.01 * WIDEST), parts_of(SUMMED), parts_of(1.01 * SUMMED)] == [1, 2, 4, 0]
+    assert [parts_of(WIDEST), parts_of(1.01 * WIDEST), parts_of(SUMMED), parts_of(1.01 * SUMMED)] == [1, 2, 6, 0]
 
 
 def test_nothing_is_computed_where_there_is_nothing():
     phi = np.full(NODES.shape[:2], FLOOR)
     phi[20, 25] = 0.0
-    found, marks = stepped(phi, spread=0.5)
+    found, marks = stepped(phi, spread=WIDEST)
     others = np.arange(len(phi)) != 20
     assert np.all(found[others] == FLOOR)
     assert np.all(marks[others] == EMPTY)
     assert np.all(marks[20, 22:28] == ROUGH)
-    assert np.exp(found[20]).sum() == pytest.approx(1.0, rel=1e-7)  # e⁻¹⁸ is lost, three nodes away
+    assert np.exp(found[20]).sum() == pytest.approx(1.0, rel=1e-7)
 
 
 @pytest.mark.parametrize("smooth", [True, False])

@@ -55,9 +55,9 @@ class DensityTrade:
 
     def __str__(self) -> str:
         heading = (
-            f"Rate {self.exit} at D = {self.intensity:g}. Error: distance of ln rate from {self.reference.log_rate:.5g},\n"
-            f"by {self.reference.setting}, whose own error is about {self.reference.estimated:.1e}.\n"
-            "Estimated: the error that SGCM estimates."
+            f"Rate {self.exit} at D = {self.intensity:g}.\n"
+            f"Error: distance of ln rate from {self.reference.log_rate:.5g}, by {self.reference.setting}, "
+            f"whose own error is about {self.reference.estimated:.1e}.\nEstimated: the error that SGCM estimates."
         )
         lines = [_HEADINGS]
         for row in (*self.rows, self.reference):

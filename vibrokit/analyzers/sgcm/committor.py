@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, QuasiStationary, Transition, remaining
+from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, QuasiStationary, Transition, remaining, spread_of
 from vibrokit.progress import advance, stage
 
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
@@ -33,12 +33,15 @@ class Committor:
     log_rate : float
         ln of the probability that leaves in one section interval for good.
     change : float
-        Change of it that further iteration would make.
+        Error of it that iteration leaves.
+    converged : bool
+        Whether iteration has ended by itself.
     """
 
     log_values: Array
     log_rate: float
     change: float
+    converged: bool
 
 
 def committor(
@@ -92,4 +95,4 @@ def committor(
             found = np.clip(np.logaddexp(reached_log, later + stays), floor, 0.0)
             change = remaining(rates, relaxation)
             advance()
-    return Committor(found, rates[-1], change)
+    return Committor(found, rates[-1], spread_of(rates, change), change <= converged)

@@ -22,7 +22,7 @@ _WINDOW = 4  # section intervals, at least: the largest changes of two windows g
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
-_STILL = 2e-3  # of ln rate: cycles of 1e-3 were seen, and errors of rates are above 1e-2
+_STILL = 1e-3  # of ln rate: means that differ by less are equal, as errors of rates are above 1e-2
 _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
 
@@ -68,7 +68,9 @@ class QuasiStationary:
     level : float
         ln p where most of it leaves.
     change : float
-        Change of the largest rate's logarithm that further iteration would make, estimated from the last ones.
+        Error of the largest rate's logarithm that iteration leaves.
+    converged : bool
+        Whether iteration has ended by itself.
     drift : float
         Relative change of the probability in one section interval by truncation errors, before it is normalized.
     intervals : int
@@ -79,6 +81,7 @@ class QuasiStationary:
     log_rates: Mapping[int, float]
     level: float
     change: float
+    converged: bool
     drift: float
     intervals: int
 
@@ -146,23 +149,31 @@ def quasi_stationary(
             change = remaining(rates, relaxation)
             advance()
     resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
-    return QuasiStationary(phi, highest, resolved, level, float(change), drift, intervals)
+    error = spread_of(rates, change)
+    return QuasiStationary(phi, highest, resolved, level, error, change <= converged, drift, intervals)
 
 
 def remaining(rates: list[float], relaxation: float) -> float:
     """Return the change of the last of some ln rates that further iteration would make.
 
-    It is the sum of a geometric series. Its ratio is that of how far the rates vary in two windows, as wide as the
-    relaxation, since a rate may change little for shorter times by chance. It is not below the square of that of the
-    slowest mode around the attractor, because the covariance of a density relaxes twice as fast as its mean; it is
-    above where a density takes longer to arrive than to relax. Rates that hardly vary in either window have ended in a
-    cycle between limits of interpolation, and do not change any further.
+    It is the sum of a geometric series of the means of three windows, as wide as half of the relaxation, since a rate
+    may change little for shorter times by chance, or cycle between limits of interpolation. Its ratio is not below the
+    square of that of the slowest mode around the attractor, because the covariance of a density relaxes twice as fast
+    as its mean; it is above where a density takes longer to arrive than to relax.
     """
-    window = max(_WINDOW, math.ceil(relaxation))
-    if len(rates) < 2 * window or not np.isfinite(rates[-2 * window :]).all():
+    window = max(_WINDOW, math.ceil(0.5 * relaxation))
+    if len(rates) < 3 * window or not np.isfinite(rates[-3 * window :]).all():
         return math.inf
-    before, now = np.ptp(np.reshape(rates[-2 * window :], (2, window)), axis=1).tolist()
+    means = np.mean(np.reshape(rates[-3 * window :], (3, window)), axis=1)
+    before, now = np.abs(np.diff(means)).tolist()
     if max(before, now) <= _STILL:
         return float(now)
     ratio = max(now / before, math.exp(-2 * window / relaxation)) if before > 0 else 1.0
     return float(now * ratio / (1 - ratio)) if ratio < 1 else math.inf
+
+
+def spread_of(rates: list[float], change: float) -> float:
+    """Return an error of the last of some ln rates: the change that is left, and half of how far they still vary."""
+    last = np.array(rates[-2 * _WINDOW :])
+    varies = 0.5 * float(np.ptp(last)) if np.isfinite(last).all() else math.inf
+    return (change if math.isfinite(change) else 2.0 * varies) + varies

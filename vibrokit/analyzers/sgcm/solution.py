@@ -24,18 +24,18 @@ from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
 from vibrokit.errors import StructureError
 from vibrokit.symbolic.flow_kind import Flow
 
-CONVERGED = 1e-2
-"""Change of ln rate that may be left by iteration."""
+_CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _ROUGHLY, _EXPLORED_TO = 0.03, 0.1  # the same with half the steps, and in exploration
 _STEP_ERROR = (
     1 / 7
 )  # of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30
+_STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
 _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
 _NARROWEST = 2.0  # the same on the finest grid, at least
 _WANTED = 4.0  # the same on the finest grid, by default
-_FEWEST = 120  # nodes along each side, by default
+_FEWEST, _MOST = 120, 400  # nodes along each side, by default
 _EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
 _MARGIN = 3  # nodes around it
@@ -82,9 +82,9 @@ class AtIntensity:
         }
 
     @property
-    def change(self) -> float:
-        """Change of ln rate that further iteration would make."""
-        return max([self.found.change, *(c.change for c in self.committors.values())])
+    def converged(self) -> bool:
+        """Whether all iterations have ended by themselves."""
+        return self.found.converged and all(c.converged for c in self.committors.values())
 
     @property
     def log_density(self) -> Array:
@@ -102,9 +102,10 @@ class AtIntensity:
     def begun(self, grid: DensityGrid, intensity: float) -> tuple[Array, dict[int, Array]]:
         """Return ln p and, by target, ln of the committor to begin iteration from on another grid, at less noise.
 
-        The shape of −D ln p and of −D ln c depends little on D.
+        The shape of −D ln p and of −D ln c depends little on D. Both begin lower than that: what is missing arrives
+        sooner than what is too much leaves, which may stay near a saddle for long.
         """
-        ratio = self.intensity / intensity
+        ratio = (self.intensity / intensity) ** _STEEPER
         committors = {target: grid.resampled(c.log_values, self.grid) * ratio for target, c in self.committors.items()}
         return grid.resampled(self.found.phi, self.grid) * ratio, committors
 
@@ -189,7 +190,7 @@ class DensitySolver:
         if self.shape is not None:
             return self.shape
         needed = math.sqrt(self._cores.resolved(explored, _WANTED) / intensity)
-        nx, nv = (max(math.ceil(needed * count), _FEWEST) for count in explored.shape)
+        nx, nv = (min(max(math.ceil(needed * count), _FEWEST), _MOST) for count in explored.shape)
         return nx, nv
 
     def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:
@@ -223,7 +224,7 @@ class DensitySolver:
         return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.is_out, executor)
 
     def _found(
-        self, transition: Transition, intensity: float, start: Array, converged: float = CONVERGED
+        self, transition: Transition, intensity: float, start: Array, converged: float = _CONVERGED
     ) -> QuasiStationary:
         sets = self._cores.others(transition.grid, intensity)
         entry = self._cores.entry(transition.grid, intensity)
@@ -235,7 +236,7 @@ class DensitySolver:
         intensity: float,
         found: QuasiStationary,
         starts: Mapping[int, Array],
-        converged: float = CONVERGED,
+        converged: float = _CONVERGED,
     ) -> dict[int, Committor]:
         """The committor of each target whose rate is known."""
         own, sets = self._cores.own(transition.grid, intensity), self._cores.others(transition.grid, intensity)
