@@ -95,8 +95,8 @@ print("mean exit time from the saddle, over that of the attractor:", time_ratios
 
 exact = 4 * zeta * barrier
 limit = result.energy("left-rest", "right-rest")
-for rate, depth in zip(left_rates, result.barrier("left-rest").values, strict=True):
-    print(f"D = {rate.intensity:g}: D ln τ = {-rate.intensity * rate.log_value:.4f}, −D ln p = {depth:.4f}")
+for rate, height in zip(left_rates, result.barrier("left-rest").values, strict=True):
+    print(f"D = {rate.intensity:g}: D ln τ = {-rate.intensity * rate.log_value:.4f}, −D ln p = {height:.4f}")
 print(f"limit D → 0: {limit.value:.4f}, between {limit.lower:.4f} and {limit.upper:.4f}; exact {exact:.4f}")
 
 # ---------------------------------------------------------------------------------------------------------------------
