@@ -90,8 +90,8 @@ print("mean exit time from the saddle, over that of the attractor:", time_ratios
 # 5. The limit of weak noise
 #
 # At one intensity, D ln τ differs from the activation energy by the prefactor, which is of the order of D. −D ln p at
-# the saddle differs less, here by half of the density at the saddle. From several intensities `SGCM` extrapolates the
-# limit D → 0 with an error estimate. The exact value is 4ζω_n times the barrier.
+# the saddle differs by D ln 2 here, since half of the stationary density there belongs to the other well. From several
+# intensities `SGCM` extrapolates the limit D → 0 with an error estimate. The exact value is 4ζω_n times the barrier.
 
 exact = 4 * zeta * barrier
 limit = result.energy("left-rest", "right-rest")
