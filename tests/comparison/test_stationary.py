@@ -61,8 +61,21 @@ def test_barrier_at_the_saddle(wells):
 
 def test_picture_shows_the_saddle(wells):
     artists = vk.StationaryDensity.of(wells).plot()
-    assert len(artists.saddles) == 1
+    assert len(artists.saddles) == len(artists.others) == 1
+    marked = np.concatenate([line.get_xdata() for line in (artists.attractor, *artists.others)])
+    np.testing.assert_allclose(np.sort(marked), [-1.0, 1.0], atol=1e-6)
+    assert len(vk.StationaryDensity.of(wells).plot(intensity=0.5, paths=[[[0.0, 0.0]]]).paths) == 1
     assert "x" in artists.ax.get_xlabel()
+
+
+def test_pictures_of_the_rates(wells):
+    assert len(wells.plot_rates().points) == 2
+    assert len(wells.plot_rates(source="left-rest").points) == 1
+    artists = wells.plot_slopes(limits=wells.energies)
+    assert artists.points == ()  # one intensity
+    assert len(artists.limits) == len(artists.bounds) == len(wells.energies)
+    with pytest.raises(vk.errors.StructureError):
+        wells.plot_slopes(source="neither")
 
 
 def test_an_attractor_without_a_density_is_named(wells):

@@ -14,7 +14,9 @@ from vibrokit.plots.axes import COLOURS, colour
 from vibrokit.plots.basins import STABLE, UNSTABLE, basin_map, section_portrait
 from vibrokit.plots.bifurcation import basin_fractions, bifurcation_diagram
 from vibrokit.plots.clipping import clipped
+from vibrokit.plots.exit_times import ExitTimes, exit_slopes, exit_times
 from vibrokit.plots.portraits import phase_portrait, steady_motions
+from vibrokit.plots.quasi_potential import quasi_potential_map
 from vibrokit.results import basins as records
 
 BOX = ((-1.0, 1.0), (-0.5, 0.5))
@@ -326,6 +328,50 @@ def test_a_search_that_found_no_exit_is_drawn(tmp_path):
     action_plot(ANGLES[:1], RADII[:1], [nothing], labels=[0], names=["a"]).figure.savefig(tmp_path / "p.png", dpi=40)
 
 
+# Mean exit times
+
+TIMES = ExitTimes([4e-3, 2e-3, 1e-3], [1 + 0.01 / d for d in (4e-3, 2e-3, 1e-3)], [0.1, 0.2, 0.3], 1, "a → b")
+
+
+def test_exit_times_are_drawn_against_the_inverse_intensity():
+    artists = exit_times([TIMES])
+    line, _, (bars,) = artists.points[0]
+    np.testing.assert_allclose(line.get_xydata(), [[250, 3.5], [500, 6.0], [1000, 11.0]])
+    lengths = [segment[1, 1] - segment[0, 1] for segment in bars.get_segments()]
+    np.testing.assert_allclose(lengths, [0.2, 0.4, 0.6])
+    assert names(artists.ax) == ["a → b"]
+
+
+def test_slopes_of_exact_exit_times_are_the_energy():
+    artists = exit_slopes([TIMES], [(1, "exact", 0.01, 0.009, 0.012)])
+    line, _, (bars,) = artists.points[0]
+    np.testing.assert_allclose(line.get_xydata(), [[2 / 750, 0.01], [2 / 1500, 0.01]])
+    lengths = [segment[1, 1] - segment[0, 1] for segment in bars.get_segments()]
+    np.testing.assert_allclose(lengths, [2 * np.hypot(0.1, 0.2) / 250, 2 * np.hypot(0.2, 0.3) / 500])
+    assert artists.limits[0].get_ydata()[0] == 0.01
+    assert (artists.bounds[0].get_y(), artists.bounds[0].get_height()) == pytest.approx((0.009, 0.003))
+    assert names(artists.ax) == ["a → b", "exact"]
+    assert to_rgba(artists.limits[0].get_color()) == to_rgba(line.get_color()) == to_rgba(colour(1))
+
+
+def test_one_intensity_has_no_slope(tmp_path):
+    artists = exit_slopes([ExitTimes([1e-3], [2.0], [0.1])])
+    assert artists.points == ()
+    assert artists.legend is None
+    exit_times([]).figure.savefig(tmp_path / "p.png", dpi=40)
+
+
+# Quasi-potentials
+
+
+def test_all_attractors_are_marked_on_a_quasi_potential():
+    artists = quasi_potential_map(np.ones((3, 2)), BOX, POINTS[0][0:1], names=["a", "b"], others={1: POINTS[1]})
+    assert [to_rgba(line.get_color()) for line in (artists.attractor, *artists.others)] == [
+        to_rgba(colour(label)) for label in (0, 1)
+    ]
+    assert names(artists.ax) == ["a", "b"]
+
+
 # All of them
 
 PICTURES = {
@@ -336,6 +382,8 @@ PICTURES = {
     "phase_portrait": lambda ax: phase_portrait(SMALL[:, 0], SMALL[:, 1], stops=(0.5,), ax=ax),
     "action_plot": lambda ax: action_plot(ANGLES, RADII, ACTIONS, labels=[0, 1], names=["a", "b"], ax=ax),
     "basin_fractions": lambda ax: basin_fractions([1, 2], [[0.5, 0.5]], ["a"], label="k (1)", ax=ax),
+    "exit_times": lambda ax: exit_times([TIMES], ax=ax),
+    "exit_slopes": lambda ax: exit_slopes([TIMES], [(0, "limit", 1.0, 0.9, 1.1)], ax=ax),
 }
 
 
@@ -358,7 +406,7 @@ def test_axes_that_are_given_are_drawn_into(draw, tmp_path):
 def test_no_window_is_ever_opened():
     code = (
         "import sys, vibrokit.plots.actions, vibrokit.plots.basins, vibrokit.plots.bifurcation\n"
-        "import vibrokit.plots.portraits, vibrokit.plots.trade\n"
+        "import vibrokit.plots.exit_times, vibrokit.plots.portraits, vibrokit.plots.trade\n"
         "assert not {'matplotlib.pyplot', 'vibrokit.results', 'numba', 'sympy'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

@@ -289,3 +289,45 @@ def test_what_is_left_first_and_what_lasts(least):
 def test_pictures_of_the_least_action(least, tmp_path):
     least.save_pictures(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(least.PICTURES)
+
+
+# -- 05: densities ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def densities(run):
+    return run("05_densities")
+
+
+def test_density_of_the_well_is_the_one_of_boltzmann_to_a_depth_of_50(densities):
+    assert densities.stationary.occupancies.values == pytest.approx(0.5, rel=1e-6)
+    assert densities.depth == pytest.approx(50.0)
+    assert max(densities.misfits) < 0.25
+
+
+def test_rates_of_the_well_are_those_of_kramers(densities):
+    """The formula has an error of 2 % at these intensities (tests/physics/test_densities.py)."""
+    for rate in densities.left_rates:
+        expected = (np.sqrt(1.04) - 0.2) / (np.sqrt(2) * np.pi) * np.exp(-0.2 / rate.intensity)
+        assert rate.value == pytest.approx(expected, rel=0.08)
+        assert rate.lower <= expected <= rate.upper
+
+
+def test_both_wells_are_equally_likely_from_the_saddle(densities):
+    assert densities.at_saddle == pytest.approx(0.5, abs=0.005)
+    assert densities.time_ratios == pytest.approx(0.5, abs=0.005)
+
+
+def test_limit_of_weak_noise_is_the_barrier(densities):
+    assert densities.limit.lower <= 0.2 <= densities.limit.upper
+    assert densities.limit.value == pytest.approx(0.2, rel=0.01)
+
+
+def test_transients_are_those_of_simulated_trajectories(densities):
+    assert densities.history.mass == pytest.approx(1.0, abs=1e-3)
+    assert max(densities.differences) < 0.02
+
+
+def test_pictures_of_the_densities(densities, tmp_path):
+    densities.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(densities.PICTURES)

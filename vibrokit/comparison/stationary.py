@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import logsumexp
 
@@ -108,15 +109,26 @@ class StationaryDensity:
         coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
         return xarray.DataArray(values, coordinates, ("intensity", "x", "v"), name)
 
-    def plot(self, ax: Any = None, intensity: float | None = None) -> QuasiPotentialArtists:
-        """Draw −D ln p at an intensity, the least one by default, with attractors and saddles."""
+    def plot(
+        self, ax: Any = None, intensity: float | None = None, paths: Sequence[ArrayLike] = ()
+    ) -> QuasiPotentialArtists:
+        """Draw −D ln p with all attractors and saddles; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        intensity : float, optional
+            The nearest one that is known; by default the least.
+        paths : sequence of array_like (count, 2)
+            Points on the section that are drawn over it, such as ``path.q[path.section]`` of an exit path.
+        """
         from vibrokit.plots.quasi_potential import quasi_potential_map
 
-        chosen = self.intensities[-1] if intensity is None else intensity
-        found = self.quasi_potential.sel(intensity=chosen, method="nearest").values
+        chosen = self._place(intensity)
+        found = self.quasi_potential.values[chosen]
         half = [0.5 * (axis[1] - axis[0]) for axis in (self.x, self.v)]
         bounds = [(self.x[0] - half[0], self.x[-1] + half[0]), (self.v[0] - half[1], self.v[-1] + half[1])]
-        likeliest = int(np.argmax(self.log_occupancies[-1]))
+        likeliest = int(np.argmax(self.log_occupancies[chosen]))
         return quasi_potential_map(
             found,
             bounds,
@@ -124,9 +136,15 @@ class StationaryDensity:
             label=likeliest,
             names=self.names,
             top=self._shown(found),
+            others={label: points for label, points in enumerate(self.section.points) if label != likeliest},
             saddles=self.section.saddles,
+            paths=paths,
             ax=ax,
         )
+
+    def _place(self, intensity: float | None) -> int:
+        """Which intensity is the nearest one, the least by default."""
+        return int(np.argmin(np.abs(self.intensities - (0.0 if intensity is None else intensity))))
 
     def _shown(self, potential: Array) -> float | None:
         """The value up to which a picture tells shades apart: somewhat above the highest saddle."""

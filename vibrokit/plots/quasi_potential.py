@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class QuasiPotentialArtists(Artists):
     contours : QuadContourSet or None
         None if the quasi-potential is flat or unknown.
     attractor : Line2D
-    saddles, paths : tuple of Line2D
+    others, saddles, paths : tuple of Line2D
         The markers of each.
     colorbar : Colorbar
     """
@@ -45,6 +46,7 @@ class QuasiPotentialArtists(Artists):
     image: AxesImage
     contours: QuadContourSet | None
     attractor: Line2D
+    others: tuple[Line2D, ...]
     saddles: tuple[Line2D, ...]
     paths: tuple[Line2D, ...]
     colorbar: Colorbar
@@ -58,6 +60,7 @@ def quasi_potential_map(
     label: int = 0,
     names: Sequence[str] = (),
     top: float | None = None,
+    others: Mapping[int, ArrayLike] = MappingProxyType({}),
     saddles: Sequence[ArrayLike] = (),
     paths: Sequence[ArrayLike] = (),
     ax: Axes | None = None,
@@ -78,6 +81,8 @@ def quasi_potential_map(
         Names of all attractors, in the order of their labels.
     top : float, optional
         Value above which all shades are the same; by default the largest.
+    others : mapping from int to array_like (count, n), optional
+        Points of other attractors, by label.
     saddles : sequence of array_like (count, n)
     paths : sequence of array_like (count, n)
         Points of exit paths on the section.
@@ -100,7 +105,10 @@ def quasi_potential_map(
         x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
         levels = np.linspace(0.0, highest, _LEVELS)[1:-1]
         contours = axes.contour(x, v, psi.T, levels=levels, colors="0.25", linewidths=0.4)
-    attractor = draw(axes, points, color=colour(label), label=attractor_name(label, names), **_ATTRACTOR)
+    attractor, *more = (
+        draw(axes, place, color=colour(own), label=attractor_name(own, names), **_ATTRACTOR)
+        for own, place in ((label, points), *others.items())
+    )
     crosses, dots = (
         tuple(draw(axes, place, label="_more" if k else name, **style) for k, place in enumerate(places))
         for places, name, style in ((saddles, "saddle", _SADDLE), (paths, "exit path", _PATH))
@@ -113,7 +121,7 @@ def quasi_potential_map(
     )  # fmt: skip
     bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.legend(
-        handles=named((attractor, *crosses, *dots)), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=8,
-        frameon=False,
+        handles=named((attractor, *more, *crosses, *dots)), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=4,
+        fontsize=8, frameon=False,
     )  # fmt: skip
-    return QuasiPotentialArtists(axes, image, contours, attractor, crosses, dots, bar)
+    return QuasiPotentialArtists(axes, image, contours, attractor, tuple(more), crosses, dots, bar)

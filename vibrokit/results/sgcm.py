@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,11 +12,13 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.labels import source_among
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
+    from vibrokit.plots.exit_times import ExitTimeArtists, ExitTimes, SlopeArtists
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
 
 
@@ -147,6 +150,59 @@ class SGCMResult(Result):
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
         """Draw −D ln p at the least intensity; see `Result.plot_quasi_potential`."""
         return self.plot_quasi_potential(source, ax)
+
+    def plot_rates(self, ax: Any = None, source: int | str | None = None) -> ExitTimeArtists:
+        """Draw ln τ against 1/D, τ = 1/rate; see `vibrokit.plots.exit_times.exit_times`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        source : int or str, optional
+            By default all attractors.
+        """
+        from vibrokit.plots.exit_times import exit_times
+
+        return exit_times(self._exit_times(source), ax=ax)
+
+    def plot_slopes(
+        self, ax: Any = None, source: int | str | None = None, limits: Iterable[ActivationEnergy] = ()
+    ) -> SlopeArtists:
+        """Draw d ln τ/d(1/D) against D; see `vibrokit.plots.exit_times.exit_slopes`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        source : int or str, optional
+            By default all attractors.
+        limits : iterable of ActivationEnergy
+            Drawn with their bounds; the slopes tend to them as D → 0. Those of `LeastAction` do not depend on D.
+        """
+        from vibrokit.plots.exit_times import exit_slopes
+
+        lines = [(e.source, f"{self.exit_of(e)}, {e.method}", e.value, e.lower, e.upper) for e in limits]
+        return exit_slopes(self._exit_times(source), lines, ax=ax)
+
+    def _exit_times(self, source: int | str | None) -> list[ExitTimes]:
+        """The mean times of every exit of one attractor, or of all, over intensity."""
+        from vibrokit.plots.exit_times import ExitTimes
+
+        found, rates = [], self.rates
+        if source is not None:
+            label = source_among({rate.source for rate in rates}, source, self.names, "rate", "of")
+            rates = tuple(rate for rate in rates if rate.source == label)
+        for start, target in dict.fromkeys((rate.source, rate.target) for rate in rates):
+            own = [rate for rate in rates if (rate.source, rate.target) == (start, target)]
+            goal = self.names[target] if target >= 0 else "exit"
+            found.append(
+                ExitTimes(
+                    [rate.intensity for rate in own],
+                    [-rate.log_value for rate in own],
+                    [rate.log_error for rate in own],
+                    start,
+                    f"{self.names[start]} → {goal}",
+                )
+            )
+        return found
 
 
 def _over_nodes(values: NDArray[np.float64], one: xarray.Dataset, name: str) -> xarray.DataArray:

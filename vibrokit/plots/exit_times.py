@@ -1,0 +1,156 @@
+"""Pictures of mean exit times against the noise intensity."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.container import ErrorbarContainer
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike, NDArray
+
+from vibrokit.plots.artists import Artists
+from vibrokit.plots.axes import axes_or_new, colour, named, span
+
+_POINTS: dict[str, Any] = {"marker": "o", "markersize": 4.5, "capsize": 2.5, "linewidth": 1.0}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExitTimes:
+    """Mean exit times of one exit at several noise intensities.
+
+    Attributes
+    ----------
+    intensities : array (count,)
+        D (m² s⁻³).
+    log_times : array (count,)
+        ln τ, τ in s.
+    errors : array (count,)
+        Error estimates of ln τ.
+    label : int
+        Of the attractor that is left: chooses the colour.
+    title : str
+        What the legend calls the exit.
+    """
+
+    intensities: ArrayLike
+    log_times: ArrayLike
+    errors: ArrayLike
+    label: int = 0
+    title: str = ""
+
+    def in_order(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return 1/D in ascending order, ln τ and its errors."""
+        inverse = 1.0 / np.asarray(self.intensities, dtype=float)
+        order = np.argsort(inverse)
+        return inverse[order], np.asarray(self.log_times, float)[order], np.asarray(self.errors, float)[order]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExitTimeArtists(Artists):
+    """Mean exit times.
+
+    Attributes
+    ----------
+    ax : Axes
+    points : tuple of ErrorbarContainer
+        One for each exit.
+    legend : Legend or None
+    """
+
+    points: tuple[ErrorbarContainer, ...]
+    legend: Legend | None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SlopeArtists(Artists):
+    """Local slopes of ln τ.
+
+    Attributes
+    ----------
+    ax : Axes
+    points : tuple of ErrorbarContainer
+        One for each exit that has two intensities or more.
+    limits : tuple of Line2D
+        Activation energies.
+    bounds : tuple of Rectangle
+        What lies between their bounds.
+    legend : Legend or None
+    """
+
+    points: tuple[ErrorbarContainer, ...]
+    limits: tuple[Line2D, ...]
+    bounds: tuple[Rectangle, ...]
+    legend: Legend | None
+
+
+def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTimeArtists:
+    """Draw ln τ against 1/D, with error bars. The slope tends to the activation energy as D → 0.
+
+    Parameters
+    ----------
+    exits : sequence of ExitTimes
+    ax : matplotlib Axes, optional
+    """
+    axes = axes_or_new(ax)
+    points = []
+    for one in exits:
+        inverse, log_times, errors = one.in_order()
+        points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **_POINTS))
+    axes.set_xlabel(r"inverse noise intensity $1/D$ (m$^{-2}$ s$^{3}$)")
+    axes.set_ylabel(r"mean exit time $\ln(\tau / 1\,\mathrm{s})$")
+    axes.ticklabel_format(axis="x", style="sci", scilimits=(-2, 4), useMathText=True)
+    return ExitTimeArtists(axes, tuple(points), _legend(axes, points))
+
+
+def exit_slopes(
+    exits: Sequence[ExitTimes],
+    limits: Sequence[tuple[int, str, float, float, float]] = (),
+    *,
+    ax: Axes | None = None,
+) -> SlopeArtists:
+    """Draw the local slope d ln τ/d(1/D) against D, with error bars, and its limits as D → 0.
+
+    A slope is the difference between two neighbouring intensities; it is drawn at the middle of their 1/D.
+
+    Parameters
+    ----------
+    exits : sequence of ExitTimes
+    limits : sequence of (label, title, value, lower, upper)
+        Activation energies and their bounds (m² s⁻³), drawn over all D.
+    ax : matplotlib Axes, optional
+    """
+    axes = axes_or_new(ax)
+    points, seen = [], list[Any]()
+    for one in exits:
+        inverse, log_times, errors = one.in_order()
+        if len(inverse) < 2:
+            continue
+        steps = np.diff(inverse)
+        slopes = np.diff(log_times) / steps
+        spreads = np.hypot(errors[1:], errors[:-1]) / steps
+        places = 2.0 / (inverse[1:] + inverse[:-1])
+        points.append(axes.errorbar(places, slopes, spreads, color=colour(one.label), label=one.title, **_POINTS))
+        seen += [slopes - spreads, slopes + spreads]
+    lines, bounds = list[Line2D](), list[Rectangle]()
+    for label, title, value, lower, upper in limits:
+        lines.append(axes.axhline(value, color=colour(label), linestyle="--", linewidth=1.2, label=title))
+        bounds.append(axes.axhspan(lower, upper, color=colour(label), alpha=0.15, linewidth=0))
+        seen += [lower, upper]
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(span(seen))
+    axes.set_xlabel(r"noise intensity $D$ (m$^2$ s$^{-3}$)")
+    axes.set_ylabel(r"slope $\mathrm{d}\ln\tau\,/\,\mathrm{d}(1/D)$ (m$^2$ s$^{-3}$)")
+    axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+    return SlopeArtists(axes, tuple(points), tuple(lines), tuple(bounds), _legend(axes, [*points, *lines]))
+
+
+def _legend(axes: Axes, artists: Sequence[Any]) -> Legend | None:
+    """A legend of what has a name, if anything has."""
+    handles = named(artists)
+    return axes.legend(handles=handles, fontsize=8, frameon=False) if handles else None
