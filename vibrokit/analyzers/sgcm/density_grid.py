@@ -20,7 +20,7 @@ from vibrokit.results.region import Region
 from vibrokit.structure.validation import pair
 
 _FEWEST = 32  # nodes along each side
-_UNRESOLVED = 1.0  # in ln p above the floor
+_UNRESOLVED = 2.0  # in ln p above the floor: what is cut at 1 above it leaves an edge that is a little higher
 _FEW = 64  # centres, each with its own ellipse
 _FINER = 5  # points along each side of a cell, which decide how much of it a set covers
 _PLACES = 4001  # in x, where the stiffness is evaluated

@@ -141,7 +141,7 @@ def quasi_stationary(
             level = max(log_rates[target] - areas[target] for target in areas)
             least = min(log_rates[target] - areas[target] for target in areas)
             floor = max(least, level - _RAREST) - _BELOW
-            phi[empty] = floor
+            phi = np.where(empty, floor, np.maximum(phi, floor))
             left = min(math.exp(np.logaddexp.reduce(list(log_rates.values()))), 1.0) if log_rates else 0.0
             if left > 0:
                 phi = np.logaddexp(phi + math.log1p(-left * ABSORBED), entry + math.log(left))
