@@ -142,6 +142,22 @@ def test_noise_with_states_of_its_own(structure):
         vk.SGCM().run(coloured, vk.find_structure(coloured, cells=(20, 20), manifolds=False, rng=0))
 
 
+class LeaveStrip(vk.LeaveRegion):
+    """|x| ≥ 0.5."""
+
+    def bounds(self, osc):
+        """A strip that is not bounded in v."""
+        return np.array([[-0.5, 0.5], [-np.inf, np.inf]])
+
+
+def test_an_equilibrium_alone_is_left_by_position():
+    osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-2))
+    structure = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(20, 20), manifolds=False)
+    (rate,) = vk.SGCM(intensities=(1e-2,), exit=LeaveStrip(), nodes=(64, 64), steps=8).run(osc, structure).rates
+    assert rate.event == "contact"
+    assert 0 < rate.value < 1
+
+
 def test_one_attractor_has_nowhere_to_go():
     osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-3))
     with pytest.raises(vk.errors.StructureError, match="only one attractor"):

@@ -83,11 +83,10 @@ class Cores:
         """Return the region of the structure, and the orbits of all attractors at all times with the density there."""
         structure = self.problem.structure
         orbits = np.concatenate([attractor.orbit[:, :2] for attractor in structure.attractors])
-        around_orbits = Region.around(orbits, _WIDER).bounds
         spread = np.diagonal(self.covariances[self.problem.source], axis1=1, axis2=2).max(axis=0)
         beyond = _DEVIATIONS * np.sqrt(intensity * spread)
-        low = np.minimum(around_orbits[:, 0], orbits.min(axis=0) - beyond)
-        high = np.maximum(around_orbits[:, 1], orbits.max(axis=0) + beyond)
+        beyond = np.maximum(beyond, _WIDER * np.ptp(orbits, axis=0))
+        low, high = orbits.min(axis=0) - beyond, orbits.max(axis=0) + beyond
         own = structure.basins.region.bounds
         return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
 
