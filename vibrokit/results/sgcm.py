@@ -92,11 +92,10 @@ class SGCMResult(Result):
         if not points:
             raise StructureError("the structure has no saddle.")
         places = xarray.DataArray(np.array(points), dims=("saddle_point", "component"))
-        grid = one["log_density"].assign_coords(density_node_x=one["density_x"], density_node_v=one["density_v"])
-        there = grid.interp(density_node_x=places[:, 0], density_node_v=places[:, 1])
-        depths = (one["log_density"].max(("density_node_x", "density_node_v")) - there).min("saddle_point")
-        found: xarray.DataArray = (one["rate_intensity"] * depths).rename("barrier")
-        return found
+        found = _over_nodes(one["log_density"].values, one, "barrier")
+        depths = found.max(("x", "v")) - found.interp(x=places[:, 0], v=places[:, 1])
+        barrier: xarray.DataArray = found["intensity"] * depths.min("saddle_point")
+        return barrier.rename("barrier").assign_attrs(units="m2 s-3")
 
     def committor(self, source: int | str, target: int | str | None = None) -> xarray.DataArray:
         """Return the probability to reach a target before the core of the source, over (intensity, x, v).

@@ -22,6 +22,7 @@ _WINDOW = 4  # section intervals, at least: the largest changes of two windows g
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
+_CROSSED = 4.0  # relaxations, in which what is missing at the start arrives from the attractor: before, a rate may rest
 _STILL = 1e-3  # of ln rate: means that differ by less are equal, as errors of rates are above 1e-2
 _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
@@ -162,7 +163,7 @@ def remaining(rates: list[float], relaxation: float) -> float:
     as its mean; it is above where a density takes longer to arrive than to relax.
     """
     window = max(_WINDOW, math.ceil(0.5 * relaxation))
-    if len(rates) < 3 * window or not np.isfinite(rates[-3 * window :]).all():
+    if len(rates) < max(3 * window, _CROSSED * relaxation) or not np.isfinite(rates[-3 * window :]).all():
         return math.inf
     means = np.mean(np.reshape(rates[-3 * window :], (3, window)), axis=1)
     before, now = np.abs(np.diff(means)).tolist()
