@@ -36,7 +36,7 @@ class ExitRate:
 
     @property
     def value(self) -> float:
-        """Exits per unit of time (s⁻¹) while the density that has not left keeps its shape."""
+        """The inverse of the mean time from the core of the attractor to the exit (s⁻¹), if there is no other exit."""
         return math.exp(self.log_value)
 
     @property
