@@ -131,6 +131,7 @@ def test_a_time_limit_keeps_what_was_reached():
         ({"nodes": (1, 1)}, "(1, 1)"),
         ({"steps": 0}, "0"),
         ({"steps": 7}, "7"),
+        ({"start": ((0.0, 1e-4), (0.0, 1e-4)), "nodes": (50, 50)}, "contains no node"),
         ({"phase": 1.0}, "1"),
     ],
 )

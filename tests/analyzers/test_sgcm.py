@@ -154,11 +154,21 @@ def test_noise_with_states_of_its_own(structure):
 
 
 class LeaveStrip(vk.LeaveRegion):
-    """|x| ≥ 0.5."""
+    """|x| beyond half a width."""
+
+    half: float = 0.5
 
     def bounds(self, osc):
         """A strip that is not bounded in v."""
-        return np.array([[-0.5, 0.5], [-np.inf, np.inf]])
+        return np.array([[-self.half, self.half], [-np.inf, np.inf]])
+
+
+def test_an_exit_that_the_density_does_not_reach_has_no_rate():
+    osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-2))
+    structure = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(20, 20), manifolds=False)
+    found = vk.SGCM(intensities=(1e-2,), exit=LeaveStrip(half=50.0), nodes=(40, 40), steps=8).run(osc, structure)
+    assert not found.rates
+    assert not found.energies
 
 
 def test_an_equilibrium_alone_is_left_by_position():

@@ -209,6 +209,10 @@ def _start(grid: DensityGrid, start: Any) -> Array:
         )
     if box is not None:
         inside = ((grid.nodes >= box[:, 0]) & (grid.nodes <= box[:, 1])).all(axis=-1)
+        if not inside.any():
+            raise StructureError(
+                f"evolve_density: start {shown(start)} contains no node of {grid.shape}; widen it, or raise nodes."
+            )
         phi = np.where(inside, 0.0, -_DEPTH)
     else:
         roots = np.eye(2) / (_START * grid.local_spacing(corners))[:, None, :]

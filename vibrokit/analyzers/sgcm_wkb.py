@@ -98,7 +98,7 @@ class SGCM(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
-        noise = checked_noise(problem.osc)
+        noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
         orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
@@ -173,7 +173,9 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
             ),
             "log_committor": (
                 ("intensity_index", "exit_index", "density_node_x", "density_node_v"),
-                np.array([[_committor(one, target) for target in targets] for one in solved]),
+                np.array([[_committor(one, target) for target in targets] for one in solved]).reshape(
+                    len(solved), len(targets), *last.grid.shape
+                ),
                 {"long_name": "logarithm of the probability to reach an exit before the own core", "units": "1"},
             ),
             "mass_drift": (

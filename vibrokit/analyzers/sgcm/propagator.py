@@ -157,10 +157,10 @@ def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array,
     return out, marks
 
 
-def checked_noise(osc: Oscillator) -> NoiseModel:
-    """Return the noise; raises SceneError if there is none, or if it has states of its own."""
-    if osc.noise is None:
-        raise SceneError("the scene has no noise, so a density does not spread; give it a noise model.")
+def checked_noise(osc: Oscillator, needs_intensity: bool = True) -> NoiseModel:
+    """Return the noise; raises SceneError if there is none, if its D is 0, or if it has states of its own."""
+    if osc.noise is None or (needs_intensity and not osc.noise.intensity > 0):
+        raise SceneError("the scene has no noise, so a density does not spread; give it a noise model with D > 0.")
     if osc.noise.extra_states:
         extra = len(osc.noise.extra_states)
         raise SceneError(

@@ -141,7 +141,8 @@ def quasi_stationary(
             rates.append(max(log_rates.values()))
             level = max(log_rates[target] - areas[target] for target in areas)
             least = min(log_rates[target] - areas[target] for target in areas)
-            floor = max(least, level - _RAREST) - _BELOW
+            if math.isfinite(level):  # otherwise nothing has reached an exit yet
+                floor = max(least, level - _RAREST) - _BELOW
             phi = np.where(empty, floor, np.maximum(phi, floor))
             left = min(math.exp(np.logaddexp.reduce(list(log_rates.values()))), 1.0) if log_rates else 0.0
             if left > 0:
