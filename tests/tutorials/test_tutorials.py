@@ -299,12 +299,14 @@ def densities(run):
     return run("05_densities")
 
 
+@pytest.mark.slow
 def test_density_of_the_well_is_the_one_of_boltzmann_to_a_depth_of_50(densities):
     assert densities.stationary.occupancies.values == pytest.approx(0.5, rel=1e-6)
     assert densities.depth == pytest.approx(50.0)
     assert max(densities.misfits) < 0.25
 
 
+@pytest.mark.slow
 def test_rates_of_the_well_are_those_of_kramers(densities):
     """The formula has an error of 2 % at these intensities (tests/physics/test_densities.py)."""
     for rate in densities.left_rates:
@@ -313,21 +315,25 @@ def test_rates_of_the_well_are_those_of_kramers(densities):
         assert rate.lower <= expected <= rate.upper
 
 
+@pytest.mark.slow
 def test_both_wells_are_equally_likely_from_the_saddle(densities):
     assert densities.at_saddle == pytest.approx(0.5, abs=0.005)
     assert densities.time_ratios == pytest.approx(0.5, abs=0.005)
 
 
+@pytest.mark.slow
 def test_limit_of_weak_noise_is_the_barrier(densities):
     assert densities.limit.lower <= 0.2 <= densities.limit.upper
     assert densities.limit.value == pytest.approx(0.2, rel=0.01)
 
 
+@pytest.mark.slow
 def test_transients_are_those_of_simulated_trajectories(densities):
     assert densities.history.mass == pytest.approx(1.0, abs=1e-3)
     assert max(densities.differences) < 0.02
 
 
+@pytest.mark.slow
 def test_pictures_of_the_densities(densities, tmp_path):
     densities.save_pictures(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(densities.PICTURES)
