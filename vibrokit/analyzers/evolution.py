@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
+from vibrokit.analyzers.sgcm.density_flow import (
+    DensityFlow,
+    check_allowed_memory,
+    check_memory,
+    check_steps,
+    steps_for,
+)
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
 from vibrokit.errors import StructureError, shown
@@ -103,6 +109,7 @@ def evolve_density(
     grid = DensityGrid.of(osc, area, shape)
     count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
     check_steps("evolve_density", count)
+    check_allowed_memory("evolve_density", max_memory_gib)
     check_memory(shape, DensityFlow.memory(shape, count, osc.autonomous), count, max_memory_gib)
     begun = _start(grid, start)
     kept: list[Array] = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
+from vibrokit.analyzers.sgcm.density_flow import check_allowed_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
@@ -90,9 +90,7 @@ class SGCM(Analyzer):
             check_steps("SGCM", self.steps)
         if self.samples is not None:
             whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
-        memory = self.max_memory_gib
-        if isinstance(memory, bool) or not isinstance(memory, Real) or not memory > 0:
-            raise StructureError(f"SGCM: max_memory_gib must be a positive number of GiB, got {shown(memory)}.")
+        check_allowed_memory("SGCM", self.max_memory_gib)
         if self.intensities is not None:
             object.__setattr__(self, "intensities", _checked_intensities(self.intensities))
 

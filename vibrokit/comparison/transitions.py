@@ -15,7 +15,7 @@ from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
 from vibrokit.errors import StructureError
-from vibrokit.results.labels import label_of
+from vibrokit.results.labels import exit_between, label_of
 from vibrokit.results.result import Result
 from vibrokit.text_table import text_table
 
@@ -249,7 +249,7 @@ class Transitions:
     def _sentence(self, cycle: Cycle) -> str:
         group = f", from the group {self._listed(cycle.members)}" if len(cycle.members) > 1 else ""
         energy = _shown(cycle.energy, cycle.lower, cycle.upper)
-        return f"{self.names[cycle.source]} → {self.names[cycle.target]}: {energy}{group}"
+        return f"{exit_between(self.names, cycle.source, cycle.target)}: {energy}{group}"
 
     def _listed(self, labels: Sequence[int]) -> str:
         return ", ".join(self.names[label] for label in labels)

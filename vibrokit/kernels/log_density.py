@@ -297,7 +297,7 @@ def _closed_row(
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _above(row: Array, floor: float) -> tuple[int, int]:
-    """The first and the last node of a row above the floor; the last is before the first if there is none."""
+    """The first and the last node of a row above the floor; if no node is, the last is less than the first."""
     first, last = 0, len(row) - 1
     while first <= last and not row[first] > floor:
         first += 1
@@ -372,8 +372,8 @@ def step_rows(
             continue
         if len(weight) > 0:
             row += weight[i]
+        reach = int(_REACH * max(spreads[i].max(), 0.5)) + 1
         for _ in range(max(parts, 1)):
-            reach = int(_REACH * max(spreads[i].max(), 0.5)) + 1
             from_node, to_node = max(low - reach, 0), min(high + reach, nv - 1)
             _mark_row(row, from_node - 1, to_node, rough)
             if _closed_row(row, spreads[i], from_node, to_node, other, rough, summed, curvatures):

@@ -27,6 +27,7 @@ from vibrokit.results.fields import (
     Whole,
     Word,
 )
+from vibrokit.results.labels import exit_between
 from vibrokit.results.table import Table
 
 
@@ -156,8 +157,7 @@ class ActivationEnergy:
 
     def exit_between(self, names: Sequence[str]) -> str:
         """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""
-        source, target = (names[label] if label >= 0 else "exit" for label in (self.source, self.target))
-        return f"{source} → {target}"
+        return exit_between(names, self.source, self.target)
 
 
 _ACTION = "m2 s-3"

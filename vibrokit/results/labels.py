@@ -9,6 +9,11 @@ from typing import Any
 from vibrokit.errors import StructureError, nearest, shown
 
 
+def exit_between(names: Sequence[str], source: int, target: int) -> str:
+    """Return the names of the attractors between which an exit leads, such as ``"hammering → clear"``."""
+    return f"{names[source]} → {names[target] if target >= 0 else 'exit'}"
+
+
 def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:
     """Return the label of an attractor given by its label, its name or the beginning of its name.
 

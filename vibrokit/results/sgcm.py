@@ -14,7 +14,7 @@ from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.labels import source_among
+from vibrokit.results.labels import exit_between, source_among
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ class SGCMResult(Result):
         one = self._of(source)
         logs = one["log_committor"].assign_coords(exit_index=one["rate_target"].values)
         if target is not None:
-            known = [label for label in one["rate_target"].values.tolist() if label >= 0]
-            logs = logs.sel(exit_index=[source_among(known, target, self.names, "rate", "to")])
+            targets = [label for label in one["rate_target"].values.tolist() if label >= 0]
+            logs = logs.sel(exit_index=[source_among(targets, target, self.names, "rate", "to")])
         probabilities = np.exp(logs.transpose("exit_index", ...).values)
         known = np.isfinite(probabilities).any(axis=0)
         return _over_nodes(np.where(known, np.nansum(probabilities, axis=0), np.nan), one, "committor")
@@ -191,14 +191,13 @@ class SGCMResult(Result):
             rates = tuple(rate for rate in rates if rate.source == label)
         for start, target in dict.fromkeys((rate.source, rate.target) for rate in rates):
             own = [rate for rate in rates if (rate.source, rate.target) == (start, target)]
-            goal = self.names[target] if target >= 0 else "exit"
             found.append(
                 ExitTimes(
                     [rate.intensity for rate in own],
                     [-rate.log_value for rate in own],
                     [rate.log_error for rate in own],
                     start,
-                    f"{self.names[start]} → {goal}",
+                    exit_between(self.names, start, target),
                 )
             )
         return found

@@ -14,6 +14,7 @@ from vibrokit.errors import SceneError, StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.finding import Code
+from vibrokit.results.labels import exit_between
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure
 from vibrokit.structure.find import find_structure
@@ -115,7 +116,7 @@ def measure_densities(
         with stage("densities", subject=found.names[label], unit="settings", total=len(settings)):
             rows = [_measured(osc, found, setting, target, shape) for setting in settings]
     compared = tuple(dataclasses.replace(row, error=abs(row.log_rate - rows[-1].log_rate)) for row in rows)
-    where = f"{found.names[label]} → {found.names[target]}"
+    where = exit_between(found.names, label, target)
     return DensityTrade(where, intensities[0], dataclasses.replace(rows[-1], error=math.nan), compared[:-1])
 
 

@@ -23,6 +23,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.labels import exit_between
 from vibrokit.results.structure import Structure
 from vibrokit.structure.find import find_structure
 from vibrokit.symbolic.flow_kind import Flow
@@ -179,7 +180,7 @@ def _compared(
     names = problem.structure.names
     runs = {"shooting": shot, "graph": graphed, "polishing": polished}
     return EnergyTrade(
-        exit=f"{problem.attractor.name} → {names[target] if target >= 0 else 'exit'}",
+        exit=exit_between(names, problem.source, target),
         reference=reference,
         reference_from=repr(stepper),
         residual=residual,

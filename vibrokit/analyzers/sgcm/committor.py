@@ -13,10 +13,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, QuasiStationary, Transition, remaining, spread_of
+from vibrokit.analyzers.sgcm.cores import CoreSets
+from vibrokit.analyzers.sgcm.quasi_stationary import (
+    ABSORBED,
+    Backward,
+    QuasiStationary,
+    most_intervals,
+    remaining,
+    spread_of,
+)
 from vibrokit.progress import advance, stage
 
-_INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
 _BELOW = 20.0  # in ln c: the floor lies that far below the rate
 
 Array = NDArray[np.float64]
@@ -45,10 +52,10 @@ class Committor:
 
 
 def committor(
-    transition: Transition,
+    earlier: Backward,
     density: QuasiStationary,
-    own: Array,
-    sets: dict[int, Array],
+    cores: CoreSets,
+    areas: Array,
     target: int,
     relaxation: float,
     converged: float,
@@ -62,13 +69,12 @@ def committor(
 
     Parameters
     ----------
-    transition : Transition
+    earlier : Backward
     density : QuasiStationary
-        On the same nodes.
-    own : array (nx, nv)
-        How much of each cell belongs to the core of the attractor that is left.
-    sets : dict of int to array (nx, nv)
-        By target: the same for the sets that absorb on the section. If empty, the exit is one by position.
+    cores : CoreSets
+        Those of others absorb on the section. If there are no others, the exit is one by position.
+    areas : array (nx, 1)
+        Area that belongs to each node.
     target : int
     relaxation : float
         Section intervals in which deviations of the density fall by a factor e.
@@ -78,15 +84,15 @@ def committor(
         ln c, for example of stronger noise.
     """
     floor = density.log_rates[target] - _BELOW
-    reached = sets.get(target, np.zeros_like(own))
-    elsewhere = sum((covered for label, covered in sets.items() if label != target), own)
+    own = cores.own
+    reached = cores.others.get(target, np.zeros_like(own))
+    elsewhere = sum((covered for label, covered in cores.others.items() if label != target), own)
     with np.errstate(divide="ignore"):
         reached_log, stays = np.log(reached), np.log(1 - ABSORBED * np.minimum(elsewhere + reached, 1.0))
-    in_core = density.phi + np.log(transition.grid.areas) + np.log(np.where(own > 0, own, 1.0))
+    in_core = density.phi + np.log(areas) + np.log(np.where(own > 0, own, 1.0))
     found = np.maximum(reached_log if start is None else start, floor)
     rates, change = list[float](), np.inf
-    most = int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
-    earlier = transition.backward(density, [own, *sets.values()])
+    most = most_intervals(relaxation)
     with stage("committor", unit="section intervals"):
         while len(rates) < most and change > converged:
             later = np.minimum(earlier(found, floor), 0.0)

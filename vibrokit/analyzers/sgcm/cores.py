@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +29,25 @@ Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class CoreSets:
+    """The cores on one grid at one intensity.
+
+    Attributes
+    ----------
+    own : array (nx, nv)
+        How much of each cell belongs to the core of the attractor that is left.
+    others : mapping of int to array (nx, nv)
+        The same for those that can be reached, by label; empty if position decides.
+    entry : array (nx, nv)
+        ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
+    """
+
+    own: Array
+    others: Mapping[int, Array]
+    entry: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Cores:
     """The cores of all attractors, as one of them is left.
 
@@ -43,27 +63,20 @@ class Cores:
         """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
         return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
 
-    def own(self, grid: DensityGrid, intensity: float) -> Array:
-        """Return how much of each cell belongs to the core of the attractor that is left, shape (nx, nv)."""
-        return self._core(self.problem.attractor, grid, intensity)
-
-    def others(self, grid: DensityGrid, intensity: float) -> dict[int, Array]:
-        """Return the same for those that can be reached, by label; nothing if position decides."""
+    def on(self, grid: DensityGrid, intensity: float) -> CoreSets:
+        """Return the cores on a grid."""
+        own = self._core(self.problem.attractor, grid, intensity)
+        with np.errstate(divide="ignore"):
+            entry: Array = self.start(grid, intensity) + np.log(own)
         if self.problem.exit.by_position:
-            return {}
+            return CoreSets(own, {}, entry)
         others = [a for a in self.problem.structure.attractors if a.label != self.problem.source]
-        return {a.label: self._core(a, grid, intensity) for a in others}
+        return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in others}, entry)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
         attractor = self.problem.attractor
         return -0.5 * grid.nearest(*_ellipses(attractor, intensity * self.covariances[attractor.label], 1.0, grid))
-
-    def entry(self, grid: DensityGrid, intensity: float) -> Array:
-        """Return the same inside the core of the attractor, −∞ elsewhere."""
-        with np.errstate(divide="ignore"):
-            inside: Array = np.log(self.own(grid, intensity))
-        return self.start(grid, intensity) + inside
 
     def resolved(self, grid: DensityGrid, nodes: float) -> float:
         """Return the least intensity at which the density around the attractor is wider than some node spacings.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from numbers import Real
 
@@ -63,7 +63,7 @@ class Leg:
     feet: Array
     growth: Array
     crossed: NDArray[np.bool_] | None
-    noise: float
+    noise: float = 0.0
     leaving: NDArray[np.bool_] | None = None
 
 
@@ -94,19 +94,22 @@ class DensityFlow:
     @cached_property
     def legs(self) -> list[Leg]:
         """The legs of a section interval."""
-        return self._made(0.0, self.scene.section_interval, self._into)
+        return self.between(0.0, self.scene.section_interval)
 
     @cached_property
     def backward_legs(self) -> list[Leg]:
         """The legs that carry an expected value back over a section interval, the last one first."""
-        return self._made(0.0, self.scene.section_interval, self._from)
+        pieces = list(self._pieces(0.0, self.scene.section_interval))
+        noise = [0.0, *(time for _, _, time in pieces[:-1])]
+        back = [(start, end, time) for (start, end, _), time in zip(pieces, noise, strict=True)]
+        return self._made(back[::-1], self._from)
 
     def between(self, start: float, end: float) -> list[Leg]:
         """Return the legs of a part of a section interval, from `start` to `end` since the section (s).
 
         Noise acts as often as in a whole interval, for their times.
         """
-        return self._made(start, end, self._into)
+        return self._made(list(self._pieces(start, end)), self._into)
 
     @cached_property
     def amplitude(self) -> Array:
@@ -121,12 +124,8 @@ class DensityFlow:
         """Memory that legs take (GiB)."""
         return shape[0] * shape[1] * (3 if autonomous else steps + 1) * 3 * 8 / 2**30
 
-    def _made(self, start: float, end: float, make: Callable[[float, float, float], Leg]) -> list[Leg]:
-        """Legs between two times; those of an autonomous scene that are equally long share their arrays."""
-        pieces = list(self._pieces(start, end))
-        if make == self._from:
-            noise = [0.0, *(piece[2] for piece in pieces[:-1])]
-            pieces = [(a, b, w) for (a, b, _), w in zip(pieces, noise, strict=True)][::-1]
+    def _made(self, pieces: Sequence[tuple[float, float, float]], make: Callable[[float, float], Leg]) -> list[Leg]:
+        """Legs of some pieces of time; those of an autonomous scene that are equally long share their arrays."""
         known: dict[int, Leg] = {}
         legs = []
         with stage("flow between nodes", unit="legs", total=len(pieces)):
@@ -134,7 +133,7 @@ class DensityFlow:
                 place = stop - begin if self.scene.autonomous else begin
                 key = round(place / (_SAME * self.scene.section_interval))
                 if key not in known:
-                    known[key] = make(begin, stop, noise_time)
+                    known[key] = make(begin, stop)
                 legs.append(dataclasses.replace(known[key], noise=noise_time))
                 advance()
         return legs
@@ -148,13 +147,13 @@ class DensityFlow:
         for begin, stop in itertools.pairwise([start, *times, end]):
             yield begin, stop, 0.5 * step if stop < end else 0.0
 
-    def _into(self, start: float, end: float, noise: float) -> Leg:
+    def _into(self, start: float, end: float) -> Leg:
         """Integrate backwards in time from all nodes, and forwards again for the derivatives."""
         nodes = self.grid.nodes.reshape(-1, 2)
         mirrored, crossed = self._followed(Flow.STATE_REVERSED, nodes * _MIRROR, -end, end - start, _MIRROR)
         feet = mirrored * _MIRROR
         places = self.grid.places(feet)
-        inside = ((places >= 0) & (places <= np.array(self.grid.shape) - 1)).all(axis=1)
+        inside = self.grid.holds(places)
         local = linear_map(self.scene, feet[inside], self.stepper, start_time=start, interval=end - start)
         growth = np.zeros(len(nodes))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -164,16 +163,15 @@ class DensityFlow:
         leaving: NDArray[np.bool_] | None = None
         if self.watches_edge:
             images, _ = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
-            ends = self.grid.places(images)
-            leaving = np.logical_not((ends >= 0) & (ends <= np.array(shape) - 1)).any(axis=1).reshape(shape)
-        return Leg(places.reshape(*shape, 2), np.nan_to_num(growth).reshape(shape), crossed, noise, leaving)
+            leaving = ~self.grid.holds(self.grid.places(images)).reshape(shape)
+        return Leg(places.reshape(*shape, 2), np.nan_to_num(growth).reshape(shape), crossed, leaving=leaving)
 
-    def _from(self, start: float, end: float, noise: float) -> Leg:
+    def _from(self, start: float, end: float) -> Leg:
         """Integrate forwards from all nodes; what leaves the grid goes on as at its edge."""
         nodes = self.grid.nodes.reshape(-1, 2)
         images, crossed = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
         places = np.clip(self.grid.places(images), 0.0, np.array(self.grid.shape) - 1.0)
-        return Leg(places.reshape(*self.grid.shape, 2), np.zeros(self.grid.shape), crossed, noise)
+        return Leg(places.reshape(*self.grid.shape, 2), np.zeros(self.grid.shape), crossed)
 
     def _followed(
         self, flow: Flow, states: Array, start: float, duration: float, sign: Array
@@ -207,10 +205,14 @@ def check_steps(caller: str, steps: object) -> None:
         raise StructureError(f"{caller}: steps must be an even number, got {steps}; they come in pairs.")
 
 
+def check_allowed_memory(caller: str, allowed: object) -> None:
+    """Raise StructureError if `max_memory_gib` is no amount of memory."""
+    if isinstance(allowed, bool) or not isinstance(allowed, Real) or not float(allowed) > 0:
+        raise StructureError(f"{caller}: max_memory_gib must be a positive number of GiB, got {shown(allowed)}.")
+
+
 def check_memory(shape: tuple[int, int], needed: float, steps: int, allowed: float) -> None:
     """Raise StructureError if more memory is needed than allowed, both in GiB."""
-    if isinstance(allowed, bool) or not isinstance(allowed, Real) or not allowed > 0:
-        raise StructureError(f"max_memory_gib must be a positive number of GiB, got {shown(allowed)}.")
     if needed > allowed:
         raise StructureError(
             f"{shape[0]} × {shape[1]} nodes and {steps} steps need {needed:.3g} GiB of memory, and max_memory_gib is "

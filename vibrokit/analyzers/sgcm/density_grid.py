@@ -93,6 +93,10 @@ class DensityGrid:
         beyond = np.where(x < self.x[0], -1.0, np.where(x > self.x[-1], float(len(self.x)), inside))
         return np.stack([np.where(np.isnan(x), np.nan, beyond), (v - self.v[0]) / self.v_spacing], axis=-1)
 
+    def holds(self, places: Array) -> NDArray[np.bool_]:
+        """Return which places (…, 2), in units of nodes, are on the grid."""
+        return np.asarray(((places >= 0) & (places <= np.array(self.shape) - 1)).all(axis=-1))
+
     def mass(self, phi: Array, where: NDArray[np.bool_] | None = None) -> float:
         """Return the logarithm of the probability of a density e^φ on the grid, or on some of its nodes."""
         weighted = phi + np.log(self.areas)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 from typing import Any
@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, Leg
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, QuasiStationary
+from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, Backward, QuasiStationary
 from vibrokit.errors import SceneError
 from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.log_density import ROUGH, mark_rows, parts_of, step_rows
@@ -102,16 +103,16 @@ class Propagator:
             factor, before = factor + change, carried.copy()
         return before, factor
 
-    def backward(self, density: QuasiStationary, sets: Sequence[Array]) -> Callable[[Array, float], Array]:
+    def backward(self, density: QuasiStationary, cores: CoreSets) -> Backward:
         """Return what gives ln of an expected value one section interval earlier; 1 at the exit, if position decides.
 
         Where the density, at its time, is too small to matter there is no value, so that nothing is computed, unless
-        the node belongs to one of the sets.
+        the node belongs to a core.
         """
         least = density.level - _RELEVANT
         reached = [density.phi, *(phi for _, phi, _ in self._carried(self.flow.legs, density.phi, self._weight, least))]
         there = [phi > least for phi in reached[:-1]]
-        for covered in sets:
+        for covered in (cores.own, *cores.others.values()):
             there[0] |= covered > 0
         legs = [
             dataclasses.replace(leg, feet=np.where(mask[..., None], leg.feet, np.nan))

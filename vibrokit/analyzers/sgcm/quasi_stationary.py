@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.progress import advance, stage
 
@@ -28,6 +29,9 @@ _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves,
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
 
 Array = NDArray[np.float64]
+
+Backward = Callable[[Array, float], Array]
+"""From ln of an expected value and its floor to the same one section interval earlier."""
 
 
 class Transition(Protocol):
@@ -47,10 +51,10 @@ class Transition(Protocol):
         φ is at least `floor`; `highest`, if given, keeps the largest φ at each node at all times in between.
         """
 
-    def backward(self, density: QuasiStationary, sets: Sequence[Array]) -> Callable[[Array, float], Array]:
-        """Return what gives ln of an expected value one section interval earlier, at least a floor.
+    def backward(self, density: QuasiStationary, cores: CoreSets) -> Backward:
+        """Return what gives ln of an expected value one section interval earlier.
 
-        It may leave out what a density does not reach; the sets absorb, or are where the density lives.
+        It may leave out what a density does not reach outside the cores.
         """
 
 
@@ -90,8 +94,7 @@ class QuasiStationary:
 def quasi_stationary(
     transition: Transition,
     start: Array,
-    entry: Array,
-    sets: Mapping[int, Array],
+    cores: CoreSets,
     relaxation: float,
     converged: float,
 ) -> QuasiStationary:
@@ -102,11 +105,8 @@ def quasi_stationary(
     transition : Transition
     start : array (nx, nv)
         ln p.
-    entry : array (nx, nv)
-        ln p, up to a constant, with which what has left is put back.
-    sets : mapping of int to array (nx, nv)
-        By target: how much of each cell belongs to the set that absorbs on the section. If empty, probability leaves
-        by position, with target −1.
+    cores : CoreSets
+        Those of others absorb on the section. If there are no others, probability leaves by position, with target −1.
     relaxation : float
         Section intervals in which deviations of the density fall by a factor e.
     converged : float
@@ -114,13 +114,13 @@ def quasi_stationary(
     """
     grid = transition.grid
     phi, rates, change, intervals = start - grid.mass(start), list[float](), np.inf, 0
-    most = int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
+    most, sets = most_intervals(relaxation), cores.others
     areas = {target: float(np.log((covered * grid.areas).sum())) for target, covered in sets.items()}
     areas = areas or {-1: float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))}
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
     highest = np.empty_like(phi)
-    entry = entry - grid.mass(entry)
+    entry = cores.entry - grid.mass(cores.entry)
     with stage("density", unit="section intervals"):
         while intervals < most and change > converged:
             highest = np.full_like(phi, -np.inf)
@@ -153,6 +153,11 @@ def quasi_stationary(
     resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
     error = spread_of(rates, change)
     return QuasiStationary(phi, highest, resolved, level, error, change <= converged, drift, intervals)
+
+
+def most_intervals(relaxation: float) -> int:
+    """Return after how many section intervals iteration is given up."""
+    return int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
 
 
 def remaining(rates: list[float], relaxation: float) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import cached_property
 
@@ -11,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.density_flow import IsOut
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary
+from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.oscillator import Oscillator
@@ -54,11 +54,6 @@ class SampledMatrix:
     executor: Executor
 
     @property
-    def intensity(self) -> float:
-        """D (m² s⁻³)."""
-        return self.scene.noise.intensity if self.scene.noise else 0.0
-
-    @property
     def by_position(self) -> bool:
         """Whether probability leaves by position, at any time."""
         return self.is_out is not None
@@ -76,7 +71,7 @@ class SampledMatrix:
             np.maximum(highest, carried, out=highest)
         return carried, float(lost)
 
-    def backward(self, density: QuasiStationary, sets: Sequence[Array]) -> Callable[[Array, float], Array]:
+    def backward(self, density: QuasiStationary, cores: CoreSets) -> Backward:
         """Return what gives ln of an expected value one section interval earlier."""
         stays, leaves = self._matrix
         transposed = stays.T.tocsr()
@@ -95,8 +90,7 @@ class SampledMatrix:
         nodes = self.grid.nodes.reshape(-1, 2)
         count, at_once = len(nodes), max(1, _AT_ONCE // self.samples)
         random = np.random.default_rng(self.seed)
-        widths = np.stack(np.broadcast_arrays(np.gradient(self.grid.x)[:, None], self.grid.v_spacing), axis=-1)
-        widths = np.broadcast_to(widths, (*self.grid.shape, 2)).reshape(-1, 2)
+        widths = self.grid.local_spacing(nodes)
         places, leaves = csr_array((count, count)), np.zeros(count)
         with stage("transitions", unit=TRAJECTORIES, total=count * self.samples):
             for first in range(0, count, at_once):

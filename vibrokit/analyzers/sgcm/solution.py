@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.committor import Committor, committor
-from vibrokit.analyzers.sgcm.cores import Cores
+from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator
@@ -26,9 +26,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _ROUGHLY, _EXPLORED_TO = 0.03, 0.1  # the same with half the steps, and in exploration
-_STEP_ERROR = (
-    1 / 7
-)  # of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30
+# A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30.
+_STEP_ERROR = 1 / 7
 _STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
@@ -150,14 +149,15 @@ class DensitySolver:
             for intensity in intensities:
                 start, committors = before.begun(grid, intensity)
                 transition, other = (self._transition(flow, intensity, executor) for flow in flows)
-                found = self._found(transition, intensity, start)
-                long = self._found(other, intensity, found.phi, _ROUGHLY)
+                cores = self._cores.on(grid, intensity)
+                found = quasi_stationary(transition, start, cores, self._cores.relaxation, _CONVERGED)
+                long = quasi_stationary(other, found.phi, cores, self._cores.relaxation, _ROUGHLY)
                 steps = {
                     target: _STEP_ERROR * abs(rate - long.log_rates[target])
                     for target, rate in found.log_rates.items()
                     if target in long.log_rates
                 }
-                solved = self._committors(transition, intensity, found, committors)
+                solved = self._committors(transition, found, cores, committors, _CONVERGED)
                 before = AtIntensity(intensity, grid, found, {target: solved[target] for target in steps}, steps)
                 yield before
 
@@ -172,17 +172,18 @@ class DensitySolver:
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
             propagator = Propagator(self._flow(grid, self._half), stronger, executor)
-            found = self._found(propagator, stronger, self._cores.start(grid, stronger), _EXPLORED_TO)
+            cores, start = self._cores.on(grid, stronger), self._cores.start(grid, stronger)
+            found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
-            for covered in self._cores.others(grid, intensity).values():
+            for covered in self._cores.on(grid, intensity).others.values():
                 wanted |= covered > 0
             closer = DensityGrid.of(self.problem.osc, grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
             if stronger == intensity or not smaller:
                 break
             grid = closer
-        committors = self._committors(propagator, stronger, found, {}, _EXPLORED_TO)
+        committors = self._committors(propagator, found, cores, {}, _EXPLORED_TO)
         return AtIntensity(stronger, propagator.grid, found, committors), closer
 
     def _shape(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
@@ -223,25 +224,17 @@ class DensitySolver:
         scene = flow.scene.replace({"noise.intensity": intensity})
         return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.is_out, executor)
 
-    def _found(
-        self, transition: Transition, intensity: float, start: Array, converged: float = _CONVERGED
-    ) -> QuasiStationary:
-        sets = self._cores.others(transition.grid, intensity)
-        entry = self._cores.entry(transition.grid, intensity)
-        return quasi_stationary(transition, start, entry, sets, self._cores.relaxation, converged)
-
     def _committors(
         self,
         transition: Transition,
-        intensity: float,
         found: QuasiStationary,
+        cores: CoreSets,
         starts: Mapping[int, Array],
-        converged: float = _CONVERGED,
+        converged: float,
     ) -> dict[int, Committor]:
         """The committor of each target whose rate is known."""
-        own, sets = self._cores.own(transition.grid, intensity), self._cores.others(transition.grid, intensity)
-        relaxation = self._cores.relaxation
+        earlier, areas, relaxation = transition.backward(found, cores), transition.grid.areas, self._cores.relaxation
         return {
-            target: committor(transition, found, own, sets, target, relaxation, converged, starts.get(target))
+            target: committor(earlier, found, cores, areas, target, relaxation, converged, starts.get(target))
             for target in found.log_rates
         }
