@@ -20,7 +20,7 @@ from vibrokit.analyzers.sgcm.density_flow import (
     check_steps,
     steps_for,
 )
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, nearest, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
@@ -223,7 +223,7 @@ def _start(grid: DensityGrid, start: Any) -> Array:
         phi = np.where(inside, 0.0, -_DEPTH)
     else:
         roots = np.eye(2) / (_START * grid.local_spacing(corners))[:, None, :]
-        phi = -0.5 * grid.nearest(corners, roots)
+        phi = -0.5 * nearest(grid.nodes, corners, roots)
     return phi - grid.mass(phi)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
-from vibrokit.errors import StructureError
+from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.ensemble import Stop
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
@@ -39,6 +39,16 @@ class Exit(ABC):
 
     by_position: ClassVar[bool] = False
     """Whether position and velocity decide, at any time; otherwise the basin decides, on the section."""
+
+    @property
+    def at_boundary(self) -> bool:
+        """Whether a state has left as soon as it is in another basin; otherwise, when it has settled there."""
+        return False
+
+    @property
+    @abstractmethod
+    def event(self) -> str:
+        """What is counted, as rates name it."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -75,7 +85,31 @@ class Exit(ABC):
 
 
 class LeaveBasin(Exit):
-    """Leaving the basin of attraction, tested on the section, for the basin of another attractor."""
+    """Leaving the basin of attraction, tested on the section, for the basin of another attractor.
+
+    Parameters
+    ----------
+    for_good : bool
+        Whether a state at finite noise has left only when it has settled around another attractor. Otherwise it has
+        left at its first section point in another basin. Where that basin has thin arms, noise soon throws the state
+        back, and the rate is several times as large. The activation energy is the same.
+    """
+
+    for_good: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.for_good, bool):
+            raise StructureError(f"LeaveBasin: for_good must be True or False, got {shown(self.for_good)}.")
+
+    @property
+    def at_boundary(self) -> bool:
+        """Whether the first state in another basin counts."""
+        return not self.for_good
+
+    @property
+    def event(self) -> str:
+        """``"commitment"``, or ``"basin"`` if the first state in another basin counts."""
+        return "commitment" if self.for_good else "basin"
 
     def check(self, osc: Oscillator, structure: Structure) -> None:
         """Refuse a structure of one attractor."""
@@ -117,6 +151,11 @@ class LeaveRegion(Exit):
     """
 
     by_position: ClassVar[bool] = True
+
+    @property
+    def event(self) -> str:
+        """``"contact"``."""
+        return "contact"
 
     @abstractmethod
     def bounds(self, osc: Oscillator) -> Array:

@@ -162,7 +162,6 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
     uniform = DensityGrid(np.linspace(*last.grid.region.x, last.grid.shape[0]), last.grid.v)
     shown = uniform.resampled(last.log_density, last.grid)
     potential = -last.intensity * (shown - np.nanmax(shown))
-    event = "contact" if problem.exit.by_position else "commitment"
     return xarray.Dataset(
         {
             "log_density": (
@@ -191,7 +190,7 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
             "rate_target": (
                 ("exit_index",), np.array(targets), {"long_name": "label of the attractor that is reached"},
             ),
-            "rate_event": ((), event, {"long_name": "what counts as an exit"}),
+            "rate_event": ((), problem.exit.event, {"long_name": "what counts as an exit"}),
             "rate_steps": ((), solver.steps, {"long_name": "how often noise acts in a section interval"}),
             "rate_intensity": (
                 ("intensity_index",), np.array([one.intensity for one in solved]),

@@ -42,6 +42,19 @@ class Basins:
         """Share of the cells with a label."""
         return float(np.mean(self.labels == label))
 
+    def at(self, states: NDArray[np.float64], every: int = 1) -> NDArray[np.int16]:
+        """Return the label of the cell in which each state (…, 2) is; UNSETTLED outside the region.
+
+        With `every` cells made one, the labels are those of a coarser grid.
+        """
+        low, high = self.region.bounds.T
+        counts = np.array(self.labels.shape)
+        places = np.floor((states[..., :2] - low) / (high - low) * counts)
+        inside = ((places >= 0) & (places < counts)).all(axis=-1)
+        cells = np.where(inside[..., None], places, 0).astype(int)
+        i, v = np.moveaxis(cells - cells % every, -1, 0)
+        return np.where(inside, self.labels[i, v], UNSETTLED).astype(np.int16)
+
     def __repr__(self) -> str:
         return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, nearest
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.structure.linear_map import gaussian_map
@@ -37,7 +37,7 @@ class CoreSets:
     own : array (nx, nv)
         How much of each cell belongs to the core of the attractor that is left.
     others : mapping of int to array (nx, nv)
-        The same for those that can be reached, by label; empty if position decides.
+        By label: the same for the cores of others, or for their basins if those count; empty if position decides.
     entry : array (nx, nv)
         ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
     """
@@ -63,20 +63,23 @@ class Cores:
         """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
         return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
 
-    def on(self, grid: DensityGrid, intensity: float) -> CoreSets:
-        """Return the cores on a grid."""
+    def on(self, grid: DensityGrid, intensity: float, every: int = 1) -> CoreSets:
+        """Return the cores on a grid; of basins, so many cells are made one."""
         own = self._core(self.problem.attractor, grid, intensity)
         with np.errstate(divide="ignore"):
             entry: Array = self.start(grid, intensity) + np.log(own)
         if self.problem.exit.by_position:
             return CoreSets(own, {}, entry)
         others = [a for a in self.problem.structure.attractors if a.label != self.problem.source]
+        if self.problem.exit.at_boundary:
+            return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
         return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in others}, entry)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
         attractor = self.problem.attractor
-        return -0.5 * grid.nearest(*_ellipses(attractor, intensity * self.covariances[attractor.label], 1.0, grid))
+        covariances = intensity * self.covariances[attractor.label]
+        return -0.5 * nearest(grid.nodes, *_ellipses(attractor, covariances, 1.0, grid))
 
     def resolved(self, grid: DensityGrid, nodes: float) -> float:
         """Return the least intensity at which the density around the attractor is wider than some node spacings.
@@ -112,9 +115,16 @@ class Cores:
             return _RELAXATION
         return max(1.0, -max(attractor.period, 1) / math.log(largest))
 
+    def _basin(self, attractor: Attractor, grid: DensityGrid, own: Array, every: int) -> Array:
+        """How much of each cell belongs to the basin of another attractor, and not to the own core."""
+        basins = self.problem.structure.basins
+        covered = grid.covered(lambda states: basins.at(states, every) == attractor.label)
+        return np.minimum(covered, 1.0 - own)
+
     def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float) -> Array:
         covariances = _SIZE**2 * intensity * self.covariances[attractor.label]
-        return grid.covered(*_ellipses(attractor, covariances, _LEAST, grid))
+        ellipses = _ellipses(attractor, covariances, _LEAST, grid)
+        return grid.covered(lambda states: nearest(states, *ellipses) <= 1)
 
 
 def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -107,35 +108,18 @@ class DensityGrid:
         widths = np.interp(points[:, 0], self.x, np.gradient(self.x))
         return np.stack([widths, np.full_like(widths, self.v_spacing)], axis=-1)
 
-    def nearest(self, centres: Array, roots: Array, moved: Array | float = 0.0) -> Array:
-        """Return the least |R (q − c)|² over centres c with their matrices R, at each node q, shape (nx, nv).
+    def covered(self, inside: Callable[[Array], NDArray[np.bool_]]) -> Array:
+        """Return how much of the cell around each node belongs to a set, from 0 to 1.
 
-        Parameters
-        ----------
-        centres : array (count, 2)
-        roots : array (count, 2, 2)
-            If there are more than a few centres, the first R is used for all.
-        moved : array broadcastable to (nx, nv, 2)
-            Added to the nodes.
+        `inside` returns which of some states (nx, nv, 2) belong to it.
         """
-        states = (self.nodes + moved).reshape(-1, 2)
-        if len(centres) > _FEW:
-            distances = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0] ** 2
-        else:
-            each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
-            distances = functools.reduce(np.minimum, each)
-        nearest: Array = distances.reshape(self.shape)
-        return nearest
-
-    def covered(self, centres: Array, roots: Array) -> Array:
-        """Return how much of the cell around each node is covered by ellipses |R (q − c)| ≤ 1, from 0 to 1."""
-        covered = np.zeros(self.shape)
+        covered, nodes = np.zeros(self.shape), self.nodes
         inner = (np.arange(_FINER) + 0.5) / _FINER - 0.5
         widths = np.gradient(self.x)[:, None]
         for x in inner:
             for v in inner:
                 moved = np.stack(np.broadcast_arrays(x * widths, v * self.v_spacing), axis=-1)
-                covered += self.nearest(centres, roots, moved) <= 1
+                covered += inside(nodes + moved)
         return covered / _FINER**2
 
     def resampled(self, phi: Array, other: DensityGrid) -> Array:
@@ -152,6 +136,23 @@ class DensityGrid:
             first, last = max(found[0] - margin, 0), min(found[-1] + margin, len(places) - 1)
             bounds.append((places[first], places[last]))
         return Region.of(bounds)
+
+
+def nearest(states: Array, centres: Array, roots: Array) -> Array:
+    """Return the least |R (q − c)|² over centres c with their matrices R, at each state q, shape (…).
+
+    Parameters
+    ----------
+    states : array (…, 2)
+    centres : array (count, 2)
+    roots : array (count, 2, 2)
+        If there are more than a few centres, the first R is used for all.
+    """
+    if len(centres) > _FEW:
+        distances: Array = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0]
+        return distances**2
+    each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
+    return functools.reduce(np.minimum, each)
 
 
 def resolved(phi: Array) -> Array:

@@ -26,6 +26,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _ROUGHLY, _EXPLORED_TO = 0.03, 0.1  # the same with half the steps, and in exploration
+_EVERY = 2  # cells of the basins that are one for the estimate of what their size changes, which is of first order
 # A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30.
 _STEP_ERROR = 1 / 7
 _STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
@@ -55,7 +56,8 @@ class AtIntensity:
     committors : mapping of int to Committor
         By target.
     step_errors : mapping of int to float
-        By target: a seventh of what halving the steps changes in ln rate.
+        By target: a seventh of what halving the steps changes in ln rate; or all of what halving the steps and making
+        cells of the basins larger changes.
     """
 
     intensity: float
@@ -145,15 +147,16 @@ class DensitySolver:
             needed = _ALL_FLOWS * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
             check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
             flows = self._flow(grid, self.steps), self._flow(grid, self._half)
-            before = explored
+            before, at_boundary = explored, self.problem.exit.at_boundary
             for intensity in intensities:
                 start, committors = before.begun(grid, intensity)
                 transition, other = (self._transition(flow, intensity, executor) for flow in flows)
                 cores = self._cores.on(grid, intensity)
                 found = quasi_stationary(transition, start, cores, self._cores.relaxation, _CONVERGED)
-                long = quasi_stationary(other, found.phi, cores, self._cores.relaxation, _ROUGHLY)
+                coarse = self._cores.on(grid, intensity, _EVERY) if at_boundary else cores
+                long = quasi_stationary(other, found.phi, coarse, self._cores.relaxation, _ROUGHLY)
                 steps = {
-                    target: _STEP_ERROR * abs(rate - long.log_rates[target])
+                    target: (1.0 if at_boundary else _STEP_ERROR) * abs(rate - long.log_rates[target])
                     for target, rate in found.log_rates.items()
                     if target in long.log_rates
                 }
@@ -176,8 +179,9 @@ class DensitySolver:
             found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
-            for covered in self._cores.on(grid, intensity).others.values():
-                wanted |= covered > 0
+            if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
+                for covered in self._cores.on(grid, intensity).others.values():
+                    wanted |= covered > 0
             closer = DensityGrid.of(self.problem.osc, grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
             if stronger == intensity or not smaller:
