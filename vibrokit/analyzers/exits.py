@@ -65,6 +65,17 @@ class Exit(ABC):
     def is_out(self, osc: Oscillator, states: Array) -> Mask:
         """Return which states have left, by position alone; shape of ``states[..., 0]``."""
 
+    def beyond(self, osc: Oscillator, states: Array) -> Array:
+        """Return how far states have left: 0 on the edge of what `is_out`, positive beyond, in any unit.
+
+        Densities are more exact where this changes smoothly across the edge; by default it is 1 beyond and −1 before.
+        """
+        return np.where(self.is_out(osc, states), 1.0, -1.0)
+
+    def faces(self, osc: Oscillator) -> Array:
+        """Return the bounds of x and of v that a state must be beyond, shape (2, 2); infinite if there are none."""
+        return np.array([[-math.inf, math.inf], [-math.inf, math.inf]])
+
     @abstractmethod
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Return the kernel's test for trajectories that start at the attractor `source`."""
@@ -163,19 +174,28 @@ class LeaveRegion(Exit):
 
     def is_out(self, osc: Oscillator, states: Array) -> Mask:
         """States on a face or beyond it."""
-        low, high = np.asarray(self.bounds(osc), dtype=float).T
-        out: Mask = np.any((states[..., :2] <= low) | (states[..., :2] >= high), axis=-1)
+        out: Mask = self.beyond(osc, states) >= 0
         return out
+
+    def beyond(self, osc: Oscillator, states: Array) -> Array:
+        """Distance beyond the face that is exceeded most, in x or in v."""
+        low, high = self.faces(osc).T
+        distance: Array = np.maximum(low - states[..., :2], states[..., :2] - high).max(axis=-1)
+        return distance
+
+    def faces(self, osc: Oscillator) -> Array:
+        """The bounds."""
+        return np.asarray(self.bounds(osc), dtype=float)
 
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the bounds."""
-        return Stop(region=np.asarray(self.bounds(osc), dtype=float))
+        return Stop(region=self.faces(osc))
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """The faces."""
         return tuple(
             AtFace((-1,), axis, float(level), outward)
-            for axis, pair in enumerate(np.asarray(self.bounds(osc), dtype=float))
+            for axis, pair in enumerate(self.faces(osc))
             for outward, level in zip((-1, 1), pair, strict=True)
             if math.isfinite(level)
         )

@@ -88,6 +88,10 @@ class ExitProblem:
         """Return which states have left, by position alone."""
         return self.exit.is_out(self.osc, states)
 
+    def beyond(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far states have left, by position alone; see `Exit.beyond`."""
+        return self.exit.beyond(self.osc, states)
+
     def orbit(self, stepper: Stepper) -> Orbit:
         """Return the attractor's orbit as a stepper gives it; raises StructureError if it gives none."""
         return refine_orbit(self.scene, self.attractor.points[0], self.attractor.period, stepper)

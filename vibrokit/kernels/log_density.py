@@ -307,6 +307,26 @@ def _above(row: Array, floor: float) -> tuple[int, int]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _absorb_row(row: Array, share: Array, value: float, floor: float) -> float:
+    """Take up a share of each node of a row, which then has a value in its place; returns ln of the sum taken up."""
+    taken = -math.inf
+    for j in range(len(row)):
+        if share[j] > 0.0:
+            if row[j] > floor:
+                taken = _added(taken, row[j] + math.log(share[j]))
+            left = row[j] + math.log1p(-share[j])
+            row[j] = max(_added(left, value + math.log(share[j])), floor)
+    return taken
+
+
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _added(a: float, b: float) -> float:
+    """The logarithm of e^a + e^b."""
+    top = max(a, b)
+    return top if top == -math.inf else top + math.log1p(math.exp(min(a, b) - top))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def mark_rows(phi: Array, floor: float, marks: Marks) -> None:
     """Mark what a quintic between the nodes would reach, in each row of φ."""
     rough = np.empty(phi.shape[1], dtype=np.bool_)
@@ -328,12 +348,15 @@ def step_rows(
     marks: Marks,
     feet: Array,
     growth: Array,
+    share: Array,
+    value: float,
     weight: Array,
     spreads: Array,
     parts: int,
     floor: float,
     out: Array,
     out_marks: Marks,
+    taken: Array,
     first: int,
     last: int,
 ) -> None:
@@ -348,6 +371,10 @@ def step_rows(
         Where φ is taken from for each node, in node spacings; NaN if it is nowhere.
     growth : array (nx, nv)
         Added to it.
+    share : array (nx, nv) or (0, 0)
+        How much an exit takes up after the flow, from 0 to below 1.
+    value : float
+        φ of what it takes up, after that: −∞ for a density, 0 for an expected value that is 1 at the exit.
     weight : array (nx, nv) or (0, 0)
         Added to φ while it diffuses.
     spreads : array (nx, nv)
@@ -358,6 +385,8 @@ def step_rows(
         φ outside the grid, and the least φ inside.
     out, out_marks : arrays (last - first, nv)
         φ in the rows from `first` to `last`, and what a quintic would reach there.
+    taken : array (last - first,)
+        ln of the sum of e^φ over each row that the exit takes up.
     first, last : int
     """
     nv = phi.shape[1]
@@ -366,6 +395,7 @@ def step_rows(
     rough, summed = np.empty(nv, dtype=np.bool_), np.empty(nv, dtype=np.bool_)
     for i in range(first, last):
         _transport_row(phi, marks, feet[i], growth[i], floor, row)
+        taken[i - first] = _absorb_row(row, share[i], value, floor) if len(share) > 0 else -math.inf
         low, high = _above(row, floor)
         if high < low:
             out[i - first] = floor

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.sgcm.cores import CoreSets
+from vibrokit.analyzers.sgcm.density_flow import ABSORBED
 from vibrokit.analyzers.sgcm.quasi_stationary import (
-    ABSORBED,
     Backward,
     QuasiStationary,
     most_intervals,

@@ -23,6 +23,7 @@ _SIZE = 1.0  # semi-axes of a core in standard deviations of the density around 
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
+_BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
 _RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
 Array = NDArray[np.float64]
@@ -96,15 +97,19 @@ class Cores:
         return float(((nodes * spacings / deviations) ** 2).max())
 
     def region(self, intensity: float) -> Region:
-        """Return the region of the structure, and the orbits of all attractors at all times with the density there."""
+        """Return a rectangle around the structure's region, the attractors' orbits with the density, and the faces."""
         structure = self.problem.structure
         orbits = np.concatenate([attractor.orbit[:, :2] for attractor in structure.attractors])
         spread = np.diagonal(self.covariances[self.problem.source], axis1=1, axis2=2).max(axis=0)
         beyond = _DEVIATIONS * np.sqrt(intensity * spread)
         beyond = np.maximum(beyond, _WIDER * np.ptp(orbits, axis=0))
         low, high = orbits.min(axis=0) - beyond, orbits.max(axis=0) + beyond
-        own = structure.basins.region.bounds
-        return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
+        own, faces = structure.basins.region.bounds, self.problem.exit.faces(self.problem.osc)
+        margins = _BEYOND_FACE * np.array([-1.0, 1.0]) * np.diff(own)
+        faces = np.where(np.isfinite(faces), faces + margins, own)
+        low = np.minimum.reduce([low, own[:, 0], faces[:, 0]])
+        high = np.maximum.reduce([high, own[:, 1], faces[:, 1]])
+        return Region.of(np.stack([low, high], axis=1))
 
     @property
     def relaxation(self) -> float:

@@ -33,11 +33,14 @@ MOST_STEPS = 4096
 """Largest number of times that noise acts in a section interval."""
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 _CHECKS = 16  # exit tests in a leg: on hertz-0.570 a mass that turns back between two has gone 1e-5 further
+ABSORBED = 1 - 1e-9
+"""Share of the probability that a set takes up where it covers a cell."""
 _SAME = 1e-9  # of a section interval: times that differ by less are equal
 
 Array = NDArray[np.float64]
-IsOut = Callable[[Array], NDArray[np.bool_]]
+Beyond = Callable[[Array], Array]
 
+_NOWHERE = np.empty((0, 0))
 _MIRROR = np.array([1.0, -1.0])  # the reversed flow has −v in place of v
 
 
@@ -52,8 +55,8 @@ class Leg:
         goes that starts there. NaN if it diverges.
     growth : array (nx, nv)
         ln of the factor by which the flow compresses areas; 0 for a leg backwards.
-    crossed : bool array (nx, nv) or None
-        Which of these motions have been at the exit, if position decides.
+    crossed : array (nx, nv)
+        Share of each cell from which, or to which, motions have been at the exit, below 1; (0, 0) if there is none.
     noise : float
         For how long noise acts (s).
     leaving : bool array (nx, nv) or None
@@ -62,7 +65,7 @@ class Leg:
 
     feet: Array
     growth: Array
-    crossed: NDArray[np.bool_] | None
+    crossed: Array
     noise: float = 0.0
     leaving: NDArray[np.bool_] | None = None
 
@@ -78,8 +81,8 @@ class DensityFlow:
     grid : DensityGrid
     steps : int
         How often noise acts in a section interval; even.
-    is_out : callable or None
-        Tells which states have left, if position decides.
+    beyond : callable or None
+        How far states are beyond the exit, see `Exit.beyond`, if position decides.
     watches_edge : bool
         Whether legs have `leaving`.
     """
@@ -88,7 +91,7 @@ class DensityFlow:
     stepper: Stepper
     grid: DensityGrid
     steps: int
-    is_out: IsOut | None = None
+    beyond: Beyond | None = None
     watches_edge: bool = False
 
     @cached_property
@@ -173,19 +176,20 @@ class DensityFlow:
         places = np.clip(self.grid.places(images), 0.0, np.array(self.grid.shape) - 1.0)
         return Leg(places.reshape(*self.grid.shape, 2), np.zeros(self.grid.shape), crossed)
 
-    def _followed(
-        self, flow: Flow, states: Array, start: float, duration: float, sign: Array
-    ) -> tuple[Array, NDArray[np.bool_] | None]:
-        """States at the end, NaN if they diverge, and which have been at the exit; `sign` undoes a reflection."""
-        checks = 1 if self.is_out is None else _CHECKS
-        out = None if self.is_out is None else self.is_out(states * sign)
+    def _followed(self, flow: Flow, states: Array, start: float, duration: float, sign: Array) -> tuple[Array, Array]:
+        """States at the end, NaN if they diverge, and the share of cells that has been at the exit.
+
+        `sign` undoes a reflection.
+        """
+        checks = 1 if self.beyond is None else _CHECKS
+        farthest = np.full(len(states), -np.inf) if self.beyond is None else self.beyond(states * sign)
         for number in range(checks):
             begin, interval = start + number * duration / checks, duration / checks
             ended = run_ensemble(self.scene, flow, self.stepper, states, start_time=begin, interval=interval)
             states = np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
-            if self.is_out is not None and out is not None:
-                out = out | self.is_out(np.nan_to_num(states) * sign)
-        return states, None if out is None else out.reshape(self.grid.shape)
+            if self.beyond is not None:
+                farthest = np.fmax(farthest, self.beyond(states * sign))
+        return states, _NOWHERE if self.beyond is None else ABSORBED * self.grid.share(farthest)
 
 
 def steps_for(osc: Oscillator, states: Array) -> int:

@@ -44,19 +44,25 @@ class DensityGrid:
     v: Array
 
     @classmethod
-    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int]) -> DensityGrid:
+    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int], faces: Array | None = None) -> DensityGrid:
         """Return a grid whose nodes in x are closer where the oscillator is stiffer.
 
-        In a contact of natural frequency ω a density is as wide in v as outside, and narrower in x by ω_n/ω.
+        In a contact of natural frequency ω a density is as wide in v as outside, and narrower in x by ω_n/ω. Faces of
+        an exit, array (2, 2), are halfway between nodes, so that each cell is on one side of them; those that are
+        outside the region do not count.
         """
-        places = np.linspace(*region.x, _PLACES)
+        if faces is None:
+            faces = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
+        widened = 2.0 * np.ptp(region.x) / shape[0]
+        places = np.linspace(region.x[0] - widened, region.x[1] + widened, _PLACES)
         stiffness = -VectorField(osc).jacobian(np.stack([places, np.zeros_like(places)], axis=-1))[:, 1, 0]
         relative = np.sqrt(np.abs(stiffness) / np.median(np.abs(stiffness)))
         density = gaussian_filter1d(np.clip(relative, 1.0, _CLOSEST), _SMOOTHED * _PLACES, mode="nearest")
         count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
-        nodes = CubicSpline(count, places)(np.linspace(0.0, count[-1], shape[0]))
-        nodes[[0, -1]] = region.x
-        return cls(nodes, np.linspace(*region.v, shape[1]))
+        counted = CubicSpline(places, count)
+        low, high = counted(region.x).tolist()
+        wanted = _aligned(low, high, shape[0], counted(_inside(region.x, faces[0])))
+        return cls(CubicSpline(count, places)(wanted), _aligned(*region.v, shape[1], _inside(region.v, faces[1])))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -93,6 +99,18 @@ class DensityGrid:
         inside = self._place(np.clip(x, self.x[0], self.x[-1]))
         beyond = np.where(x < self.x[0], -1.0, np.where(x > self.x[-1], float(len(self.x)), inside))
         return np.stack([np.where(np.isnan(x), np.nan, beyond), (v - self.v[0]) / self.v_spacing], axis=-1)
+
+    def share(self, beyond: Array) -> Array:
+        """Return how much of the cell around each node is where a function, known at the nodes, is positive.
+
+        The function is taken as linear within a cell; its values may be −∞ or very different away from 0.
+        """
+        values = beyond.reshape(self.shape)
+        finite = np.where(np.isfinite(values), values, np.min(values, where=np.isfinite(values), initial=-1.0))
+        slope = np.hypot(*np.gradient(finite))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.clip(0.5 + finite / slope, 0.0, 1.0)
+        return np.where(slope > 0, share, finite > 0)
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Return which places (…, 2), in units of nodes, are on the grid."""
@@ -136,6 +154,22 @@ class DensityGrid:
             first, last = max(found[0] - margin, 0), min(found[-1] + margin, len(places) - 1)
             bounds.append((places[first], places[last]))
         return Region.of(bounds)
+
+
+def _inside(bounds: tuple[float, float], faces: Array) -> Array:
+    """Those faces that are between the bounds."""
+    return faces[(faces > bounds[0]) & (faces < bounds[1])]
+
+
+def _aligned(low: float, high: float, nodes: int, faces: Array) -> Array:
+    """Nodes at equal distances from `low` to `high` at least; faces, at most two, are halfway between them."""
+    if len(faces) == 0:
+        return np.linspace(low, high, nodes)
+    spacing = (high - low) / (nodes - 2)
+    if len(faces) == 2 and np.ptp(faces) > spacing:
+        spacing = np.ptp(faces) / np.floor(np.ptp(faces) / spacing)
+    first = faces[0] - (np.ceil((faces[0] - low) / spacing - 0.5) + 0.5) * spacing
+    return first + spacing * np.arange(nodes)
 
 
 def nearest(states: Array, centres: Array, roots: Array) -> Array:

@@ -12,20 +12,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from vibrokit.analyzers.sgcm.cores import CoreSets
-from vibrokit.analyzers.sgcm.density_flow import DensityFlow, Leg
+from vibrokit.analyzers.sgcm.density_flow import ABSORBED, DensityFlow, Leg
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.quasi_stationary import ABSORBED, Backward, QuasiStationary
+from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.errors import SceneError
 from vibrokit.kernels.ensemble import carry
-from vibrokit.kernels.log_density import ROUGH, mark_rows, parts_of, step_rows
+from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.noise.noise_model import NoiseModel
 
 _BLOCKS = 4  # of rows, which threads or processes share
-_QUINTIC = 3  # nodes that a quintic reaches to each side
 _RELEVANT = 14.0  # in ln p below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
 
 Array = NDArray[np.float64]
@@ -58,7 +56,7 @@ class Propagator:
     @property
     def by_position(self) -> bool:
         """Whether probability leaves by position, at any time."""
-        return self.flow.is_out is not None
+        return self.flow.beyond is not None
 
     @cached_property
     def deviation(self) -> Array:
@@ -79,11 +77,8 @@ class Propagator:
         `highest`, if given, keeps the largest φ at each node over all legs.
         """
         lost, carried = -np.inf, phi
-        for leg, carried, marks in self._carried(self.flow.legs, phi, self._weight, floor):
-            if leg.crossed is not None and leg.crossed.any():
-                lost = np.logaddexp(lost, self.grid.mass(carried, leg.crossed))
-                carried[leg.crossed] = np.maximum(carried[leg.crossed] + np.log(1 - ABSORBED), floor)
-                marks[binary_dilation(leg.crossed, iterations=_QUINTIC)] = ROUGH
+        for _, carried, taken in self._carried(self.flow.legs, phi, self._weight, floor):
+            lost = np.logaddexp(lost, taken)
             if highest is not None:
                 np.maximum(highest, carried, out=highest)
         return carried, float(lost)
@@ -120,42 +115,45 @@ class Propagator:
         ]
 
         def earlier(values: Array, floor: float) -> Array:
-            for leg, values, marks in self._carried(legs, values, _NO_WEIGHT, floor):  # noqa: B020
-                if leg.crossed is not None:
-                    values[leg.crossed] = 0.0
-                    marks[binary_dilation(leg.crossed, iterations=_QUINTIC)] = ROUGH
-            return values
+            *_, (_, found, _) = self._carried(legs, values, _NO_WEIGHT, floor, at_exit=0.0)
+            return found
 
         return earlier
 
     def _carried(
-        self, legs: Sequence[Leg], phi: Array, weight: Array, floor: float
-    ) -> Iterator[tuple[Leg, Array, Marks]]:
-        """Yield each leg, φ after it and its marks; the caller may change the arrays in place."""
+        self, legs: Sequence[Leg], phi: Array, weight: Array, floor: float, at_exit: float = -math.inf
+    ) -> Iterator[tuple[Leg, Array, float]]:
+        """Yield each leg, φ after it, which may be changed in place, and ln of the probability taken up at the exit."""
         marks = np.empty(phi.shape, dtype=np.uint8)
         mark_rows(phi, floor, marks)
         for leg in legs:
-            phi, marks = self._stepped(phi, marks, leg, weight, floor)
-            yield leg, phi, marks
+            phi, marks, taken = self._stepped(phi, marks, leg, at_exit, weight, floor)
+            yield leg, phi, taken
 
-    def _stepped(self, phi: Array, marks: Marks, leg: Leg, weight: Array, floor: float) -> tuple[Array, Marks]:
-        """φ after a leg: the flow, then diffusion in parts that are narrow enough."""
+    def _stepped(
+        self, phi: Array, marks: Marks, leg: Leg, at_exit: float, weight: Array, floor: float
+    ) -> tuple[Array, Marks, float]:
+        """φ after a leg, its marks, and ln of what the exit takes up.
+
+        The flow comes first, then the exit, then diffusion in parts that are narrow enough.
+        """
         spread = math.sqrt(leg.noise)
         parts = parts_of(float(self.deviation.max()) * spread)
         spreads = self.deviation * (spread / math.sqrt(max(parts, 1)))
-        given = (phi, marks, leg.feet, leg.growth, weight, spreads, parts, floor)
+        given = (phi, marks, leg.feet, leg.growth, leg.crossed, at_exit, weight, spreads, parts, floor)
         edges = np.linspace(0, len(phi), _BLOCKS + 1).astype(int).tolist()
         tasks = [(given, first, last) for first, last in itertools.pairwise(edges)]
         blocks = list(carry(_stepped_rows, tasks, self.executor))
-        return np.concatenate([out for out, _ in blocks]), np.concatenate([marks for _, marks in blocks])
+        out, marks, taken = (np.concatenate(some) for some in zip(*blocks, strict=True))
+        return out, marks, float(np.logaddexp.reduce(taken + np.log(self.grid.areas[:, 0])))
 
 
-def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array, Marks]:
-    """Some rows of φ after a step, and their marks; in whatever thread or process."""
+def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array, Marks, Array]:
+    """Some rows of φ after a step, their marks, and what the exit takes up; in whatever thread or process."""
     shape = (last - first, given[0].shape[1])
-    out, marks = np.empty(shape), np.empty(shape, dtype=np.uint8)
-    step_rows(*given, out, marks, first, last)
-    return out, marks
+    out, marks, taken = np.empty(shape), np.empty(shape, dtype=np.uint8), np.empty(last - first)
+    step_rows(*given, out, marks, taken, first, last)
+    return out, marks, taken
 
 
 def checked_noise(osc: Oscillator, needs_intensity: bool = True) -> NoiseModel:

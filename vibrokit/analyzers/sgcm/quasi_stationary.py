@@ -16,13 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.sgcm.cores import CoreSets
+from vibrokit.analyzers.sgcm.density_flow import ABSORBED
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.progress import advance, stage
 
 _WINDOW = 4  # section intervals, at least: the largest changes of two windows give how fast they fall
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
-ABSORBED = 1 - 1e-9
-"""Share of the probability that a set takes up where it covers a cell."""
 _CROSSED = 4.0  # relaxations, in which what is missing at the start arrives from the attractor: before, a rate may rest
 _STILL = 1e-3  # of ln rate: means that differ by less are equal, as errors of rates are above 1e-2
 _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from vibrokit.analyzers.sgcm.cores import CoreSets
-from vibrokit.analyzers.sgcm.density_flow import IsOut
+from vibrokit.analyzers.sgcm.density_flow import Beyond
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.kernels.choice import ensemble_stepper
@@ -41,8 +41,8 @@ class SampledMatrix:
     samples : int
         Trajectories from each cell.
     seed : int
-    is_out : callable or None
-        Tells which states have left, if position decides.
+    beyond : callable or None
+        How far states are beyond the exit, if position decides.
     executor : Executor
     """
 
@@ -50,13 +50,13 @@ class SampledMatrix:
     grid: DensityGrid
     samples: int
     seed: int
-    is_out: IsOut | None
+    beyond: Beyond | None
     executor: Executor
 
     @property
     def by_position(self) -> bool:
         """Whether probability leaves by position, at any time."""
-        return self.is_out is not None
+        return self.beyond is not None
 
     def interval(self, phi: Array, floor: float, highest: Array | None = None) -> tuple[Array, float]:
         """Return φ one section interval later, and the logarithm of the probability that left by position."""
@@ -108,7 +108,7 @@ class SampledMatrix:
     def _carried(self, starts: Array, first: int, total: int) -> tuple[Array, NDArray[np.bool_]]:
         """States one section interval later, and which have been at the exit."""
         stepper = ensemble_stepper(self.scene, Flow.NOISY)
-        checks = 1 if self.is_out is None else _CHECKS
+        checks = 1 if self.beyond is None else _CHECKS
         interval = self.scene.section_interval / checks
         states, out = starts, np.zeros(len(starts), dtype=bool)
         for number in range(checks):
@@ -118,6 +118,6 @@ class SampledMatrix:
                 executor=self.executor,
             )  # fmt: skip
             states = ended.states
-            if self.is_out is not None:
-                out |= self.is_out(states)
+            if self.beyond is not None:
+                out |= self.beyond(states) >= 0
         return states, out

@@ -22,6 +22,7 @@ from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, Transition, quasi_stationary
 from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
 from vibrokit.errors import StructureError
+from vibrokit.results.region import Region
 from vibrokit.symbolic.flow_kind import Flow
 
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
@@ -142,7 +143,7 @@ class DensitySolver:
         with ExitStack() as stack:
             executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
             explored, closer = self._explored(intensities[0], executor)
-            grid = DensityGrid.of(self.problem.osc, closer.region, self._shape(closer, intensities[-1]))
+            grid = self._grid(closer.region, self._shape(closer, intensities[-1]))
             self._check_resolution(grid, intensities[-1])
             needed = _ALL_FLOWS * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
             check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
@@ -171,7 +172,7 @@ class DensitySolver:
         """
         wanted_shape = self.shape or (_EXPLORING, _EXPLORING)
         shape = min(_EXPLORING, wanted_shape[0]), min(_EXPLORING, wanted_shape[1])
-        grid = DensityGrid.of(self.problem.osc, self._cores.region(intensity), shape)
+        grid = self._grid(self._cores.region(intensity), shape)
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
             propagator = Propagator(self._flow(grid, self._half), stronger, executor)
@@ -182,13 +183,16 @@ class DensitySolver:
             if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
                 for covered in self._cores.on(grid, intensity).others.values():
                     wanted |= covered > 0
-            closer = DensityGrid.of(self.problem.osc, grid.around(wanted, _MARGIN), shape)
+            closer = self._grid(grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
             if stronger == intensity or not smaller:
                 break
             grid = closer
         committors = self._committors(propagator, found, cores, {}, _EXPLORED_TO)
         return AtIntensity(stronger, propagator.grid, found, committors), closer
+
+    def _grid(self, region: Region, shape: tuple[int, int]) -> DensityGrid:
+        return DensityGrid.of(self.problem.scene, region, shape, self.problem.exit.faces(self.problem.osc))
 
     def _shape(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
         """The nodes that are wanted, or those that the narrowest density needs."""
@@ -219,14 +223,14 @@ class DensitySolver:
 
     def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
         stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
-        is_out = self.problem.is_out if self.problem.exit.by_position else None
-        return DensityFlow(self.problem.scene, stepper, grid, steps, is_out)
+        beyond = self.problem.beyond if self.problem.exit.by_position else None
+        return DensityFlow(self.problem.scene, stepper, grid, steps, beyond)
 
     def _transition(self, flow: DensityFlow, intensity: float, executor: Executor) -> Transition:
         if self.samples is None:
             return Propagator(flow, intensity, executor)
         scene = flow.scene.replace({"noise.intensity": intensity})
-        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.is_out, executor)
+        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.beyond, executor)
 
     def _committors(
         self,
