@@ -128,6 +128,7 @@ def test_a_time_limit_keeps_what_was_reached():
         ({"intervals": (float("nan"),)}, "nan"),
         ({"start": (3.0, 0.0)}, "3"),
         ({"start": (0.1, 0.2, 0.3)}, "0.3"),
+        ({"start": "a"}, "'a'"),
         ({"nodes": (1, 1)}, "(1, 1)"),
         ({"steps": 0}, "0"),
         ({"steps": 7}, "7"),

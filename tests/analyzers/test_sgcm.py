@@ -126,6 +126,8 @@ def test_time_limit_keeps_what_was_solved(structure):
     ("settings", "shown"),
     [
         ({"nodes": (1, 1)}, "(1, 1)"),
+        ({"nodes": 100}, "32 or more"),
+        ({"intensities": "weak"}, "w"),
         ({"steps": 7}, "7"),
         ({"steps": 0}, "0"),
         ({"samples": 0}, "0"),
@@ -139,6 +141,17 @@ def test_bad_settings(settings, shown):
     with pytest.raises(vk.errors.StructureError, match="SGCM") as refused:
         vk.SGCM(**settings)
     assert shown in str(refused.value)
+
+
+def test_intensities_of_an_array_are_those_of_a_tuple():
+    assert vk.SGCM(intensities=np.array([1e-3, 2e-3])) == vk.SGCM(intensities=(2e-3, 1e-3))
+
+
+def test_noise_is_weak_against_the_intensities_of_the_method_not_of_the_scene(structure):
+    loud = WELL.replace({"noise.intensity": 0.5})
+    quiet = vk.SGCM(source=0, intensities=(8e-3, 6e-3), nodes=(90, 90), steps=8).run(loud, structure)
+    assert quiet.energies
+    assert not quiet.found(vk.Code.NOISE_NOT_WEAK)
 
 
 def test_too_little_memory(structure):
@@ -177,6 +190,14 @@ def test_an_equilibrium_alone_is_left_by_position():
     (rate,) = vk.SGCM(intensities=(1e-2,), exit=LeaveStrip(), nodes=(64, 64), steps=8).run(osc, structure).rates
     assert rate.event == "contact"
     assert 0 < rate.value < 1
+
+
+def test_an_attractor_without_noise_is_refused():
+    still = scene(damping_ratio=0.2, noise=vk.StateDependentNoise(1e-2, "v"))
+    structure = vk.find_structure(still, region=((-1, 1), (-1, 1)), cells=(20, 20), manifolds=False)
+    found = vk.SGCM(exit=LeaveStrip(), nodes=(40, 40), steps=8).run(still, structure)
+    (failed,) = found.found(vk.Code.SOURCE_FAILED)
+    assert "noise is 0" in failed.values["reason"]
 
 
 def test_one_attractor_has_nowhere_to_go():

@@ -1,13 +1,15 @@
 """Densities and exit rates against closed forms and simulated trajectories."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.linalg import expm
 
 import vibrokit as vk
-from tests.scenes import scene
+from tests.scenes import double_well, scene
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -35,6 +37,67 @@ def test_density_of_a_forced_linear_scene_is_gaussian_to_a_depth_of_40():
     known = (depth < 40) & (np.hypot(*np.moveaxis(offsets, -1, 0)) < 0.6)
     assert depth[known].max() > 30
     assert np.all(np.abs(data["log_density"].values - expected)[known] <= 0.01 * np.maximum(depth[known], 1.0))
+
+
+def simulated_first_passage(damping, amplitude, frequency, stop, intensity, paths=6000, steps=200, rng=0):
+    """ln of the mean intervals to the first passage of a linear scene, and its standard error.
+
+    The deviation from the forced motion is a Gaussian process whose steps are exact (Van Loan, IEEE Trans. Autom.
+    Control 23, 395, 1978).
+    """
+    drift, step = np.array([[0.0, 1.0], [-1.0, -2.0 * damping]]), 2 * math.pi / frequency / steps
+    block = np.block([[-drift, np.diag([0.0, intensity])], [np.zeros((2, 2)), drift.T]])
+    exponential = expm(block * step)
+    carried = exponential[2:, 2:].T
+    root = np.linalg.cholesky(carried @ exponential[:2, 2:])
+    response = amplitude / (1 - frequency**2 + 2j * damping * frequency)
+    forced = (response * np.exp(1j * frequency * step * np.arange(1, steps + 1))).real
+    random = np.random.default_rng(rng)
+    deviations, lost, present = np.zeros((paths, 2)), 0, 0
+    for interval in itertools.count():
+        before = len(deviations)
+        for place in forced:
+            deviations = deviations @ carried.T + random.standard_normal(deviations.shape) @ root.T
+            deviations = deviations[deviations[:, 0] + place < stop]
+        if interval >= 6:  # relaxed to e⁻⁹
+            lost, present = lost + before - len(deviations), present + before
+        if len(deviations) < paths / 20:
+            return math.log(present / lost), 1 / math.sqrt(lost)
+
+
+def test_first_contact_of_a_forced_linear_scene_is_that_of_an_exact_simulation():
+    given = {"damping": 0.2, "amplitude": 0.1, "frequency": 0.8, "stop": 0.5, "intensity": 1e-2}
+    osc = scene(
+        vk.Barrier(vk.Linear(1e3), given["stop"], "right"),
+        damping_ratio=given["damping"],
+        excitations=(vk.Harmonic(amplitude=given["amplitude"], frequency=given["frequency"]),),
+        noise=vk.WhiteNoise(intensity=given["intensity"]),
+    )
+    structure = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(20, 20), manifolds=False, rng=0)
+    (rate,) = vk.SGCM(intensities=(1e-2,), nodes=(120, 120), exit=vk.FirstContact()).run(osc, structure).rates
+    simulated, standard_error = simulated_first_passage(**given)
+    found = -rate.log_value - math.log(osc.section_interval)
+    assert abs(found - simulated) <= rate.log_error + 3 * standard_error
+    assert rate.log_error < 0.05
+
+
+def test_the_first_state_in_another_basin_is_that_of_simulated_trajectories():
+    osc = double_well(noise=vk.WhiteNoise(intensity=2e-2))
+    structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
+    given = {"source": 0, "intensities": (2e-2,), "nodes": (120, 120)}
+    exits = {good: vk.SGCM(exit=vk.LeaveBasin(for_good=good), **given).run(osc, structure) for good in (True, False)}
+    (settled,), (crossed,) = exits[True].rates, exits[False].rates
+    assert [settled.event, crossed.event] == ["commitment", "basin"]
+    assert crossed.value > 1.3 * settled.value
+    (well,) = structure.attractor(0).points
+    places = np.random.default_rng(3).uniform(-1, 1, (8000, 2))
+    deviations = np.sqrt(2e-2 / (2 * 0.1) * np.array([1 / 2, 1]))  # of the linear motion x″ + 0.1 x′ + 2 x
+    starts = well[:2] + deviations * places[(places**2).sum(axis=1) < 1]  # the core is one standard deviation wide
+    stop = vk.LeaveBasin().stop(osc, structure, 0)
+    ended = run_ensemble(osc, Flow.NOISY, vk.RK4(256), starts, 100_000, stop=stop, stream=(9, 0))
+    simulated, standard_error = math.log(ended.intervals.mean()), 1 / math.sqrt(len(starts))
+    found = -crossed.log_value - math.log(osc.section_interval)
+    assert abs(found - simulated) <= crossed.log_error + 3 * standard_error
 
 
 def kramers_rate(damping, intensity):

@@ -165,7 +165,7 @@ class Analyzer(ABC):
                 data={label: one.data for label, one in analyses.items()},
                 findings=(
                     *(finding for one in analyses.values() for finding in one.findings),
-                    *_strength(osc, analyses),
+                    *_strength(self.least_intensity(osc), analyses),
                     *findings,
                 ),
                 scene=scene_data(osc),
@@ -174,6 +174,10 @@ class Analyzer(ABC):
                 complete=not findings and all(one.complete for one in analyses.values()),
                 seconds=work.seconds,
             )
+
+    def least_intensity(self, osc: Oscillator) -> float:
+        """Return the least noise intensity for which energies are meant, that of the scene by default (m² s⁻³)."""
+        return osc.noise.intensity if osc.noise else 0.0
 
     def _checked(self, osc: Oscillator, structure: Structure, executor: Executor | None) -> tuple[Attractor, ...]:
         """Check what a run is given, before any work is done, and return the attractors to leave."""
@@ -223,9 +227,8 @@ class Analyzer(ABC):
                 )
 
 
-def _strength(osc: Oscillator, analyses: dict[int, Analysis]) -> list[Finding]:
-    """Findings where the noise of the scene is not weak against an energy."""
-    intensity = osc.noise.intensity if osc.noise else 0.0
+def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:
+    """Findings where the noise is not weak against an energy."""
     energies = [energy for one in analyses.values() for energy in one.estimates]
     return [
         Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=_WEAK)

@@ -156,7 +156,7 @@ def evolve_density(
 def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> Iterator[tuple[Array, float]]:
     """Yield ln p at some times, in section intervals, and ln of what truncation has changed in its probability."""
     flow, change = propagator.flow, 0.0
-    interval = flow.scene.section_interval
+    interval, floor = flow.scene.section_interval, float(phi.max()) - _DEPTH
     with stage("density", unit="section intervals", total=math.ceil(ends[-1])):
         for end in ends:
             while now < end - _SAME:
@@ -164,7 +164,9 @@ def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> It
                 until = min(section + 1.0, end)
                 whole_interval = now < section + _SAME and until > section + 1 - _SAME
                 legs = flow.legs if whole_interval else flow.between(*(interval * (t - section) for t in (now, until)))
-                phi, added = propagator.along(legs, phi, float(phi.max()) - _DEPTH)
+                phi, added = propagator.along(legs, phi, floor)
+                lower = float(phi.max()) - _DEPTH
+                phi, floor = np.where(phi <= floor, lower, phi), lower  # what is at the floor is not computed
                 change, now = change + added, until
                 advance()
             yield phi, change
@@ -206,7 +208,7 @@ def _start(grid: DensityGrid, start: Any) -> Array:
     if isinstance(start, Attractor):
         corners, box = start.points[:, :2], None
     else:
-        given = np.asarray(grid.region.bounds if start is None else start, dtype=float)
+        given = _numbers(grid.region.bounds if start is None else start)
         box = given if given.shape == (2, 2) and bool(np.all(given[:, 0] < given[:, 1])) else None
         corners = box.T if box is not None else given[None] if given.shape == (2,) else np.full((1, 2), np.nan)
     if not grid.region.contains(corners).all():
@@ -225,6 +227,14 @@ def _start(grid: DensityGrid, start: Any) -> Array:
         roots = np.eye(2) / (_START * grid.local_spacing(corners))[:, None, :]
         phi = -0.5 * nearest(grid.nodes, corners, roots)
     return phi - grid.mass(phi)
+
+
+def _numbers(start: Any) -> Array:
+    """The start as an array of numbers, empty if it is none."""
+    try:
+        return np.asarray(start, dtype=float)
+    except (TypeError, ValueError):
+        return np.empty(0)
 
 
 def _plain_start(start: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from numbers import Real
 from typing import ClassVar
 
@@ -18,6 +19,7 @@ from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
 from vibrokit.errors import StructureError, shown
+from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
@@ -94,6 +96,10 @@ class SGCM(Analyzer):
         if self.intensities is not None:
             object.__setattr__(self, "intensities", _checked_intensities(self.intensities))
 
+    def least_intensity(self, osc: Oscillator) -> float:
+        """The least of the intensities."""
+        return min(self.intensities) if self.intensities else super().least_intensity(osc)
+
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
         noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
@@ -121,7 +127,7 @@ class SGCM(Analyzer):
 
 def _checked_intensities(intensities: tuple[float, ...]) -> tuple[float, ...]:
     """Intensities in descending order, each once."""
-    given = intensities if isinstance(intensities, tuple | list) else (intensities,)
+    given = tuple(intensities) if isinstance(intensities, Sequence | np.ndarray) else (intensities,)
     for intensity in given:
         if isinstance(intensity, bool) or not isinstance(intensity, Real) or not 0 < intensity < math.inf:
             raise StructureError(f"SGCM: intensities must be positive numbers, got {shown(intensity)}.")
@@ -232,14 +238,7 @@ def _findings(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Finding,
             )
         for target, error in one.errors.items():
             if not error <= _ACCEPTED:
-                found.append(
-                    Finding.of(
-                        Code.RATE_UNCERTAIN,
-                        problem.source,
-                        target,
-                        intensity=one.intensity,
-                        error=error,
-                        accepted=_ACCEPTED,
-                    )
-                )
+                code = Code.RATE_UNCERTAIN if math.isfinite(error) else Code.RATE_UNKNOWN
+                values = {"error": error, "accepted": _ACCEPTED} if math.isfinite(error) else {}
+                found.append(Finding.of(code, problem.source, target, intensity=one.intensity, **values))
     return tuple(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -193,6 +194,7 @@ def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Arr
     )
     points = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
     known = np.nan_to_num(data["log_density"].values, nan=-np.inf)
+    area = math.log((x[1] - x[0]) * (v[1] - v[0]))
     parts = np.full((known.shape[1], known.shape[0], *nodes), -np.inf)
     for place, label in enumerate(data["source"].values.tolist()):
         own = tuple(axes[axis][place][np.isfinite(axes[axis][place])] for axis in ("x", "v"))
@@ -200,5 +202,6 @@ def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Arr
             resolved = np.maximum(phi[: len(own[0]), : len(own[1])], _LOWEST)
             found = RegularGridInterpolator(own, resolved, bounds_error=False, fill_value=-np.inf)(points)
             least = np.min(resolved, where=resolved > _LOWEST, initial=np.inf)
-            parts[number, label] = np.where(found >= least, found, -np.inf)
+            found = np.where(found >= least, found, -np.inf)
+            parts[number, label] = found - logsumexp(found) - area  # interpolation changes the mass a little
     return x, v, parts

@@ -206,8 +206,13 @@ class Code(StrEnum):
     )  # fmt: skip
     RATE_UNCERTAIN = (
         "rate-uncertain", WARNING,
-        "The rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.0%}, above {accepted:.0%}.",
-        "Raise the number of nodes or of steps, or the noise intensity.",
+        "ln of the rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.2g}, above "
+        "{accepted:g}.", "Raise the number of nodes or of steps, or the noise intensity.",
+    )  # fmt: skip
+    RATE_UNKNOWN = (
+        "rate-unknown", WARNING,
+        "The rate from {state} to {goal} at D = {intensity:g} is not known: what leaves did not become steady above "
+        "the numerical errors.", "Raise the number of nodes or of steps, or the noise intensity.",
     )  # fmt: skip
 
     # Polishing

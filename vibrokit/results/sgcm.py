@@ -61,7 +61,7 @@ class SGCMResult(Result):
             for i, intensity in enumerate(one["rate_intensity"].values.tolist()):
                 for k, target in enumerate(one["rate_target"].values.tolist()):
                     log_rate, error = float(one["log_rate"][i, k]), float(one["log_rate_error"][i, k])
-                    if math.isnan(log_rate) or math.isnan(error):
+                    if not (math.isfinite(log_rate) and math.isfinite(error)):
                         continue
                     found.append(
                         ExitRate(

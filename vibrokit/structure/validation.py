@@ -100,15 +100,15 @@ def whole(name: str, number: Any, least: int, most: int) -> int:
     return int(number)
 
 
-def pair(name: str, counts: Any, most: int = _MOST_CELLS) -> tuple[int, int]:
-    """Return two whole numbers; a StructureError is raised unless they are 1 or more, their product within bounds."""
+def pair(name: str, counts: Any, most: int = _MOST_CELLS, least: int = 1) -> tuple[int, int]:
+    """Return two whole numbers of at least some size, whose product is within bounds; raises StructureError."""
     try:
-        first, second = (whole(name, count, 1, most) for count in counts)
+        first, second = (whole(name, count, least, most) for count in counts)
     except (TypeError, ValueError, StructureError):
         first = second = most + 1
     if first * second > most:
         raise StructureError(
-            f"{name} must be two whole numbers, 1 or more, whose product is at most {most}, got {shown(counts)}."
+            f"{name} must be two whole numbers, {least} or more, whose product is at most {most}, got {shown(counts)}."
         )
     return first, second
 

@@ -16,8 +16,10 @@ REGION = Region((-1.0, 1.5), (-2.0, 2.0))
 def test_faces_are_halfway_between_nodes_of_a_grid_that_covers_the_region(barriers, faces):
     grid = DensityGrid.of(scene(*barriers), REGION, (71, 50), np.array([faces, (-np.inf, 0.7)]))
     assert grid.shape == (71, 50)
-    assert grid.x[0] <= REGION.x[0] and grid.x[-1] >= REGION.x[1]
-    assert grid.v[0] <= REGION.v[0] and grid.v[-1] >= REGION.v[1]
+    assert grid.x[0] <= REGION.x[0]
+    assert grid.x[-1] >= REGION.x[1]
+    assert grid.v[0] <= REGION.v[0]
+    assert grid.v[-1] >= REGION.v[1]
     middles = 0.5 * (grid.x[1:] + grid.x[:-1])
     for face in (face for face in faces if np.isfinite(face)):
         assert np.abs(middles - face).min() < 1e-3 * np.diff(grid.x).min()

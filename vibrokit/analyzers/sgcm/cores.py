@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, nearest
+from vibrokit.errors import StructureError
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.structure.linear_map import gaussian_map
@@ -23,6 +24,7 @@ _SIZE = 1.0  # semi-axes of a core in standard deviations of the density around 
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
+_SINGULAR = 1e-12  # 1 − correlation², as rounding errors may leave of 0
 _BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
 _RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
@@ -104,12 +106,17 @@ class Cores:
         beyond = _DEVIATIONS * np.sqrt(intensity * spread)
         beyond = np.maximum(beyond, _WIDER * np.ptp(orbits, axis=0))
         low, high = orbits.min(axis=0) - beyond, orbits.max(axis=0) + beyond
-        own, faces = structure.basins.region.bounds, self.problem.exit.faces(self.problem.osc)
-        margins = _BEYOND_FACE * np.array([-1.0, 1.0]) * np.diff(own)
-        faces = np.where(np.isfinite(faces), faces + margins, own)
-        low = np.minimum.reduce([low, own[:, 0], faces[:, 0]])
-        high = np.maximum.reduce([high, own[:, 1], faces[:, 1]])
-        return Region.of(np.stack([low, high], axis=1))
+        own = self._with_faces(structure.basins.region.bounds)
+        return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
+
+    def _with_faces(self, bounds: Array) -> Array:
+        """Bounds that hold the exit's faces; if x must be wider for that then v is too, as a motion there needs it."""
+        faces, outward = self.problem.exit.faces(self.problem.osc), np.array([-1.0, 1.0])
+        margins = _BEYOND_FACE * np.diff(bounds)
+        beyond = np.where(np.isfinite(faces), outward * (faces - bounds) + margins, 0.0)
+        grown = np.max(np.maximum(beyond, 0.0) / np.diff(bounds))
+        wider: Array = np.maximum(np.maximum(beyond, 0.0), grown * np.diff(bounds) * np.isinf(faces))
+        return bounds + outward * wider
 
     @property
     def relaxation(self) -> float:
@@ -140,7 +147,7 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
     Raises
     ------
     StructureError
-        The orbit is not stable.
+        The orbit is not stable, or noise does not make it spread.
     """
     if not attractor.is_fixed:
         return np.zeros((len(attractor.points), 2, 2))
@@ -150,7 +157,10 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
     for point in attractor.points[:-1]:
         step = gaussian_map(problem.osc, point[None], stepper)
         covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
-    return np.array(covariances)
+    found = np.array(covariances)
+    if not np.all(np.linalg.det(found) > _SINGULAR * found[:, 0, 0] * found[:, 1, 1]):
+        raise StructureError("the noise is 0 on the attractor or nearly so: the density around it has no width.")
+    return found
 
 
 def _ellipses(attractor: Attractor, covariances: Array, least: float, grid: DensityGrid) -> tuple[Array, Array]:

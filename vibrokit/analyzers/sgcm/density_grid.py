@@ -14,7 +14,6 @@ from scipy.ndimage import gaussian_filter1d, map_coordinates
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
-from vibrokit.errors import StructureError
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
@@ -196,7 +195,4 @@ def resolved(phi: Array) -> Array:
 
 def checked_nodes(caller: str, nodes: object) -> tuple[int, int]:
     """Return numbers of nodes in x and in v; raises StructureError if they are too few, or no such numbers."""
-    shape = pair(f"{caller}: nodes", nodes)
-    if min(shape) < _FEWEST:
-        raise StructureError(f"{caller}: nodes must be {_FEWEST} or more in x and in v, got {shape}.")
-    return shape
+    return pair(f"{caller}: nodes", nodes, least=_FEWEST)

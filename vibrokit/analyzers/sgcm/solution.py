@@ -209,7 +209,8 @@ class DensitySolver:
             nx, nv = (math.ceil(factor * count) for count in grid.shape)
             raise StructureError(
                 f"at D = {intensity:g} the density is narrower than {_NARROWEST:g} node spacings; {grid.shape[0]} × "
-                f"{grid.shape[1]} nodes are enough for D = {least:.3g}, and this D needs {nx} × {nv}."
+                f"{grid.shape[1]} nodes are enough for D = {least:.5g}, and this D needs {nx} × {nv}. "
+                "LeastAction gives the energy in the limit of weak noise."
             )
 
     @cached_property
