@@ -37,7 +37,6 @@ def exact_energies(scene, structure):
 MILD = [
     *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 2.0))),
     *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
-    *by_name(pressed_wells("linear"), "pressed well, linear, k=1, zeta=0.05"),
     *by_name(tilted_wells(), "tilted well, 0.001 from its fold"),
 ]
 STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05")

@@ -131,12 +131,12 @@ def round_trip(osc, stepper, periods=1):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", ["hertz", "linear", "jumping"])
 def test_located_contacts(name):
     """A located contact's error is the tolerance, times what motion through stops makes of it: some 1e2 at most."""
     law, adhesive, _ = LAWS[name]
     osc = scene(law, adhesive)
-    kind = vk.Order8 if name in ("damping", "jumping") else vk.FreeFlight
+    kind = vk.Order8 if name == "jumping" else vk.FreeFlight
     for tolerance in (1e-8, 1e-11):
         errors = round_trip(osc, kind(tolerance))
         assert np.median(errors) < 100 * tolerance

@@ -105,6 +105,7 @@ def test_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: trade)
     monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
     monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
+    monkeypatch.setattr("vibrokit.trade.densities.measure_densities", lambda osc, source: "densities")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
     assert str(trade) in capsys.readouterr().out
