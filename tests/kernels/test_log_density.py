@@ -120,8 +120,3 @@ def test_an_expected_value_at_the_exit_is_that_of_the_exit():
     share[:, 30:], share[:, 29] = 1 - 1e-9, 0.25
     found, *_ = stepped(values, share=share, value=0.0)
     np.testing.assert_allclose(np.exp(found), share + (1 - share) * np.exp(-50.0), rtol=1e-12)
-
-
-def test_what_is_at_the_floor_is_not_taken_up():
-    *_, taken = stepped(np.full(NODES.shape[:2], FLOOR), share=np.full(NODES.shape[:2], 0.5))
-    assert np.all(taken == -np.inf)

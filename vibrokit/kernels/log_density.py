@@ -312,8 +312,7 @@ def _absorb_row(row: Array, share: Array, value: float, floor: float) -> float:
     taken = -math.inf
     for j in range(len(row)):
         if share[j] > 0.0:
-            if row[j] > floor:
-                taken = _added(taken, row[j] + math.log(share[j]))
+            taken = _added(taken, row[j] + math.log(share[j]))
             left = row[j] + math.log1p(-share[j])
             row[j] = max(_added(left, value + math.log(share[j])), floor)
     return taken

@@ -28,7 +28,8 @@ from vibrokit.symbolic.flow_kind import Flow
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _ROUGHLY, _EXPLORED_TO = 0.03, 0.1  # the same with half the steps, and in exploration
 _EVERY = 2  # cells of the basins that are one for the estimate of what their size changes, which is of first order
-# A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30.
+# A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30. Edges
+# of sets that absorb at any time, or that are basins, are of first order, and all of the change counts.
 _STEP_ERROR = 1 / 7
 _STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
@@ -57,8 +58,7 @@ class AtIntensity:
     committors : mapping of int to Committor
         By target.
     step_errors : mapping of int to float
-        By target: a seventh of what halving the steps changes in ln rate; or all of what halving the steps and making
-        cells of the basins larger changes.
+        By target: a share of what halving the steps changes in ln rate; basins are made coarser as well.
     """
 
     intensity: float
@@ -149,6 +149,7 @@ class DensitySolver:
             check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
             flows = self._flow(grid, self.steps), self._flow(grid, self._half)
             before, at_boundary = explored, self.problem.exit.at_boundary
+            share = 1.0 if at_boundary or self.problem.exit.by_position else _STEP_ERROR
             for intensity in intensities:
                 start, committors = before.begun(grid, intensity)
                 transition, other = (self._transition(flow, intensity, executor) for flow in flows)
@@ -157,7 +158,7 @@ class DensitySolver:
                 coarse = self._cores.on(grid, intensity, _EVERY) if at_boundary else cores
                 long = quasi_stationary(other, found.phi, coarse, self._cores.relaxation, _ROUGHLY)
                 steps = {
-                    target: (1.0 if at_boundary else _STEP_ERROR) * abs(rate - long.log_rates[target])
+                    target: share * abs(rate - long.log_rates[target])
                     for target, rate in found.log_rates.items()
                     if target in long.log_rates
                 }
@@ -242,6 +243,8 @@ class DensitySolver:
         converged: float,
     ) -> dict[int, Committor]:
         """The committor of each target whose rate is known."""
+        if not found.log_rates:
+            return {}
         earlier, areas, relaxation = transition.backward(found, cores), transition.grid.areas, self._cores.relaxation
         return {
             target: committor(earlier, found, cores, areas, target, relaxation, converged, starts.get(target))
