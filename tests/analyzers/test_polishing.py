@@ -345,8 +345,9 @@ FACES = {"right": ("x", 0, 1), "left": ("x", 0, -1), "up": ("v", 1, 1), "down": 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("filtered", [False, True], ids=["white", "filtered"])
-@pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
+@pytest.mark.parametrize(
+    ("forced", "filtered"), [(False, False), (True, False), (True, True)], ids=["autonomous", "forced", "filtered"]
+)
 @pytest.mark.parametrize("face", FACES.values(), ids=FACES)
 def test_the_least_action_to_a_face(face, forced, filtered):
     name, axis, sign = face
