@@ -42,8 +42,9 @@ class SGCM(Analyzer):
     one; what is lost in a section interval is the exit rate.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
-    shape and the standard deviations of the density there, or 2.5 node spacings where that is more. With an exit by
-    position it has left at the first time that satisfies the condition.
+    shape and the standard deviations of the density there, or 2.5 node spacings where that is more. With
+    `LeaveBasin(for_good=False)` it has left when it is in another basin on the section, and with an exit by position at
+    the first time that satisfies the condition.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class SGCM(Analyzer):
     -----
     A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
     reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Their difference is its error estimate, with a seventh of what halving the steps, or another sample, changes. An
+    Their difference is its error estimate, with a share of what halving the steps, or another sample, changes. An
     activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,

@@ -21,8 +21,9 @@ class ExitRate:
     log_error : float
         Error estimate of it.
     event : str
-        What counts: ``"commitment"``, the first state on the section in the core of another attractor, or
-        ``"contact"``, the first time at which position and velocity satisfy the exit condition.
+        What counts: ``"commitment"``, the first state on the section in the core of another attractor; ``"basin"``,
+        the first one in another basin; or ``"contact"``, the first time at which position and velocity satisfy the exit
+        condition.
     method : str
     """
 
