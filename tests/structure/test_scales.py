@@ -100,3 +100,19 @@ def test_the_units_of_time_change_nothing():
 def test_a_force_that_never_repeats_counts_too():
     osc = scene(Incommensurate(0.7), stops=STOPS[:1])
     assert 5 * 1.39 < length_of(osc) <= 5 * 1.4
+
+
+@pytest.mark.parametrize(("wells", "frequency"), [(1.0, 1.0), (1e-4, 1.0), (1e-4, 2e3), (1e5, 1e-3)])
+def test_the_wells_of_a_spring_are_found_in_any_unit(wells, frequency):
+    """x″ + 2ζω x′ − ω² x + ω² x³/w² = 0 rests at ± w."""
+    spring = vk.CubicSpring(linear=-(frequency**2), cubic=(frequency / wells) ** 2)
+    osc = vk.Oscillator(natural_frequency=frequency, damping_ratio=0.1, spring=spring)
+    assert length_of(osc) == pytest.approx(wells, rel=1e-8)
+    structure = vk.find_structure(osc, cells=(30, 30), rng=0)
+    assert sorted(float(a.points[0, 0]) for a in structure.attractors) == pytest.approx([-wells, wells], rel=1e-9)
+    assert len(structure.saddles) == 1
+    assert structure.basins.fraction(0) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_linear_spring_has_no_length():
+    assert length_of(vk.Oscillator(natural_frequency=30.0, damping_ratio=0.1)) == 1.0

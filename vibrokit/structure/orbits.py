@@ -17,7 +17,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton
-from vibrokit.structure.scales import size_of
+from vibrokit.structure.scales import length_of, size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 EQUAL = 1e-6
@@ -103,9 +103,16 @@ def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
 
 
 def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
-    """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion."""
-    nearest = np.linalg.norm(known - point, axis=1).min()
-    return bool(nearest < tolerance * (size_of(osc) + np.abs(known).max()))
+    """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion.
+
+    Displacements are compared with displacements and velocities with velocities, so that no unit of time matters;
+    states of the noise are compared with the size of both.
+    """
+    length, size = length_of(osc), size_of(osc)
+    scales = np.full(known.shape[1], size)
+    scales[:2] = length, length * osc.natural_frequency
+    near = np.abs(known - point) < tolerance * (scales + np.abs(known).max(axis=0))
+    return bool(near.all(axis=1).any())
 
 
 def arrival_at(orbits: Mapping[int, Array], tolerance: float) -> Stop:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
@@ -24,6 +24,7 @@ _SAMPLES, _LEAST_SAMPLES = 64, 512  # of a force in 2π/ω_n, and in all; its ma
 _LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its period is longer
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
+_DECADES = 12  # of deflections, above and below 1 m, at which a spring's force is compared with its linear part
 
 Array = NDArray[np.float64]
 
@@ -33,20 +34,42 @@ def length_of(osc: Oscillator) -> float:
     """Return the distance that the mass may be expected to move (m).
 
     It is the larger of twice the distance to the stops and the deflection of a spring ω_n² by the largest forces of
-    the excitations. Where two stops do not limit a resonance, it multiplies the deflection by periodic forces. A scene
-    with neither stops nor forces has no length scale; its length is 1.
+    the excitations. Where two stops do not limit a resonance, it multiplies the deflection by periodic forces. With
+    neither stops nor forces it is the deflection at which the spring's force differs from its linear part by as much
+    as that. A linear spring has no length scale; the length is 1 then.
     """
     field, push = VectorField(osc), 0.0
     for index, part in enumerate(osc.excitations):
         resonant = len(osc.barriers) < 2 and part.period is not None
         largest = _largest_force(field, index, part.period, 2 * math.pi / osc.natural_frequency)
         push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
-    return max([push, *(2 * abs(barrier.position) for barrier in osc.barriers)]) or 1.0
+    return max([push, *(2 * abs(barrier.position) for barrier in osc.barriers)]) or _bending(osc, field)
 
 
 def size_of(osc: Oscillator) -> float:
     """Return the size of states (x, v) that goes with it, x and v taken together."""
     return length_of(osc) * math.hypot(1.0, osc.natural_frequency)
+
+
+def _bending(osc: Oscillator, field: VectorField) -> float:
+    """Deflection at which the spring's force differs from its linear part by as much as that; 1 if there is none."""
+    rest = states_at(osc, np.zeros((1, 2)))
+    slope = float(field.jacobian(rest)[0, 1, 0])
+    offset = float(field.rate(rest)[0, 1])
+
+    def excess(logarithm: float) -> float:
+        sides = states_at(osc, np.array([[1.0, 0.0], [-1.0, 0.0]]) * math.exp(logarithm))
+        forces = field.rate(sides)[:, 1] - offset
+        return float(np.abs(forces - slope * sides[:, 0]).max() / (abs(slope) * sides[0, 0])) - 1.0
+
+    if slope == 0.0 or not math.isfinite(slope):
+        return 1.0
+    places = np.linspace(-_DECADES, _DECADES, 8 * _DECADES + 1) * math.log(10)
+    values = [excess(place) for place in places]
+    for low, high, below, above in zip(places, places[1:], values, values[1:], strict=False):
+        if below < 0 <= above < math.inf:
+            return float(f"{math.exp(brentq(excess, low, high)):.9g}")
+    return 1.0
 
 
 def _largest_force(field: VectorField, index: int, period: float | None, turn: float) -> float:

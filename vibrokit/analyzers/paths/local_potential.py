@@ -84,6 +84,11 @@ def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> tuple[Ph
 
 
 def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotential:
+    if not (np.isfinite(monodromy).all() and np.isfinite(gathered).all()):
+        raise StructureError(
+            f"the motion along the orbit at {tuple(orbit.point.tolist())} cannot be linearized; it may rest exactly "
+            "where it touches a stop, or graze one."
+        )
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
     if not largest < 1 - _NEUTRAL:
         raise StructureError(
