@@ -52,7 +52,7 @@ class SGCM(Analyzer):
         Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
     nodes : (int, int), optional
         Nodes in x and in v; by default so many that the narrowest density around the attractor is 4 node spacings
-        wide, from 120 to 400.
+        wide, from 120 to 400, or 2 spacings with up to 640 nodes.
     steps : int, optional
         How often noise acts in a section interval; even. By default 2 per radian of the fastest oscillation or decay.
     max_memory_gib : float
@@ -144,7 +144,8 @@ def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Activati
             continue
         times = [-one.log_rates[target] for one in solved]
         value, error = extrapolated([s.intensity for s in solved], times, [one.errors[target] for one in solved])
-        lower, upper = max(value - error, 0.0), max(value + error, 0.0)
+        error += max(-value, 0.0)  # no energy is negative: a negative limit misses by that much at least
+        lower, upper = max(value - error, 0.0), max(value, 0.0) + error
         found.append(
             ActivationEnergy(
                 problem.source,

@@ -28,3 +28,11 @@ def test_errors_of_rates_are_those_of_the_straight_line():
 def test_one_intensity_has_an_error_of_three_times_itself():
     value, error = extrapolated([2.0], [4.0], [0.1])
     assert (value, error) == (8.0, pytest.approx(6.2))
+
+
+@pytest.mark.parametrize("bend", [0.2, -0.2])
+def test_the_error_from_two_intensities_contains_the_limit_of_a_prefactor_like_kramers(bend):
+    """The first correction of Kramers' formula is of the order of D/ΔU, here 1/5 of D."""
+    d = np.array([1.0, 0.7])
+    value, error = extrapolated(d, (5.0 + 0.01 * d + bend * d**2) / d, [0.0, 0.0])
+    assert abs(value - 5.0) <= error

@@ -38,6 +38,7 @@ _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole regi
 _NARROWEST = 2.0  # the same on the finest grid, at least
 _WANTED = 4.0  # the same on the finest grid, by default
 _FEWEST, _MOST = 120, 400  # nodes along each side, by default
+_LARGEST, _SPARE = 640, 1.05  # the same if more than the most are needed for the least width, and a little more
 _EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
 _MARGIN = 3  # nodes around it
@@ -199,8 +200,13 @@ class DensitySolver:
         """The nodes that are wanted, or those that the narrowest density needs."""
         if self.shape is not None:
             return self.shape
-        needed = math.sqrt(self._cores.resolved(explored, _WANTED) / intensity)
-        nx, nv = (min(max(math.ceil(needed * count), _FEWEST), _MOST) for count in explored.shape)
+        fine, coarse = (
+            math.sqrt(self._cores.resolved(explored, w) / intensity) for w in (_WANTED, _SPARE * _NARROWEST)
+        )
+        nx, nv = (
+            max(_FEWEST, min(math.ceil(fine * count), _MOST), min(math.ceil(coarse * count), _LARGEST))
+            for count in explored.shape
+        )
         return nx, nv
 
     def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:
