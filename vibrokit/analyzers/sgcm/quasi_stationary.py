@@ -22,7 +22,8 @@ from vibrokit.progress import advance, stage
 
 _WINDOW = 4  # section intervals, at least: the largest changes of two windows give how fast they fall
 _INTERVALS_PER_RELAXATION, _FEWEST, _MOST = 40, 60, 3000  # section intervals after which iteration is given up
-_CROSSED = 4.0  # relaxations, in which what is missing at the start arrives from the attractor: before, a rate may rest
+CROSSED = 4.0
+"""Relaxations, in which what is missing at the start arrives from the attractor: before, a rate may rest."""
 _STILL = 1e-3  # of ln rate: means that differ by less are equal, as errors of rates are above 1e-2
 _BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
@@ -96,6 +97,7 @@ def quasi_stationary(
     cores: CoreSets,
     relaxation: float,
     converged: float,
+    crossed: float = CROSSED,
 ) -> QuasiStationary:
     """Iterate until the rates stay the same.
 
@@ -110,6 +112,8 @@ def quasi_stationary(
         Section intervals in which deviations of the density fall by a factor e.
     converged : float
         Change of ln rate that may be left.
+    crossed : float
+        Relaxations that must pass.
     """
     grid = transition.grid
     phi, rates, change, intervals = start - grid.mass(start), list[float](), np.inf, 0
@@ -147,7 +151,7 @@ def quasi_stationary(
             if left > 0:
                 phi = np.logaddexp(phi + math.log1p(-left * ABSORBED), entry + math.log(left))
             intervals += 1
-            change = remaining(rates, relaxation)
+            change = remaining(rates, relaxation, crossed)
             advance()
     resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
     error = spread_of(rates, change)
@@ -159,7 +163,7 @@ def most_intervals(relaxation: float) -> int:
     return int(np.clip(_INTERVALS_PER_RELAXATION * relaxation, _FEWEST, _MOST))
 
 
-def remaining(rates: list[float], relaxation: float) -> float:
+def remaining(rates: list[float], relaxation: float, crossed: float = CROSSED) -> float:
     """Return the change of the last of some ln rates that further iteration would make.
 
     It is the sum of a geometric series of the means of three windows, as wide as half of the relaxation, since a rate
@@ -168,7 +172,7 @@ def remaining(rates: list[float], relaxation: float) -> float:
     as its mean; it is above where a density takes longer to arrive than to relax.
     """
     window = max(_WINDOW, math.ceil(0.5 * relaxation))
-    if len(rates) < max(3 * window, _CROSSED * relaxation) or not np.isfinite(rates[-3 * window :]).all():
+    if len(rates) < max(3 * window, crossed * relaxation) or not np.isfinite(rates[-3 * window :]).all():
         return math.inf
     means = np.mean(np.reshape(rates[-3 * window :], (3, window)), axis=1)
     before, now = np.abs(np.diff(means)).tolist()
