@@ -27,8 +27,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _EXPLORED_TO = 0.1  # the same in exploration
-# Relaxations that must pass with all steps, which begin from the density with half of them. On hertz-0.570 at D = 2e-5 ln
-# of the rate after 2 differs by 0.004 from that after 4, and its error is 0.03.
+# Relaxations that must pass with all steps, which begin from the density with half of them. On hertz-0.570 at D = 2e-5,
+# ln of the rate after 2 differs by 0.004 from that after 4, and its error is 0.03.
 _ARRIVED = 2.0
 _EVERY = 2  # cells of the basins that are one for the estimate of what their size changes, which is of first order
 # A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30. Edges
