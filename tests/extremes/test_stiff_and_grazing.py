@@ -5,6 +5,8 @@ import pytest
 
 import vibrokit as vk
 from tests.extremes.exact import exact_period
+from tests.scenes import scene
+from vibrokit.structure.linear_map import gaussian_map
 
 pytestmark = pytest.mark.slow
 
@@ -51,3 +53,16 @@ def test_zero_gap(stepper, stiffness):
     half = exact_period(stiffness, 1.5, 0.0, 0.8) - np.pi  # the right half; the left one is its mirror image
     path = osc.trajectory([0.0, 0.8], duration=CYCLES * 2 * half, samples=1, stepper=stepper)
     np.testing.assert_allclose(path.states[-1], [0.0, 0.8], rtol=0, atol=1e-8)
+
+
+def test_a_rest_that_touches_a_stop_with_a_rate_too_small_to_move():
+    """At x = 1 all forces are 0, and the rounding error of a rest may be a positive velocity."""
+    spring = vk.CubicSpring(linear=-1.0, cubic=1.0)
+    osc = scene(
+        vk.Barrier(vk.Hertz(1e3), 1.0, "right"), damping_ratio=0.1, spring=spring, noise=vk.WhiteNoise(intensity=1e-2)
+    )
+    rates = np.array([0.0, 1e-21, 1e-18])
+    found = gaussian_map(osc, np.stack([np.ones(3), rates], axis=1), vk.Order8(1e-10))
+    assert np.abs(found.images - [1.0, 0.0]).max() < 1e-15
+    np.testing.assert_allclose(found.derivatives, found.derivatives[:1].repeat(3, axis=0), rtol=1e-9)
+    np.testing.assert_allclose(found.covariances, found.covariances[:1].repeat(3, axis=0), rtol=1e-9)

@@ -12,6 +12,7 @@ from vibrokit.kernels.templates.steps import (
     INNER,
     PULLED,
     SINCE,
+    SPAN,
     TIMED,
     TOUCHED,
 )
@@ -36,6 +37,7 @@ def settle(y, memory, pushing, theta, spare):
             acceleration = SIDES[i] * spare[1]
             # A contact too shallow for x to represent does not count.
             seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
+            seen = seen and abs(rate) * memory[SPAN] > EPSILON * abs(wall)
             touched = rate > 0.0 if seen else acceleration > 0.0
             if touched and ROOTED[i]:
                 memory[SINCE] = y[CLOCK]
