@@ -166,7 +166,7 @@ class Work:
             raise KeyboardInterrupt
         if time.perf_counter() > self.deadline:
             self.deadline = math.inf
-            raise OutOfTime
+            raise OutOfTime("the time limit was reached before there was a result; raise time_limit.")
         if self.outer is not None:
             self.outer.check()
 

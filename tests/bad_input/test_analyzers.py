@@ -88,6 +88,11 @@ def test_unknown_sides(side):
     refused(StructureError, lambda: vk.FirstContact(side), "side must be")
 
 
+@pytest.mark.parametrize("given", ["no", 1, None])
+def test_what_is_not_for_good(given):
+    refused(StructureError, lambda: vk.LeaveBasin(for_good=given), "for_good must be True or False")
+
+
 @pytest.fixture(scope="module")
 def centres(structure):
     """Without damping the wells are centres: their multipliers have size 1, and there is no quadratic form."""
