@@ -126,6 +126,15 @@ class DensityFlow:
             amplitude[:] = amplitude.mean()
         return amplitude
 
+    def beyond_exit(self, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the nodes at which motions from some nodes end a leg in which they have been at the exit."""
+        arrivals = np.zeros(self.grid.shape, dtype=bool)
+        for leg in self.legs:
+            held = self.grid.holds(leg.feet)
+            i, j = np.moveaxis(np.rint(np.where(held[..., None], leg.feet, 0.0)).astype(int), -1, 0)
+            arrivals |= held & nodes[i, j] & (leg.crossed > 0)
+        return arrivals
+
     @staticmethod
     def memory(shape: tuple[int, int], steps: int, autonomous: bool) -> float:
         """Memory that legs take (GiB)."""

@@ -189,6 +189,8 @@ class DensitySolver:
             if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
                 for covered in self._cores.on(grid, intensity).others.values():
                     wanted |= covered > 0
+            if self.problem.exit.by_position:
+                wanted |= propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted
             closer = self._grid(grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
             if stronger == intensity or not smaller:
