@@ -2,6 +2,7 @@
 
 import json
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from tests.builders import full_result, rewritten, say
 from vibrokit.cli import main
 from vibrokit.progress import Stats
 from vibrokit.report.data import plain, run_data
-from vibrokit.report.text import energy_table, findings_text, record_text, stats_text
+from vibrokit.report.text import energy_table, findings_text, rate_table, record_text, stats_text
 from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
@@ -44,6 +46,31 @@ def test_energies_are_told_by_name_with_their_bounds_and_their_ratio_to_the_nois
     ]  # fmt: skip
     assert [cell.strip() for cell in cells(lines[2])][4:9] == ["inf", "estimate", "1.0e-06", "–", "–"]
     assert lines[3].startswith("clear → exit ")
+
+
+class WithRates(Result):
+    """A result with rates of any size."""
+
+    kind: ClassVar[str] = "with-rates"
+
+    @property
+    def rates(self):
+        """One that a float holds, and one that it does not."""
+        given = [(0, 1, math.log(0.25), 0.03, "commitment"), (1, -1, -2000.0, 0.5, "contact")]
+        return tuple(ExitRate(a, b, 2e-5, value, error, event, "SGCM") for a, b, value, error, event in given)
+
+
+def test_rates_are_told_with_mean_times_of_any_size():
+    section = Section(labels=np.zeros((1, 1), dtype=np.int16), bounds=np.zeros((2, 2)), points=(), names=NAMES)
+    found = WithRates(energies=(), section=section, scene=SCENE)
+    lines = [[cell.strip() for cell in cells(line)] for line in rate_table(found).splitlines()]
+    assert lines[0] == ["exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method"]
+    assert lines[1] == ["clear → hammering", "2e-05", "4", "0.25", "0.03", "commitment", "SGCM"]
+    assert lines[2] == ["hammering → exit", "2e-05", "10^868.59", "10^-868.59", "0.5", "contact", "SGCM"]
+    assert rate_table(found) in record_text("scene", found)
+    (one, other) = run_data(None, {"sgcm": found})["rates"]
+    assert (one["exit"], one["value"], one["analyzer"]) == ("clear → hammering", pytest.approx(0.25), "sgcm")
+    assert (other["value"], other["log_value"]) == (0.0, -2000.0)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.report.text import noise_intensity
 from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -20,6 +21,8 @@ from vibrokit.results.structure import Structure
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
 _SADDLE = ("period", "points", "multipliers", "kind", "leads_to")
 _ENERGY = ("source", "target", "method", "value", "lower", "upper", "bound", "numerical_error", "residual", "saddle")
+
+_RATE = ("source", "target", "intensity", "value", "log_value", "log_error", "event", "method")
 
 
 def run_data(structure: Structure | None, results: Mapping[str, Result]) -> dict[str, Any]:
@@ -32,6 +35,7 @@ def run_data(structure: Structure | None, results: Mapping[str, Result]) -> dict
             "saddles": [_fields(s, _SADDLE) for s in structure.saddles] if structure else [],
             "energies": [_energy(name, r, e) for name, r in results.items() for e in r.energies],
             "branches": [_energy(name, r, e) for name, r in results.items() for e in r.branches],
+            "rates": [_rate(name, r, rate) for name, r in results.items() for rate in r.rates],
             "transitions": {
                 name: _transitions(Transitions.of(r))
                 for name, r in results.items()
@@ -78,6 +82,10 @@ def _energy(analyzer: str, result: Result, energy: ActivationEnergy) -> dict[str
     intensity = noise_intensity(result)
     ratio = energy.value / intensity if intensity > 0 else None
     return {**_fields(energy, _ENERGY), "exit": result.exit_of(energy), "ratio": ratio, "analyzer": analyzer}
+
+
+def _rate(analyzer: str, result: Result, rate: ExitRate) -> dict[str, Any]:
+    return {**_fields(rate, _RATE), "exit": rate.exit_between(result.names), "analyzer": analyzer}
 
 
 def _transitions(transitions: Transitions) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.text_table import number_text, text_table
 
+_LARGEST = 690.0  # logarithm of numbers that a float holds, at most
 _LEAST_SHARE = 0.01  # of the time: shorter stages are not listed
 
 
@@ -49,6 +50,8 @@ def _result_tables(result: Result) -> list[str]:
     if len(result.branches) > len(result.energies):
         ranked = sorted(result.branches, key=lambda branch: (branch.source, branch.target, branch.value))
         tables.append("All paths, the cheapest of each exit first:\n" + energy_table(result, ranked))
+    if result.rates:
+        tables.append(rate_table(result))
     if any(energy.target >= 0 for energy in result.energies):
         tables.append(transitions_text(Transitions.of(result), noise_intensity(result)))
     return tables
@@ -89,6 +92,22 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> str:
         value = f"{e.value:.{_digits(e)}g}"
         rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, e.method))
     return "\n".join(text_table(rows)) if len(rows) > 1 else "No activation energy was found."
+
+
+def rate_table(result: Result) -> str:
+    """Return exit rates at finite noise, a line each, with the mean times that are their inverses."""
+    rows = [("exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method")]
+    for rate in result.rates:
+        times = _power(-rate.log_value), _power(rate.log_value), f"{rate.log_error:.2g}"
+        rows.append((rate.exit_between(result.names), f"{rate.intensity:g}", *times, rate.event, rate.method))
+    return "\n".join(text_table(rows))
+
+
+def _power(logarithm: float) -> str:
+    """A number of any size, given its natural logarithm."""
+    if abs(logarithm) < _LARGEST:
+        return f"{math.exp(logarithm):.4g}"
+    return f"10^{logarithm / math.log(10):.2f}"
 
 
 def transitions_text(transitions: Transitions, intensity: float) -> str:

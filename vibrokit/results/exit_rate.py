@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
+
+from vibrokit.results.labels import exit_between
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,10 @@ class ExitRate:
     log_error: float
     event: str
     method: str
+
+    def exit_between(self, names: Sequence[str]) -> str:
+        """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""
+        return exit_between(names, self.source, self.target)
 
     @property
     def value(self) -> float:

@@ -14,6 +14,7 @@ from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
 from vibrokit.results.energy import ActivationEnergy, ExitPath, energy_variables, read_energies
+from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.labels import label_of, source_among
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
@@ -114,9 +115,14 @@ class Result(Record):
             raise StructureError(f"there is no energy of {self.names[start]}{goal}; the result has {known}.")
         return min(found, key=lambda energy: energy.value)
 
-    def exit_of(self, energy: ActivationEnergy) -> str:
+    def exit_of(self, energy: ActivationEnergy | ExitRate) -> str:
         """Return the names of the attractors between which an exit leads: ``"hammering → clear"``."""
         return energy.exit_between(self.names)
+
+    @property
+    def rates(self) -> tuple[ExitRate, ...]:
+        """Exit rates at finite noise; only methods that take the noise as it is have them."""
+        return ()
 
     @property
     def summary(self) -> Summary:
