@@ -86,5 +86,11 @@ def test_an_attractor_without_a_density_is_named(wells):
         vk.StationaryDensity.of(3)
 
 
+@pytest.mark.parametrize("nodes", [(2, 2), (1, 9), 3.5, "many"])
+def test_too_few_nodes_are_refused(wells, nodes):
+    with pytest.raises(vk.errors.StructureError):
+        vk.StationaryDensity.of(wells, nodes)
+
+
 def wells_structure(wells):
     return vk.find_structure(wells.oscillator, cells=(40, 40), manifolds=False, rng=0)

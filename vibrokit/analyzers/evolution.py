@@ -13,13 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.density_flow import (
-    DensityFlow,
-    check_allowed_memory,
-    check_memory,
-    check_steps,
-    steps_for,
-)
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, nearest, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
 from vibrokit.errors import StructureError, shown
@@ -32,7 +26,7 @@ from vibrokit.results.density_history import DensityHistory
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.region import Region
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.validation import check_means, plain
+from vibrokit.structure.validation import check_means, gibibytes, plain
 from vibrokit.symbolic.flow_kind import Flow
 
 _DEPTH = 60.0  # in ln p below the maximum that is resolved
@@ -109,8 +103,8 @@ def evolve_density(
     grid = DensityGrid.of(osc, area, shape)
     count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
     check_steps("evolve_density", count)
-    check_allowed_memory("evolve_density", max_memory_gib)
-    check_memory(shape, DensityFlow.memory(shape, count, osc.autonomous), count, max_memory_gib)
+    allowed = gibibytes("evolve_density: max_memory_gib", max_memory_gib)
+    check_memory(shape, DensityFlow.memory(shape, count, osc.autonomous), count, allowed)
     begun = _start(grid, start)
     kept: list[Array] = []
     masses: list[float] = []
@@ -230,7 +224,7 @@ def _start(grid: DensityGrid, start: Any) -> Array:
 
 
 def _numbers(start: Any) -> Array:
-    """The start as an array of numbers, empty if it is none."""
+    """The start as an array of numbers; an empty array if it does not consist of numbers."""
     try:
         return np.asarray(start, dtype=float)
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.errors import StructureError, shown
-from vibrokit.kernels.ensemble import Stop
+from vibrokit.kernels.ensemble import UNBOUNDED, Stop
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
@@ -74,7 +74,7 @@ class Exit(ABC):
 
     def faces(self, osc: Oscillator) -> Array:
         """Return the bounds of x and of v that a state must be beyond, shape (2, 2); infinite if there are none."""
-        return np.array([[-math.inf, math.inf], [-math.inf, math.inf]])
+        return UNBOUNDED
 
     @abstractmethod
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_flow import check_allowed_memory, check_steps, steps_for
+from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
@@ -24,7 +24,7 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
-from vibrokit.structure.validation import whole
+from vibrokit.structure.validation import gibibytes, whole
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
@@ -93,7 +93,7 @@ class SGCM(Analyzer):
             check_steps("SGCM", self.steps)
         if self.samples is not None:
             whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
-        check_allowed_memory("SGCM", self.max_memory_gib)
+        gibibytes("SGCM: max_memory_gib", self.max_memory_gib)
         if self.intensities is not None:
             object.__setattr__(self, "intensities", _checked_intensities(self.intensities))
 

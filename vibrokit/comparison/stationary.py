@@ -16,6 +16,7 @@ from scipy.special import logsumexp
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
+from vibrokit.structure.validation import pair
 from vibrokit.text_table import text_table
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ class StationaryDensity:
         Raises
         ------
         StructureError
-            The result is not one of SGCM, an attractor was not analyzed, or no exit from one was resolved.
+            The result is not one of SGCM, an attractor was not analyzed, no exit from one was resolved, or the nodes
+            are too few.
         """
         if not isinstance(result, SGCMResult):
             raise StructureError(f"StationaryDensity.of needs a result of SGCM, got {shown(result)}.")
@@ -79,7 +81,7 @@ class StationaryDensity:
             if rate.target >= 0:
                 log_rates[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
         occupancies = np.array([log_stationary(one, names) for one in log_rates])
-        x, v, parts = _on_one_grid(result, nodes)
+        x, v, parts = _on_one_grid(result, pair("StationaryDensity.of: nodes", nodes, least=2))
         density = logsumexp(parts + occupancies[:, :, None, None], axis=1)
         return cls(np.array(known), occupancies, density, x, v, result.section)
 
@@ -203,5 +205,10 @@ def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Arr
             found = RegularGridInterpolator(own, resolved, bounds_error=False, fill_value=-np.inf)(points)
             least = np.min(resolved, where=resolved > _LOWEST, initial=np.inf)
             found = np.where(found >= least, found, -np.inf)
+            if np.isneginf(found).all():
+                raise StructureError(
+                    f"the density of {result.names[label]} at D = {result.intensities[number]:g} is narrower than the "
+                    f"distance of {nodes[0]} × {nodes[1]} nodes; ask for more."
+                )
             parts[number, label] = found - logsumexp(found) - area  # interpolation changes the mass a little
     return x, v, parts

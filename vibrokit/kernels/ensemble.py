@@ -25,6 +25,9 @@ _SMALLEST_BLOCK = 64
 
 Array = NDArray[Any]
 
+UNBOUNDED = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
+"""Bounds of x and of v that no state exceeds."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stop:
@@ -41,7 +44,7 @@ class Stop:
         Known points of the section; a trajectory nearer than `tolerance` to one has reached it.
     """
 
-    region: Array = dataclasses.field(default_factory=lambda: np.array([[-np.inf, np.inf], [-np.inf, np.inf]]))
+    region: Array = dataclasses.field(default_factory=UNBOUNDED.copy)
     labels: Array = dataclasses.field(default_factory=lambda: np.empty((0, 0), dtype=np.int16))
     home: int = -1
     points: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))

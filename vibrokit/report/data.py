@@ -21,7 +21,6 @@ from vibrokit.results.structure import Structure
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
 _SADDLE = ("period", "points", "multipliers", "kind", "leads_to")
 _ENERGY = ("source", "target", "method", "value", "lower", "upper", "bound", "numerical_error", "residual", "saddle")
-
 _RATE = ("source", "target", "intensity", "value", "log_value", "log_error", "event", "method")
 
 
@@ -85,7 +84,7 @@ def _energy(analyzer: str, result: Result, energy: ActivationEnergy) -> dict[str
 
 
 def _rate(analyzer: str, result: Result, rate: ExitRate) -> dict[str, Any]:
-    return {**_fields(rate, _RATE), "exit": rate.exit_between(result.names), "analyzer": analyzer}
+    return {**_fields(rate, _RATE), "exit": result.exit_of(rate), "analyzer": analyzer}
 
 
 def _transitions(transitions: Transitions) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def rate_table(result: Result) -> str:
     rows = [("exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method")]
     for rate in result.rates:
         times = _power(-rate.log_value), _power(rate.log_value), f"{rate.log_error:.2g}"
-        rows.append((rate.exit_between(result.names), f"{rate.intensity:g}", *times, rate.event, rate.method))
+        rows.append((result.exit_of(rate), f"{rate.intensity:g}", *times, rate.event, rate.method))
     return "\n".join(text_table(rows))
 
 

@@ -47,11 +47,7 @@ class Basins:
 
         With `every` cells made one, the labels are those of a coarser grid.
         """
-        low, high = self.region.bounds.T
-        counts = np.array(self.labels.shape)
-        places = np.floor((states[..., :2] - low) / (high - low) * counts)
-        inside = ((places >= 0) & (places < counts)).all(axis=-1)
-        cells = np.where(inside[..., None], places, 0).astype(int)
+        cells, inside = self.region.cells_at(states, self.labels.shape)
         i, v = np.moveaxis(cells - cells % every, -1, 0)
         return np.where(inside, self.labels[i, v], UNSETTLED).astype(np.int16)
 

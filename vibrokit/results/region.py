@@ -70,6 +70,18 @@ class Region:
         bounds, places = self.bounds, points[:, :2]
         return np.asarray(np.all((places >= bounds[:, 0]) & (places <= bounds[:, 1]), axis=1))
 
+    def cells_at(
+        self, states: NDArray[np.float64], counts: Sequence[int]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return in which cell of a grid each state (…, n) is, shape (…, 2), and whether it is in the region.
+
+        Of states outside, the cell is (0, 0).
+        """
+        low, high = self.bounds.T
+        places = (states[..., :2] - low) / (high - low) * np.array(counts)
+        inside = np.asarray(((places >= 0) & (places < np.array(counts))).all(axis=-1))
+        return np.where(inside[..., None], places, 0.0).astype(np.int64), inside
+
     def cell_centres(self, cells: Sequence[int]) -> NDArray[np.float64]:
         """Return the centres of a grid of cells, shape (nx · nv, 2), v running fastest."""
         axes = centres(self.bounds, cells)

@@ -35,8 +35,8 @@ def length_of(osc: Oscillator) -> float:
 
     It is the larger of twice the distance to the stops and the deflection of a spring ω_n² by the largest forces of
     the excitations. Where two stops do not limit a resonance, it multiplies the deflection by periodic forces. With
-    neither stops nor forces it is the deflection at which the spring's force differs from its linear part by as much
-    as that. A linear spring has no length scale; the length is 1 then.
+    neither stops nor forces it is the deflection at which the nonlinear part of the spring's force is as large as the
+    linear part. A linear spring has no length scale; the length is 1 then.
     """
     field, push = VectorField(osc), 0.0
     for index, part in enumerate(osc.excitations):
@@ -52,7 +52,7 @@ def size_of(osc: Oscillator) -> float:
 
 
 def _bending(osc: Oscillator, field: VectorField) -> float:
-    """Deflection at which the spring's force differs from its linear part by as much as that; 1 if there is none."""
+    """Deflection at which the nonlinear part of the force of the spring is as large as the linear one; else 1."""
     rest = states_at(osc, np.zeros((1, 2)))
     slope = float(field.jacobian(rest)[0, 1, 0])
     offset = float(field.rate(rest)[0, 1])

@@ -113,6 +113,13 @@ def pair(name: str, counts: Any, most: int = _MOST_CELLS, least: int = 1) -> tup
     return first, second
 
 
+def gibibytes(name: str, amount: Any) -> float:
+    """Return an amount of memory (GiB); a StructureError is raised unless it is a positive number."""
+    if isinstance(amount, bool) or not isinstance(amount, Real) or not float(amount) > 0:
+        raise StructureError(f"{name} must be a positive number of GiB, got {shown(amount)}.")
+    return float(amount)
+
+
 def check_means(osc: Any, stepper: Any, executor: Any) -> None:
     """Refuse a wrong oscillator, stepper or executor with a SceneError, StepperError or StructureError."""
     if not isinstance(osc, Oscillator):

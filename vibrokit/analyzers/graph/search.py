@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from numbers import Real
 
 import numpy as np
 import xarray
@@ -17,12 +16,12 @@ from vibrokit.analyzers.graph.targets import ExitTarget
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.errors import SceneError, StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
-from vibrokit.structure.validation import pair, whole
+from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _FAR_LESS = 0.25  # of the costliest exit: below, an exit gets a grid that reaches no farther than it needs
@@ -115,10 +114,8 @@ class GraphSearch:
     max_memory_gib: float = 4.0
 
     def __post_init__(self) -> None:
-        name, steps, memory = type(self).__name__, self.steps_per_period, self.max_memory_gib
-        object.__setattr__(self, "nodes", pair(f"{name}: nodes", self.nodes))
-        if min(self.nodes) < _FEWEST_NODES:
-            raise StructureError(f"{name}: nodes must be {_FEWEST_NODES} or more in x and in v, got {self.nodes}.")
+        name, steps = type(self).__name__, self.steps_per_period
+        object.__setattr__(self, "nodes", pair(f"{name}: nodes", self.nodes, least=_FEWEST_NODES))
         if steps is not None:
             whole(f"{name}: steps_per_period", steps, 2, _MOST_STEPS)
             if steps % 2:
@@ -126,8 +123,7 @@ class GraphSearch:
                     f"{name}: steps_per_period must be an even number, got {steps}; the error is estimated with steps "
                     "twice as long."
                 )
-        if isinstance(memory, bool) or not isinstance(memory, Real) or not memory > 0:
-            raise StructureError(f"{name}: max_memory_gib must be a positive number of GiB, got {shown(memory)}.")
+        gibibytes(f"{name}: max_memory_gib", self.max_memory_gib)
 
     def search(self, problem: ExitProblem) -> GraphSolution:
         """Search the exits of one attractor.

@@ -113,9 +113,9 @@ class Cores:
         """Bounds that hold the exit's faces; if x must be wider for that then v is too, as a motion there needs it."""
         faces, outward = self.problem.exit.faces(self.problem.osc), np.array([-1.0, 1.0])
         margins = _BEYOND_FACE * np.diff(bounds)
-        beyond = np.where(np.isfinite(faces), outward * (faces - bounds) + margins, 0.0)
-        grown = np.max(np.maximum(beyond, 0.0) / np.diff(bounds))
-        wider: Array = np.maximum(np.maximum(beyond, 0.0), grown * np.diff(bounds) * np.isinf(faces))
+        beyond = np.where(np.isfinite(faces), np.maximum(outward * (faces - bounds) + margins, 0.0), 0.0)
+        grown = np.max(beyond / np.diff(bounds))
+        wider: Array = np.maximum(beyond, grown * np.diff(bounds) * np.isinf(faces))
         return bounds + outward * wider
 
     @property

@@ -7,13 +7,12 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
@@ -57,7 +56,8 @@ class Leg:
     growth : array (nx, nv)
         ln of the factor by which the flow compresses areas; 0 for a leg backwards.
     crossed : array (nx, nv)
-        Share of each cell from which, or to which, motions have been at the exit, below 1; (0, 0) if there is none.
+        Share of each cell whose motions have been at the exit in this time, from 0 to below 1. Its shape is (0, 0) if
+        position does not decide.
     noise : float
         For how long noise acts (s).
     leaving : bool array (nx, nv) or None
@@ -220,12 +220,6 @@ def check_steps(caller: str, steps: object) -> None:
     whole(f"{caller}: steps", steps, 2, MOST_STEPS)
     if isinstance(steps, int) and steps % 2:
         raise StructureError(f"{caller}: steps must be an even number, got {steps}; they come in pairs.")
-
-
-def check_allowed_memory(caller: str, allowed: object) -> None:
-    """Raise StructureError if `max_memory_gib` is no amount of memory."""
-    if isinstance(allowed, bool) or not isinstance(allowed, Real) or not float(allowed) > 0:
-        raise StructureError(f"{caller}: max_memory_gib must be a positive number of GiB, got {shown(allowed)}.")
 
 
 def check_memory(shape: tuple[int, int], needed: float, steps: int, allowed: float) -> None:

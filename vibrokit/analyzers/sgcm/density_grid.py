@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter1d, map_coordinates
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
+from vibrokit.kernels.ensemble import UNBOUNDED
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
@@ -43,15 +44,13 @@ class DensityGrid:
     v: Array
 
     @classmethod
-    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int], faces: Array | None = None) -> DensityGrid:
+    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int], faces: Array = UNBOUNDED) -> DensityGrid:
         """Return a grid whose nodes in x are closer where the oscillator is stiffer.
 
         In a contact of natural frequency ω a density is as wide in v as outside, and narrower in x by ω_n/ω. Faces of
         an exit, array (2, 2), are halfway between nodes, so that each cell is on one side of them; those that are
         outside the region do not count.
         """
-        if faces is None:
-            faces = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
         widened = 2.0 * np.ptp(region.x) / shape[0]
         places = np.linspace(region.x[0] - widened, region.x[1] + widened, _PLACES)
         stiffness = -VectorField(osc).jacobian(np.stack([places, np.zeros_like(places)], axis=-1))[:, 1, 0]

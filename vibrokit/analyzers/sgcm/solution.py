@@ -187,7 +187,8 @@ class DensitySolver:
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
             if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
-                for covered in self._cores.on(grid, intensity).others.values():
+                needed = cores if stronger == intensity else self._cores.on(grid, intensity)
+                for covered in needed.others.values():
                     wanted |= covered > 0
             if self.problem.exit.by_position:
                 wanted |= propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted

@@ -45,11 +45,9 @@ def core_of(
     certain = agreeing(basins.labels, margin)
     cells, shape, labels = np.flatnonzero(certain), certain.shape, basins.labels.flat
     ended = run_ensemble(osc, Flow.STATE, stepper, centres(osc, basins.region, shape, cells), executor=executor)
-    low, high = basins.region.bounds.T
-    places = (ended.states[:, :2] - low) / (high - low)
-    inside = np.all((places >= 0) & (places < 1), axis=1) & (ended.status == COMPLETED)
-    targets = np.ravel_multi_index(np.where(inside[:, None], places * shape, 0).astype(np.int64).T, shape)
-    held = inside & (labels[targets] == labels[cells])
+    reached, inside = basins.region.cells_at(ended.states, shape)
+    targets = np.ravel_multi_index(tuple(reached.T), shape)
+    held = inside & (ended.status == COMPLETED) & (labels[targets] == labels[cells])
     for _ in range(_AHEAD):
         lost = np.zeros_like(certain)
         lost.flat[cells[~(held & certain.flat[targets])]] = True
