@@ -151,14 +151,15 @@ class Oscillator(Scene):
         """
         from vibrokit.kernels.choice import ensemble_stepper
         from vibrokit.kernels.ensemble import run_ensemble
+        from vibrokit.kernels.streams import streams_of
 
         starts = self._checked_states(states, 2)
         if isinstance(periods, bool) or not isinstance(periods, Integral) or periods < 0:
             raise ParameterError(f"section_map: periods must be a whole number, at least 0, got {shown(periods)}.")
         flow = Flow.STATE if rng is None else self._noisy()
         chosen = stepper or ensemble_stepper(self, flow)
-        stream = None if rng is None else (seed_from(rng), 0)
-        ended = run_ensemble(self, flow, chosen, starts, int(periods), stream=stream, executor=executor)
+        streams = None if rng is None else streams_of(seed_from(rng), np.arange(len(starts)))
+        ended = run_ensemble(self, flow, chosen, starts, int(periods), streams=streams, executor=executor)
         failed = np.flatnonzero(ended.intervals < periods)
         if failed.size:
             first = failed[0]

@@ -60,12 +60,13 @@ def steps_taken(osc, stepper, states):
     interval = osc.section_interval
     module, theta, stop = kernel_for(osc, Flow.STATE, stepper).module, theta_of(osc), Stop()
     settings = np.array(stepper.settings(osc, interval))
-    tests = (stop.region, stop.labels, stop.home, stop.points, stop.point_labels, stop.tolerance)
+    tests = (1, stop.region, False, stop.area, stop.labels, stop.home, stop.points, stop.point_labels, stop.metrics)
 
     def stalls(state, limit):
         settings[1] = limit
         out = np.empty((1, 2)), *(np.zeros(1, dtype=np.int64) for _ in range(3))
-        module.advance(state[None], theta, 0.0, interval, settings, np.ones(1, dtype=np.int64), *tests, *out)
+        budget, none = np.ones(1, dtype=np.int64), np.empty((1, 0, 2))
+        module.advance(state[None], theta, 0.0, interval, settings, budget, *tests, *out, none)
         return out[2][0] == STALLED
 
     counts = []

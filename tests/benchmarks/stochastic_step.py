@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.rk4 import RK4
-from vibrokit.kernels.streams import normal_pairs, seed_lane
+from vibrokit.kernels.streams import normal_pairs, seed_lane, streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 SCENE = vibrokit.load_scene("hertz-0.570")
@@ -189,7 +189,8 @@ class Here(futures.Executor):
 def generated(trajectories: int, periods: int, seed: int) -> Outcome:
     starts = np.zeros((trajectories, 2))
     start = time.perf_counter_ns()
-    ended = run_ensemble(SCENE, Flow.NOISY, RK4(STEPS), starts, periods, stream=(seed, 0), executor=Here())
+    streams = streams_of(seed, np.arange(trajectories))
+    ended = run_ensemble(SCENE, Flow.NOISY, RK4(STEPS), starts, periods, streams=streams, executor=Here())
     elapsed = time.perf_counter_ns() - start
     final = ended.states[:, 0]
     return Outcome(elapsed / (trajectories * periods * STEPS), float(final.mean()), float(final.std()))

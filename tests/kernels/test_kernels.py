@@ -14,6 +14,7 @@ from vibrokit.errors import IntegrationError
 from vibrokit.kernels import ensemble
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
+from vibrokit.kernels.streams import streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 
@@ -46,7 +47,7 @@ def work(flow, executor=None, first=0, count=COUNT):
     chosen = slice(first, first + count)
     ended = run_ensemble(
         impacting(), flow, vk.RK4(steps=64), starts[chosen], (np.arange(COUNT) % 5)[chosen],
-        stream=(11, first) if flow is Flow.NOISY else None, executor=executor,
+        streams=streams_of(11, np.arange(COUNT)[chosen]) if flow is Flow.NOISY else None, executor=executor,
     )  # fmt: skip
     assert ended.intervals.tolist() == (np.arange(COUNT) % 5)[chosen].tolist()
     return ended.states
@@ -137,7 +138,9 @@ def test_a_runaway_leaves_the_others_alone():
 def test_runaways_of_other_flows(flow):
     osc = scene(**RUNAWAY, noise=vk.WhiteNoise(1e-3))
     starts = np.array([[2.0, 1.0, 0.0, 0.0, 0.0]])[:, : 5 if flow is Flow.HAMILTONIAN else 2]
-    ended = run_ensemble(osc, flow, vk.RK4(), starts, 3, stream=(1, 0) if flow is Flow.NOISY else None)
+    ended = run_ensemble(
+        osc, flow, vk.RK4(), starts, 3, streams=streams_of(1, np.arange(1)) if flow is Flow.NOISY else None
+    )
     assert ended.status.tolist() == [4]
     assert np.isfinite(ended.states).all()
 

@@ -13,8 +13,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("stepper", [vk.FreeFlight(tolerance=1e-10), vk.Order8(tolerance=1e-10)], ids=lambda s: s.name)
 def test_same_bits(stepper):
-    # A process that compiles may differ in the last bit from those that load what it compiled. So the kernel is one
-    # that no other test has, and the first to run it is a process that nothing is compared with.
+    # A kernel that no other test has, so that this process compiles what the others load.
     osc = vk.Oscillator(
         natural_frequency=1.0,
         damping_ratio=0.01,
@@ -23,8 +22,6 @@ def test_same_bits(stepper):
     )
     states = np.random.default_rng(0).uniform(-0.6, 0.6, (200, 2))
     context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(1, mp_context=context) as first:
-        osc.section_map(states, 3, stepper=stepper, executor=first)
     alone = np.concatenate([osc.section_map(states[k : k + 10], 3, stepper=stepper) for k in range(0, 200, 10)])
     with concurrent.futures.ThreadPoolExecutor(3) as threads:
         np.testing.assert_array_equal(osc.section_map(states, 3, stepper=stepper, executor=threads), alone)

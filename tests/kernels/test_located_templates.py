@@ -19,7 +19,7 @@ IMPORTS = """
 import numpy as np
 from vibrokit.kernels.cubic import crossing, summit
 from vibrokit.kernels.error_blocks import error_blocks
-from vibrokit.kernels.stopping import DIVERGED, COMPLETED, STALLED, section_status
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED, stop_status, turned_outside
 from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
 """
 DAMPING, STIFFNESS, AMPLITUDE, FREQUENCY, FORCE, HERTZ, STOP = 0.02, 1.0, 0.18, 0.57, 0.2, 50.0, 0.5
@@ -74,10 +74,12 @@ def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None
     states = np.atleast_2d(np.asarray(states, dtype=float))
     count = len(states)
     out, done, status, label = np.empty_like(states), *(np.zeros(count, dtype=np.int64) for _ in range(3))
-    none = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), 0.0
+    labels = EVERYWHERE, np.zeros((0, 0), dtype=np.int8), -1
+    points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
+    outputs = out, done, status, label, np.zeros((count, 0, 5))
     module.advance(
         states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0]),
-        np.full(count, intervals), region, np.zeros((0, 0), dtype=np.int8), -1, *none, out, done, status, label,
+        np.full(count, intervals), 1, region, False, *labels, *points, *outputs,
     )  # fmt: skip
     return out, done, status
 

@@ -279,14 +279,16 @@ def test_a_period_is_a_positive_number(period):
         scene(Strange())
 
 
-def test_repeats_after():
-    forced, free = scene(harmonic(1.0)), scene()
-    assert forced.repeats_after(2 * math.pi)
-    assert forced.repeats_after(10 * math.pi)
-    assert not forced.repeats_after(math.pi)
-    assert not forced.repeats_after(2.1 * math.pi)
-    assert free.repeats_after(0.123)
-    assert not scene(harmonic(1.0), harmonic(math.sqrt(2))).repeats_after(2 * math.pi)
+def test_intervals_in_a_period():
+    forced = scene(harmonic(1.0), vk.Constant(force=0.2))
+    period = 2 * math.pi
+    assert forced.intervals_in_period(period) == forced.intervals_in_period(5 * period) == 1
+    assert forced.intervals_in_period(period / 2) == 2
+    assert forced.intervals_in_period(period / 48) == 48
+    assert forced.intervals_in_period(1.05 * period) == forced.intervals_in_period(0.4 * period) == 0
+    assert forced.intervals_in_period(period / 1e6) == 0
+    assert scene().intervals_in_period(0.123) == 1
+    assert scene(harmonic(1.0), harmonic(math.sqrt(2))).intervals_in_period(period) == 0
 
 
 def test_a_multi_harmonic_orbit_has_the_common_period():

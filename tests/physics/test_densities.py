@@ -11,6 +11,7 @@ from scipy.linalg import expm
 import vibrokit as vk
 from tests.scenes import double_well, scene
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.streams import streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
@@ -95,7 +96,8 @@ def test_the_first_state_in_another_basin_is_that_of_simulated_trajectories():
     deviations = np.sqrt(2e-2 / (2 * 0.1) * np.array([1 / 2, 1]))  # of the linear motion x″ + 0.1 x′ + 2 x
     starts = well[:2] + deviations * places[(places**2).sum(axis=1) < 1]  # the core is one standard deviation wide
     stop = vk.LeaveBasin().stop(osc, structure, 0)
-    ended = run_ensemble(osc, Flow.NOISY, vk.RK4(256), starts, 100_000, stop=stop, stream=(9, 0))
+    streams = streams_of(9, np.arange(len(starts)))
+    ended = run_ensemble(osc, Flow.NOISY, vk.RK4(256), starts, 100_000, stop=stop, streams=streams)
     simulated, standard_error = math.log(ended.intervals.mean()), 1 / math.sqrt(len(starts))
     found = -crossed.log_value - math.log(osc.section_interval)
     assert abs(found - simulated) <= crossed.log_error + 3 * standard_error
@@ -146,7 +148,9 @@ def test_transients_of_the_paper_s_scene_are_those_of_simulated_trajectories():
     count = 20_000
     starts = np.random.default_rng(5).uniform(*box.T, (count, 2))
     for time, interval in enumerate(intervals):
-        ended = run_ensemble(osc, Flow.NOISY, vk.RK4(512), starts, interval, stream=(7, 0)).states
+        ended = run_ensemble(
+            osc, Flow.NOISY, vk.RK4(512), starts, interval, streams=streams_of(7, np.arange(len(starts)))
+        ).states
         marginal = history.marginal("x")[time].values
         steps = np.diff(history.x)
         cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (marginal[1:] + marginal[:-1]) * steps)])

@@ -9,6 +9,7 @@ import scipy.linalg
 import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
+from vibrokit.kernels.streams import streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
@@ -110,7 +111,9 @@ def test_ito_not_stratonovich():
     interval_share = time / osc.section_interval
     starts = np.tile([0.0, 1.0], (count, 1))
     stepper = vk.RK4(round(64 / interval_share))
-    ended = run_ensemble(osc, Flow.NOISY, stepper, starts, 1, interval=time, stream=(5, 0))
+    ended = run_ensemble(
+        osc, Flow.NOISY, stepper, starts, 1, interval=time, streams=streams_of(5, np.arange(len(starts)))
+    )
     # E v = 1, E v² = exp(D T) = e.
     v = ended.states[:, 1]
     assert v.mean() == pytest.approx(1.0, abs=5 * v.std() / math.sqrt(count))

@@ -138,7 +138,7 @@ def test_unstable_branches_come_to_the_attractors(scene):
 def test_the_stable_manifold_is_the_boundary_of_the_basins(scene):
     osc, _, attractors, branches = scene()
     stepper = vk.Order8(1e-8) if scene is duffing else vk.FreeFlight(1e-8)
-    stop = Stop(points=attractors, point_labels=np.array([0, 1]), tolerance=1e-3)
+    stop = Stop(points=attractors, point_labels=np.array([0, 1]), metrics=np.tile(np.eye(2) / 1e-3, (2, 1, 1)))
     for branch in branches[:2]:
         lengths = np.cumsum(np.linalg.norm(np.diff(branch.curve, axis=0), axis=1))
         along = np.searchsorted(lengths, np.linspace(0.05, 0.9, 20))  # farther on, other arms of it come close

@@ -137,7 +137,7 @@ class LeaveBasin(Exit):
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the basin grid."""
         basins = structure.basins
-        return Stop(region=basins.region.bounds, labels=basins.labels, home=source)
+        return Stop().with_cells(basins.region.bounds, basins.labels, home=source)
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """The saddles on basin boundaries, those of this basin first, and basins that none of these leads to."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels import store
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
@@ -31,25 +32,37 @@ UNBOUNDED = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stop:
-    """When a trajectory ends before its budget, tested in the kernel at every section.
+    r"""When a trajectory ends before its budget, tested in the kernel after every interval.
 
     Attributes
     ----------
     region : array (2, 2)
         Bounds of x and of v; a trajectory outside has left the region.
-    labels : int16 array (nx, nv)
-        Labels of the cells of the region; a label that is neither negative nor `home` ends the trajectory.
+    between : bool
+        Whether x may not leave its bounds between two tests either, which a cubic through both decides.
+    every : int
+        Intervals from section to section: labels and points are tested on the section only.
+    area : array (2, 2), labels : int16 array (nx, nv)
+        Bounds of a grid of cells, and the labels of the cells; one that is neither negative nor `home` ends the
+        trajectory.
     home : int
-    points : array (m, 2), point_labels : int64 array (m,), tolerance : float
-        Known points of the section; a trajectory nearer than `tolerance` to one has reached it.
+    points : array (m, 2), point_labels : int64 array (m,), metrics : array (m, 2, 2)
+        Known points of the section; a trajectory has reached c if it is at q with R (q − c) has a length of 1 or less.
     """
 
     region: Array = dataclasses.field(default_factory=UNBOUNDED.copy)
+    between: bool = False
+    every: int = 1
+    area: Array = dataclasses.field(default_factory=UNBOUNDED.copy)
     labels: Array = dataclasses.field(default_factory=lambda: np.empty((0, 0), dtype=np.int16))
     home: int = -1
     points: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
     point_labels: Array = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    tolerance: float = 0.0
+    metrics: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2, 2)))
+
+    def with_cells(self, bounds: Array, labels: Array, home: int = -1) -> Stop:
+        """Return this test, also in the cells of a grid, outside of which a trajectory has left the region."""
+        return dataclasses.replace(self, region=bounds, area=bounds, labels=labels, home=home)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,12 +79,18 @@ class Ensemble:
         Why it ended: a constant of `vibrokit.kernels.stopping`.
     label : int64 array (count,)
         Label of the cell or point that ended it; −1 if none did.
+    visits : array (count, visits, equations)
+        The states at its latest sections: that of section number n is in row (n − 1) mod `visits`.
+    streams : uint64 array (count, 4)
+        States of the random streams at the end; empty without noise.
     """
 
     states: Array
     intervals: Array
     status: Array
     label: Array
+    visits: Array
+    streams: Array
 
 
 def run_ensemble(
@@ -84,10 +103,13 @@ def run_ensemble(
     stop: Stop | None = None,
     start_time: float = 0.0,
     interval: float | None = None,
-    stream: tuple[int, int] | None = None,
+    streams: Array | None = None,
+    visits: int = 0,
     executor: futures.Executor | None = None,
 ) -> Ensemble:
-    """Advance trajectories from section to section until each meets a stop test or has spent its budget.
+    """Advance trajectories interval by interval until each meets a stop test or has spent its budget.
+
+    One that goes on from the states and streams of an ensemble gets the same bits as one that never paused.
 
     Trajectories, intervals and steps count into the work under way; a stage of trajectories advances by each block.
 
@@ -105,9 +127,11 @@ def run_ensemble(
         Time of the start (s).
     interval : float, optional
         Time from section to section (s); the scene's own by default.
-    stream : (int, int), optional
-        For the noisy flow: seed, and index of the first trajectory. Each trajectory has a random stream of its own
-        that depends on the seed and its index alone.
+    streams : uint64 array (count, 4), optional
+        For the noisy flow: the state of each trajectory's own random stream, as `vibrokit.kernels.streams.streams_of`
+        starts it, or as an ensemble ended.
+    visits : int
+        How many of the latest sections to keep of each trajectory.
     executor : concurrent.futures.Executor, optional
         Integrates the blocks; threads of this process by default. The result is the same to the last bit.
 
@@ -121,13 +145,11 @@ def run_ensemble(
     budgets = np.broadcast_to(budget, len(starts))
     span = scene.section_interval if interval is None else interval
     common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)))
-    tasks = []
-    for block in _blocks(len(starts)):
-        streams: tuple[Any, ...] = ()
-        if stream is not None:
-            seed, first = stream
-            streams = (np.int64(seed), np.arange(first + block.start, first + block.stop, dtype=np.int64))
-        tasks.append((kernel, starts[block], budgets[block], common, streams, stop or Stop()))
+    known = np.empty((len(starts), 0), dtype=np.uint64) if streams is None else streams
+    test = stop or Stop()
+    tasks = [
+        (kernel, starts[block], budgets[block], common, known[block], test, visits) for block in _blocks(len(starts))
+    ]
     steps, parts = stepper.steps_in(scene, span), []
     with contextlib.closing(carry(_advance_block, tasks, executor)) as blocks:
         for part in blocks:
@@ -135,19 +157,28 @@ def run_ensemble(
             passed = int(part.intervals.sum())
             count(trajectories=len(part.intervals), intervals=passed, steps=steps * passed)
             advance(len(part.intervals), TRAJECTORIES)
-    return _joined(parts, starts.shape[1])
+    if not parts:
+        parts = [_advance_block(kernel, starts, budgets, common, known, test, visits)]
+    names = [field.name for field in dataclasses.fields(Ensemble)]
+    return Ensemble(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
-    """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation."""
+    """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation.
+
+    What was compiled here is loaded from disk, as every other process does, so that all have the same bits.
+    """
     kernel = kernel_for(scene, flow, stepper)
     advance_kernel = kernel.module.advance
     if not advance_kernel.overloads:
         common = (theta_of(scene), 0.0, 1.0, np.array(stepper.settings(scene, 1.0)))
-        streams = (np.int64(0), np.empty(0, dtype=np.int64)) if flow is Flow.NOISY else ()
         nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
+        none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)
         with first_call(advance_kernel):
-            _advance_block(kernel, *nothing, common, streams, Stop())
+            _advance_block(kernel, *nothing, common, none, Stop(), 0)
+            if advance_kernel.stats.cache_misses:
+                store.reload(kernel.name, kernel.source)
+                _advance_block(kernel, *nothing, common, none, Stop(), 0)
     return kernel
 
 
@@ -160,28 +191,28 @@ def _blocks(count: int) -> Iterator[slice]:
 
 
 def _advance_block(
-    kernel: Kernel, starts: Array, budget: Array, common: tuple[Any, ...], streams: tuple[Any, ...], stop: Stop
+    kernel: Kernel, starts: Array, budget: Array, common: tuple[Any, ...], streams: Array, stop: Stop, visits: int
 ) -> Ensemble:
-    count = len(starts)
-    ended = Ensemble(np.empty_like(starts), *(np.zeros(count, dtype=np.int64) for _ in range(3)))
-    starts, region, points = (_plain(array, float) for array in (starts, stop.region, stop.points))
-    budget, point_labels = _plain(budget, np.int64), _plain(stop.point_labels, np.int64)
-    tests = (region, _plain(stop.labels, np.int16), stop.home, points, point_labels, stop.tolerance)
-    outputs = (ended.states, ended.intervals, ended.status, ended.label)
-    kernel.module.advance(starts, *common, *streams, budget, *tests, *outputs)
+    count, equations = starts.shape
+    streams = np.array(streams, dtype=np.uint64)  # the kernel advances them in place
+    intervals, status, label = (np.zeros(count, dtype=np.int64) for _ in range(3))
+    ended = Ensemble(
+        np.empty((count, equations)), intervals, status, label, np.zeros((count, visits, equations)), streams
+    )
+    bounds = stop.region, stop.area, stop.points, stop.metrics
+    region, area, points, metrics = (_plain(array, float) for array in bounds)
+    labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
+    kernel.module.advance(
+        _plain(starts, float), *common, *((streams,) if streams.shape[1] else ()), _plain(budget, np.int64),
+        stop.every, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
+        ended.states, ended.intervals, ended.status, ended.label, ended.visits,
+    )  # fmt: skip
     return ended
 
 
 def _plain(array: Array, kind: type) -> Array:
     """The same numbers, contiguous and writable: Numba would compile again for other arrays."""
     return np.require(array, kind, ("C", "W"))
-
-
-def _joined(parts: list[Ensemble], equations: int) -> Ensemble:
-    if not parts:
-        return Ensemble(np.empty((0, equations)), *(np.zeros(0, dtype=np.int64) for _ in range(3)))
-    names = [field.name for field in dataclasses.fields(Ensemble)]
-    return Ensemble(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def carry(

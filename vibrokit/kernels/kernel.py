@@ -32,7 +32,7 @@ _NEED_NOISE = {
     Flow.HAMILTONIAN: "momenta",
     Flow.HAMILTONIAN_VARIATIONAL: "momenta",
 }
-_CONDITION = re.compile(r"  # (forced|unforced|noisy|breaking|unbroken|bending|unbent)\n$")
+_CONDITION = re.compile(r"  # (\w+)\n$")  # a comment of one word at the end of a line of code
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,6 +149,8 @@ def _fitting(text: str, conditions: dict[str, bool]) -> str:
         condition = _CONDITION.search(line)
         if condition is None:
             kept.append(line)
+        elif condition[1] not in conditions:
+            raise ValueError(f"the line {line.strip()!r} of a template has an unknown condition.")
         elif conditions[condition[1]]:
             kept.append(line[: condition.start()] + "\n")
     return "".join(kept)

@@ -46,8 +46,9 @@ class LocatedStepper(Stepper):
             )
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, largest number of steps in an interval, whether the forcing repeats with it, and 1/ω_n."""
-        return float(self.tolerance), _MOST_STEPS, float(scene.repeats_after(interval)), 1.0 / scene.natural_frequency
+        """Tolerance, largest number of steps in an interval, after how many of them the forcing repeats, and 1/ω_n."""
+        cycle = scene.intervals_in_period(interval)
+        return float(self.tolerance), _MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:
         """The templates, with those for jumps at events before those that locate events."""

@@ -45,9 +45,9 @@ class RK4(Stepper):
             raise StepperError(f"RK4: steps must be a whole number from 1 to {_LARGEST}, got {self.steps!r}.")
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Steps in this interval, whether the forcing repeats with it, and the step length."""
+        """Steps in this interval, after how many of them the forcing repeats, and the step length."""
         steps = self.steps_in(scene, interval)
-        return float(steps), float(scene.repeats_after(interval)), scene.time_unit / self.steps
+        return float(steps), float(scene.intervals_in_period(interval)), scene.time_unit / self.steps
 
     def steps_in(self, scene: Scene, interval: float) -> int:
         """Return the number of steps in an interval (s), 1 or more."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.streams import streams_of
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -36,7 +37,7 @@ def record(
     out = np.empty((count + 1, len(state)))
     noise: tuple[Any, ...] = ()
     if flow is Flow.NOISY:
-        noise = (np.int64(seed or 0), np.int64(0), np.empty((0, 2)) if normals is None else normals)
+        noise = (streams_of(seed or 0, np.zeros(1, dtype=np.int64)), np.empty((0, 2)) if normals is None else normals)
     with first_call(module.record):
         good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
     return out[:good]

@@ -1,49 +1,68 @@
-"""Stop tests at each section, compiled into every stepper, so that each trajectory of an ensemble ends by itself."""
+"""Stop tests, compiled into every stepper, so that each trajectory of an ensemble ends by itself."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from vibrokit.kernels.cubic import summit
+
 COMPLETED = 0  # all intervals of the budget, without a stop
 LEFT_REGION = 1
 LEFT_BASIN = 2  # in a cell of the basin grid that belongs to another attractor
-REACHED = 3  # within the tolerance of a known point
+REACHED = 3  # in the ellipse around a known point
 DIVERGED = 4  # not finite
 STALLED = 5  # more steps in one interval than allowed
 GRAZED = 6  # the contact with a stop whose force jumps was too slow to determine the jump of the momenta
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def section_status(
+def stop_status(
     x: float,
     v: float,
+    at_section: bool,  # whether labels and points are tested too
     region: NDArray[np.float64],  # (2, 2): bounds of x and of v; infinite ones switch the test off
-    labels: NDArray[np.int8],  # attractor that each cell of the region leads to, negative where unknown; empty: no test
+    area: NDArray[np.float64],  # (2, 2): bounds of x and of v that the cells of `labels` fill
+    labels: NDArray[np.int8],  # attractor that each cell leads to, negative where unknown; empty: no test
     home: int,  # label of the basin that the trajectory started in
     points: NDArray[np.float64],  # (K, 2): known points of the section
     point_labels: NDArray[np.int64],  # (K,)
-    tolerance: float,  # distance at which a known point counts as reached
+    metrics: NDArray[np.float64],  # (K, 2, 2): R; a point c is reached where |R (q − c)| ≤ 1
 ) -> tuple[int, int]:
-    """Return how a trajectory ends at this section, and with which label: `COMPLETED` and −1 if it goes on."""
+    """Return how a trajectory ends here, and with which label: `COMPLETED` and −1 if it goes on."""
     if not (np.isfinite(x) and np.isfinite(v)):
         return DIVERGED, -1
     if x < region[0, 0] or x > region[0, 1] or v < region[1, 0] or v > region[1, 1]:
         return LEFT_REGION, -1
-    nearest, least = -1, tolerance
+    if not at_section:
+        return COMPLETED, -1
+    nearest, least = -1, 1.0
     for k in range(points.shape[0]):
-        distance = np.hypot(x - points[k, 0], v - points[k, 1])
+        dx, dv = x - points[k, 0], v - points[k, 1]
+        distance = np.hypot(
+            metrics[k, 0, 0] * dx + metrics[k, 0, 1] * dv, metrics[k, 1, 0] * dx + metrics[k, 1, 1] * dv
+        )
         if distance <= least:
             nearest, least = k, distance
     if nearest >= 0:
         return REACHED, int(point_labels[nearest])
-    if labels.size > 0:
+    if labels.size > 0 and area[0, 0] <= x <= area[0, 1] and area[1, 0] <= v <= area[1, 1]:
         label = labels[
-            _cell(x, region[0, 0], region[0, 1], labels.shape[0]),
-            _cell(v, region[1, 0], region[1, 1], labels.shape[1]),
+            _cell(x, area[0, 0], area[0, 1], labels.shape[0]),
+            _cell(v, area[1, 0], area[1, 1], labels.shape[1]),
         ]
         if label >= 0 and label != home:
             return LEFT_BASIN, int(label)
     return COMPLETED, -1
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def turned_outside(x0: float, v0: float, x1: float, v1: float, interval: float, region: NDArray[np.float64]) -> bool:
+    """Whether x left its bounds and turned back between two tests, as the cubic through both ends has it."""
+    if v0 > 0.0 > v1:
+        return bool(summit(x0, v0, x1, v1, interval) > region[0, 1])
+    if v0 < 0.0 < v1:
+        return bool(-summit(-x0, -v0, -x1, -v1, interval) < region[0, 0])
+    return False
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -62,11 +62,20 @@ def load(name: str, text: str) -> types.ModuleType:
         return _load(name, text)
 
 
+def reload(name: str, text: str) -> types.ModuleType:
+    """Import a generated module anew, so that its functions are those that were stored."""
+    with _LOADING:
+        _LOADED.pop((name, text), None)
+        return _load(name, text)
+
+
 _LOADING = threading.Lock()
+_LOADED: dict[tuple[str, str], types.ModuleType] = {}
 
 
-@functools.cache
 def _load(name: str, text: str) -> types.ModuleType:
+    if (name, text) in _LOADED:
+        return _LOADED[name, text]
     if stored(name) != text:
         store(name, text)
     specification = importlib.util.spec_from_file_location(name, cache_directory() / f"{name}.py")
@@ -75,4 +84,5 @@ def _load(name: str, text: str) -> types.ModuleType:
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
     specification.loader.exec_module(module)
+    _LOADED[name, text] = module
     return module

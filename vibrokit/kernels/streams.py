@@ -119,6 +119,15 @@ def seed_lane(state: _Words, lane: int, seed: int | _Word, index: int | _Word) -
 
 
 @njit(nogil=True, cache=True)
+def streams_of(seed: int, indices: NDArray[np.int64]) -> _Words:
+    """Return the states at which the streams (seed, index) start, uint64[count, 4]."""
+    lanes = np.empty((4, indices.size), dtype=np.uint64)
+    for lane in range(indices.size):
+        seed_lane(lanes, lane, seed, indices[lane])
+    return lanes.T.copy()
+
+
+@njit(nogil=True, cache=True)
 def _rotate(word: _Word, count: _Word) -> _Word:
     return (word << count) | (word >> (_U(64) - count))
 

@@ -20,6 +20,7 @@ _OWN = (
     Parameter("natural_frequency", "natural_frequency", "omega_n", "s^-1", above=0),
     Parameter("damping_ratio", "damping_ratio", "zeta", "", minimum=0),
 )
+_MOST_INTERVALS = 4096  # in a period, over which the forcing is tabulated
 _LONGEST_RATIO = 1000  # largest whole number in a ratio of two frequencies with a common period
 
 
@@ -224,15 +225,21 @@ class Scene:
         except NoSectionError:
             return 2 * math.pi / self.natural_frequency
 
-    def repeats_after(self, interval: float) -> bool:
-        """Whether the excitations repeat after `interval` (s), so that trajectories share the phase."""
+    def intervals_in_period(self, interval: float) -> int:
+        """Return after how many intervals (s) the excitations repeat, so that trajectories share the phase; 0 if never.
+
+        That is 1 for multiples of the section interval, and n for an n-th of it, up to 4096.
+        """
         if self.autonomous:
-            return True
+            return 1
         try:
             multiple = interval / self.section_interval
         except NoSectionError:
-            return False
-        return round(multiple) >= 1 and abs(multiple - round(multiple)) < 1e-12 * multiple
+            return 0
+        for ratio, intervals in ((multiple, 1), (1.0 / multiple, round(1.0 / multiple))):
+            if round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-12 * ratio and intervals <= _MOST_INTERVALS:
+                return intervals
+        return 0
 
 
 def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:

@@ -119,7 +119,8 @@ def arrival_at(orbits: Mapping[int, Array], tolerance: float) -> Stop:
     """Return the test that ends a trajectory within a distance in (x, v) of a point of orbits, given by label."""
     points = np.concatenate([np.empty((0, 2)), *(points[:, :2] for points in orbits.values())])
     labels = np.repeat(list(orbits), [len(points) for points in orbits.values()])
-    return Stop(points=points, point_labels=labels.astype(np.int64), tolerance=tolerance)
+    metrics = np.tile(np.eye(2) / tolerance, (len(points), 1, 1))
+    return Stop(points=points, point_labels=labels.astype(np.int64), metrics=metrics)
 
 
 def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:

@@ -15,6 +15,7 @@ import numpy as np
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import write_source
 from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.streams import streams_of
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.report import ConformanceError
@@ -35,8 +36,8 @@ def outcome(scene: Oscillator) -> tuple[str, bytes]:
     extra = 0 if scene.noise is None else len(scene.noise.extra_states)
     starts = np.array([[0.3, 0.4], [-0.2, 0.9], [0.15, 0.0], [0.05, -0.6]])
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])
-    stream = None if scene.noise is None else (7, 0)
-    ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, stream=stream)
+    streams = None if scene.noise is None else streams_of(7, np.arange(len(starts)))
+    ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, streams=streams)
     return write_source(scene, flow, stepper), ended.states.tobytes()
 
 

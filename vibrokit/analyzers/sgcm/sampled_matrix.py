@@ -16,6 +16,7 @@ from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.streams import streams_of
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import TRAJECTORIES, stage
 from vibrokit.symbolic.flow_kind import Flow
@@ -96,7 +97,7 @@ class SampledMatrix:
             for first in range(0, count, at_once):
                 cells = np.repeat(np.arange(first, min(first + at_once, count)), self.samples)
                 starts = nodes[cells] + (random.random((len(cells), 2)) - 0.5) * widths[cells]
-                ends, out = self._carried(starts, first * self.samples, count * self.samples)
+                ends, out = self._carried(starts, first * self.samples)
                 to = np.rint(np.nan_to_num(self.grid.places(ends), nan=-1.0)).astype(int)
                 inside = ((to >= 0) & (to < self.grid.shape)).all(axis=1) & ~out
                 reached = to[inside, 0] * self.grid.shape[1] + to[inside, 1]
@@ -105,19 +106,19 @@ class SampledMatrix:
                 leaves += np.bincount(cells[out], minlength=count) / self.samples
         return places, leaves
 
-    def _carried(self, starts: Array, first: int, total: int) -> tuple[Array, NDArray[np.bool_]]:
+    def _carried(self, starts: Array, first: int) -> tuple[Array, NDArray[np.bool_]]:
         """States one section interval later, and which have been at the exit."""
         stepper = ensemble_stepper(self.scene, Flow.NOISY)
         checks = 1 if self.beyond is None else _CHECKS
         interval = self.scene.section_interval / checks
         states, out = starts, np.zeros(len(starts), dtype=bool)
+        streams = streams_of(self.seed, np.arange(first, first + len(starts)))
         for number in range(checks):
-            stream = self.seed, first + number * total
             ended = run_ensemble(
-                self.scene, Flow.NOISY, stepper, states, start_time=number * interval, interval=interval, stream=stream,
-                executor=self.executor,
+                self.scene, Flow.NOISY, stepper, states, start_time=number * interval, interval=interval,
+                streams=streams, executor=self.executor,
             )  # fmt: skip
-            states = ended.states
+            states, streams = ended.states, ended.streams
             if self.beyond is not None:
                 out |= self.beyond(states) >= 0
         return states, out

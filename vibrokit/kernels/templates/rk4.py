@@ -1,7 +1,7 @@
 """Classical Runge–Kutta with fixed steps, trajectories packed in lanes.
 
-All lanes of a block share the phase of the forcing, so it is tabulated once. A lane whose trajectory has ended is
-given the next one at the following section.
+All lanes of a block share the phase of the forcing, so it is tabulated once, for all intervals after which it repeats.
+A lane whose trajectory has ended is given the next one when the phase is that of the start again.
 
 With noise, a step of length h draws ΔW and ΔZ = ∫W dt exactly and gives them as two kicks, ΔZ/h before a Runge–Kutta
 step of the drift and ΔW − ΔZ/h after it, so that the driven state and its integral both receive the right
@@ -15,8 +15,8 @@ Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and f
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, section_status
-from vibrokit.kernels.streams import normal_pairs, seed_lane
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
+from vibrokit.kernels.streams import normal_pairs
 from vibrokit.kernels.templates.scene import (
     EQUATIONS,
     LANES,
@@ -36,25 +36,28 @@ def advance(
     start_time,
     interval,
     settings,
-    seed,  # noisy
-    indices,  # noisy
+    streams,  # noisy
     budget,
+    every,
     region,
+    between,
+    area,
     labels,
     home,
     points,
     point_labels,
-    tolerance,
+    metrics,
     out_states,
     out_intervals,
     out_status,
     out_label,
+    visits,
 ):
     steps = int(settings[0])
-    repeats = settings[1] != 0.0
+    cycle = int(settings[1])  # intervals after which the forcing repeats; 0 if it never does
     h = interval / steps
     count = states.shape[0]
-    table = np.zeros(2 * steps + 1)  # forced
+    table = np.zeros((max(cycle, 1), 2 * steps + 1))  # forced
     z = np.zeros((EQUATIONS, LANES))
     before = np.zeros((EQUATIONS, LANES))
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
@@ -64,18 +67,21 @@ def advance(
     done = np.zeros(LANES, dtype=np.int64)
     waiting = 0
     active = 0
-    elapsed = 0  # forced
-    tabulate(start_time, h, theta, table)  # forced
+    elapsed = 0
+    for phase in range(cycle):  # forced
+        tabulate(start_time + phase * interval, h, theta, table[phase])  # forced
     while waiting < count or active > 0:
-        # Lanes that do not share the phase of a newcomer must finish first.
-        if active == 0 or repeats:
+        # Lanes that do not share the phase of a newcomer go on first.
+        if active == 0 or (cycle > 0 and elapsed % cycle == 0):
+            elapsed = elapsed if active > 0 else 0
             for lane in range(LANES):
                 while holder[lane] < 0 and waiting < count:
                     if budget[waiting] > 0:
                         holder[lane] = waiting
                         done[lane] = 0
                         active += 1
-                        seed_lane(stream, lane, seed, indices[waiting])  # noisy
+                        for k in range(4):  # noisy
+                            stream[k, lane] = streams[waiting, k]  # noisy
                         for e in range(EQUATIONS):
                             z[e, lane] = states[waiting, e]
                     else:
@@ -86,23 +92,23 @@ def advance(
                     waiting += 1
             if active == 0:
                 break
-            elapsed = elapsed if repeats else 0  # forced
-        if not repeats:  # forced
-            tabulate(start_time + elapsed * interval, h, theta, table)  # forced
+        row = elapsed % cycle if cycle > 0 else 0  # forced
+        if cycle == 0:  # forced
+            tabulate(start_time + elapsed * interval, h, theta, table[row])  # forced
         before[:, :] = z
         for step in range(steps):
             normal_pairs(stream, first, second)  # noisy
             step_lanes(
                 z,
-                table[2 * step],  # forced
-                table[2 * step + 1],  # forced
-                table[2 * step + 2],  # forced
+                table[row, 2 * step],  # forced
+                table[row, 2 * step + 1],  # forced
+                table[row, 2 * step + 2],  # forced
                 first,  # noisy
                 second,  # noisy
                 theta,
                 h,
             )
-        elapsed += 1  # forced
+        elapsed += 1
         for lane in range(LANES):
             index = holder[lane]
             if index < 0:
@@ -115,14 +121,25 @@ def advance(
                 status = DIVERGED
             else:
                 done[lane] += 1
-                status, label = section_status(
-                    z[0, lane], z[1, lane], region, labels, home, points, point_labels, tolerance
+                at_section = done[lane] % every == 0
+                if at_section and visits.shape[1] > 0:
+                    visit = (done[lane] // every - 1) % visits.shape[1]
+                    for e in range(EQUATIONS):
+                        visits[index, visit, e] = z[e, lane]
+                status, label = stop_status(
+                    z[0, lane], z[1, lane], at_section, region, area, labels, home, points, point_labels, metrics
                 )
+                if between and status == COMPLETED:
+                    ends = before[0, lane], before[1, lane], z[0, lane], z[1, lane]
+                    if turned_outside(ends[0], ends[1], ends[2], ends[3], interval, region):
+                        status = LEFT_REGION
                 if status == COMPLETED and done[lane] < budget[index]:
                     continue
             for e in range(EQUATIONS):
                 out_states[index, e] = z[e, lane] if finite else before[e, lane]
                 z[e, lane] = 0.0
+            for k in range(4):  # noisy
+                streams[index, k] = stream[k, lane]  # noisy
             out_intervals[index] = done[lane]
             out_status[index] = status
             out_label[index] = label
@@ -137,8 +154,7 @@ def record(
     start_time,
     spacing,
     settings,
-    seed,  # noisy
-    index,  # noisy
+    streams,  # noisy
     given,  # noisy
     out,
 ):
@@ -149,7 +165,8 @@ def record(
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
     second = np.zeros(LANES)  # noisy
-    seed_lane(stream, 0, seed, index)  # noisy
+    for k in range(4):  # noisy
+        stream[k, 0] = streams[0, k]  # noisy
     for e in range(EQUATIONS):
         z[e, 0] = state[e]
     out[0] = state

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, section_status
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
 from vibrokit.kernels.templates.located import press
 from vibrokit.kernels.templates.order8 import fly
 from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
@@ -69,34 +69,46 @@ def advance(
     interval,
     settings,
     budget,
+    every,
     region,
+    between,
+    area,
     labels,
     home,
     points,
     point_labels,
-    tolerance,
+    metrics,
     out_states,
     out_intervals,
     out_status,
     out_label,
+    visits,
 ):
     memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
     workspace, coefficients, y = workspaces()
-    repeats = settings[2] != 0.0
+    cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
     for index in range(states.shape[0]):
         status, label, done = COMPLETED, -1, 0
         copy_state(states[index], out_states[index])
         while status == COMPLETED and done < budget[index]:
-            # Where the forcing repeats, each interval starts at the same time: the phase cannot drift.
-            start = start_time if repeats else start_time + done * interval
+            # Where the forcing repeats, so do the times: the phase cannot drift.
+            start = start_time + (done % cycle if cycle > 0 else done) * interval
             copy_state(out_states[index], y)
+            x, v = y[0], y[1]
             y[CLOCK] = start
             begin(y, interval, memory, pushing, theta, workspace)
             status = travel(y, start + interval, memory, pushing, theta, settings, workspace, coefficients)
             if status == COMPLETED:
                 done += 1
                 copy_state(y, out_states[index])
-                status, label = section_status(y[0], y[1], region, labels, home, points, point_labels, tolerance)
+                at_section = done % every == 0
+                if at_section and visits.shape[1] > 0:
+                    copy_state(y, visits[index, (done // every - 1) % visits.shape[1]])
+                status, label = stop_status(
+                    y[0], y[1], at_section, region, area, labels, home, points, point_labels, metrics
+                )
+                if between and status == COMPLETED and turned_outside(x, v, y[0], y[1], interval, region):
+                    status = LEFT_REGION
         out_intervals[index], out_status[index], out_label[index] = done, status, label
 
 

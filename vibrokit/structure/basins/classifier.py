@@ -109,9 +109,9 @@ class BasinClassifier:
         """The test for points, for cells of the core, and for marked cells, whose labels follow the attractors'."""
         if self._mask is not None:
             labels = self._mask.labels(self.core, len(self.attractors))
-            return dataclasses.replace(self.points, region=self._mask.frame.bounds, labels=labels)
+            return self.points.with_cells(self._mask.frame.bounds, labels)
         if self.core is not None:
-            return dataclasses.replace(self.points, region=self.core.region.bounds, labels=self.core.labels)
+            return self.points.with_cells(self.core.region.bounds, self.core.labels)
         return self.points
 
     @cached_property
@@ -120,8 +120,7 @@ class BasinClassifier:
         mask = self._mask
         if mask is None:
             return {}
-        here = dataclasses.replace(self.points, region=mask.frame.bounds)
-        return {place: dataclasses.replace(here, labels=mask.away(place)) for place in mask.near}
+        return {place: self.points.with_cells(mask.frame.bounds, mask.away(place)) for place in mask.near}
 
     @cached_property
     def _mask(self) -> AttractorMask | None:
