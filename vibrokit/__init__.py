@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.exits import LeaveRegion as LeaveRegion
     from vibrokit.analyzers.graph.search import GraphSearch as GraphSearch
     from vibrokit.analyzers.least_action import LeastAction as LeastAction
+    from vibrokit.analyzers.mean_exit_times import MFET as MFET
     from vibrokit.analyzers.problem import ExitProblem as ExitProblem
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
@@ -77,6 +78,7 @@ _MODULES = {
     "GraphSearch": "vibrokit.analyzers.graph.search",
     "LeastAction": "vibrokit.analyzers.least_action",
     "ExitProblem": "vibrokit.analyzers.problem",
+    "MFET": "vibrokit.analyzers.mean_exit_times",
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
     "StationaryDensity": "vibrokit.comparison.stationary",

@@ -47,6 +47,10 @@ class ResultFileError(VibrokitError, ValueError):
     """A file is not a saved result, its parts contradict one another, or a result cannot be saved."""
 
 
+class CheckpointError(VibrokitError, ValueError):
+    """A checkpoint is damaged, or belongs to other work."""
+
+
 class IntegrationError(VibrokitError, ArithmeticError):
     """A state became infinite or NaN, or the number of steps reached its limit.
 

@@ -60,7 +60,19 @@ def steps_taken(osc, stepper, states):
     interval = osc.section_interval
     module, theta, stop = kernel_for(osc, Flow.STATE, stepper).module, theta_of(osc), Stop()
     settings = np.array(stepper.settings(osc, interval))
-    tests = (1, stop.region, False, stop.area, stop.labels, stop.home, stop.points, stop.point_labels, stop.metrics)
+    tests = (
+        np.zeros(1, dtype=np.int64),
+        1,
+        1,
+        stop.region,
+        False,
+        stop.area,
+        stop.labels,
+        stop.home,
+        stop.points,
+        stop.point_labels,
+        stop.metrics,
+    )
 
     def stalls(state, limit):
         settings[1] = limit

@@ -79,7 +79,7 @@ def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None
     outputs = out, done, status, label, np.zeros((count, 0, 5))
     module.advance(
         states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0]),
-        np.full(count, intervals), 1, region, False, *labels, *points, *outputs,
+        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, *outputs,
     )  # fmt: skip
     return out, done, status
 

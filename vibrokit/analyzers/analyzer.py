@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import os
 from abc import ABC, abstractmethod
 from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any, ClassVar, dataclass_transform
 
 import xarray
 
+from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
@@ -20,6 +24,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import NOT_FOLLOWED
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding, check_findings
+from vibrokit.results.record import versions
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
@@ -89,6 +94,7 @@ class Analyzer(ABC):
     """
 
     result: ClassVar[type[Result]] = Result
+    keeps_checkpoints: ClassVar[bool] = False
 
     source: int | str | None = None
     exit: Exit = dataclasses.field(default_factory=LeaveBasin)
@@ -116,6 +122,7 @@ class Analyzer(ABC):
         executor: Executor | None = None,
         progress: Progress = None,
         time_limit: float | None = None,
+        checkpoint: str | os.PathLike[str] | None = None,
     ) -> Result:
         """Analyze a scene whose structure is known.
 
@@ -127,12 +134,15 @@ class Analyzer(ABC):
         structure : Structure
             What `find_structure` returned for this oscillator.
         executor : concurrent.futures.Executor, optional
-            Where `SGCM` works on parts of a grid; threads of this process by default, which the other methods always
-            use. The result is the same to the last bit.
+            Where `SGCM` works on parts of a grid and `MFET` on some of its walkers; threads of this process by default,
+            which the other methods always use. The result is the same to the last bit.
         progress : bool or callable, optional
             True shows progress on standard error; a function is called with each `vibrokit.progress.Update`.
         time_limit : float, optional
             In seconds.
+        checkpoint : path, optional
+            A file in which `MFET` keeps what it has done, every few seconds. If it exists, the work goes on from there;
+            the result is the same to the last bit as without a pause. Other methods keep none.
 
         Returns
         -------
@@ -143,21 +153,29 @@ class Analyzer(ABC):
         SceneError
             The scene has no noise.
         StructureError
-            The structure is that of another scene, the scene has no such exit, or the source is unknown.
+            The structure is that of another scene, the scene has no such exit, the source is unknown, or the method
+            keeps no checkpoints.
+        CheckpointError
+            The checkpoint is damaged, or belongs to other work.
         """
         sources = self._checked(osc, structure, executor)
+        kept = self._checkpoint(osc, structure, checkpoint)
         analyses: dict[int, Analysis] = {}
         findings: list[Finding] = []
         with working(progress, time_limit) as work:
             try:
                 for attractor in sources:
-                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor)
+                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept)
                     with stage(type(self).__name__, subject=attractor.name):
                         analyses[attractor.label] = self._analyzed(problem)
                     if not analyses[attractor.label].complete:
                         break
             except KeyboardInterrupt as stopped:
                 findings.append(Finding.stopped(type(self).__name__, stopped, attractor.label))
+            finally:
+                kept.flush()
+            if kept.failure:
+                findings.append(Finding.of(Code.CHECKPOINT_NOT_WRITTEN, path=str(kept.path), reason=kept.failure))
             return self.result.assembled(
                 structure,
                 estimates={label: one.estimates for label, one in analyses.items()},
@@ -171,7 +189,7 @@ class Analyzer(ABC):
                 scene=scene_data(osc),
                 settings=settings_of(self),
                 stats=work.stats,
-                complete=not findings and all(one.complete for one in analyses.values()),
+                complete=len(analyses) == len(sources) and all(one.complete for one in analyses.values()),
                 seconds=work.seconds,
             )
 
@@ -189,6 +207,26 @@ class Analyzer(ABC):
             raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
         self.exit.check(osc, structure)
         return structure.attractors if self.source is None else (structure.attractor(self.source),)
+
+    def _checkpoint(self, osc: Oscillator, structure: Structure, path: str | os.PathLike[str] | None) -> Checkpoint:
+        if path is None:
+            return Checkpoint(None, {})
+        if not self.keeps_checkpoints:
+            raise StructureError(f"{type(self).__name__} keeps no checkpoints; leave out checkpoint=.")
+        where = Path(path)
+        if not where.parent.is_dir():
+            raise StructureError(f"the folder {where.parent} of the checkpoint does not exist; make it first.")
+        points = [attractor.points.tolist() for attractor in structure.attractors]
+        labels = hashlib.sha256(structure.basins.labels.tobytes()).hexdigest()
+        return Checkpoint(
+            where,
+            {
+                "scene": scene_data(osc),
+                "settings": settings_of(self),
+                "structure": [points, structure.basins.region.bounds.tolist(), labels],
+                "versions": versions(),
+            },
+        )
 
     def _analyzed(self, problem: ExitProblem) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""

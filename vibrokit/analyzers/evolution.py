@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.neighbourhoods import nearest
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, nearest, resolved
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper

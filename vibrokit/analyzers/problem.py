@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.exits import Exit
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.errors import StructureError
@@ -40,6 +41,8 @@ class ExitProblem:
         The one that the user asked for; None for the defaults.
     executor : Executor or None
         Where a method may do parts of its work; None for threads of this process.
+    checkpoint : Checkpoint
+        Where a method may keep what long work has reached.
     """
 
     osc: Oscillator
@@ -48,6 +51,7 @@ class ExitProblem:
     exit: Exit
     stepper: Stepper | None = None
     executor: Executor | None = None
+    checkpoint: Checkpoint = dataclasses.field(default_factory=lambda: Checkpoint(None, {}))
 
     @property
     def source(self) -> int:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from numbers import Real
 from typing import ClassVar
 
 import numpy as np
@@ -18,13 +16,12 @@ from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, res
 from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
-from vibrokit.errors import StructureError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
-from vibrokit.structure.validation import gibibytes, whole
+from vibrokit.structure.validation import gibibytes, intensities, whole
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
@@ -95,7 +92,7 @@ class SGCM(Analyzer):
             whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
         gibibytes("SGCM: max_memory_gib", self.max_memory_gib)
         if self.intensities is not None:
-            object.__setattr__(self, "intensities", _checked_intensities(self.intensities))
+            object.__setattr__(self, "intensities", intensities("SGCM", self.intensities))
 
     def least_intensity(self, osc: Oscillator) -> float:
         """The least of the intensities."""
@@ -108,12 +105,12 @@ class SGCM(Analyzer):
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
         orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
         steps = self.steps or steps_for(problem.osc, np.concatenate(orbits))
-        intensities = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
+        wanted = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
         solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
         solved: list[AtIntensity] = []
         stopped: tuple[Finding, ...] = ()
         try:
-            solved.extend(solver.solve(intensities))
+            solved.extend(solver.solve(wanted))
         except KeyboardInterrupt as interrupt:
             if not solved:
                 raise
@@ -124,17 +121,6 @@ class SGCM(Analyzer):
             (*_findings(problem, solved), *stopped),
             complete=not stopped,
         )
-
-
-def _checked_intensities(intensities: tuple[float, ...]) -> tuple[float, ...]:
-    """Intensities in descending order, each once."""
-    given = tuple(intensities) if isinstance(intensities, Sequence | np.ndarray) else (intensities,)
-    for intensity in given:
-        if isinstance(intensity, bool) or not isinstance(intensity, Real) or not 0 < intensity < math.inf:
-            raise StructureError(f"SGCM: intensities must be positive numbers, got {shown(intensity)}.")
-    if not given:
-        raise StructureError("SGCM: intensities must contain at least one number, got ().")
-    return tuple(sorted({float(intensity) for intensity in given}, reverse=True))
 
 
 def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[ActivationEnergy, ...]:
@@ -199,6 +185,9 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
                 ("exit_index",), np.array(targets), {"long_name": "label of the attractor that is reached"},
             ),
             "rate_event": ((), problem.exit.event, {"long_name": "what counts as an exit"}),
+            "rate_method": (
+                ("intensity_index",), np.array(["SGCM"] * len(solved)), {"long_name": "how the rate was found"},
+            ),
             "rate_steps": ((), solver.steps, {"long_name": "how often noise acts in a section interval"}),
             "rate_intensity": (
                 ("intensity_index",), np.array([one.intensity for one in solved]),

@@ -14,6 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.special import logsumexp
 
 from vibrokit.errors import StructureError, shown
+from vibrokit.results.rated import RatedResult
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.structure.validation import pair
@@ -76,11 +77,7 @@ class StationaryDensity:
             raise StructureError(
                 f"SGCM has no density of {', '.join(absent)}; run it without source=, and see the result's findings."
             )
-        log_rates = np.full((len(known), len(names), len(names)), -np.inf)
-        for rate in result.rates:
-            if rate.target >= 0:
-                log_rates[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
-        occupancies = np.array([log_stationary(one, names) for one in log_rates])
+        occupancies = np.array([log_stationary(one, names) for one in result.log_rates.values])
         x, v, parts = _on_one_grid(result, pair("StationaryDensity.of: nodes", nodes, least=2))
         density = logsumexp(parts + occupancies[:, :, None, None], axis=1)
         return cls(np.array(known), occupancies, density, x, v, result.section)
@@ -93,8 +90,7 @@ class StationaryDensity:
     @property
     def occupancies(self) -> xarray.DataArray:
         """Probability of each attractor, over (intensity, attractor)."""
-        coordinates = {"intensity": self.intensities, "attractor": list(self.names)}
-        return xarray.DataArray(np.exp(self.log_occupancies), coordinates, ("intensity", "attractor"), "occupancy")
+        return _by_attractor(self.log_occupancies, self.intensities, self.names)
 
     @property
     def density(self) -> xarray.DataArray:
@@ -162,6 +158,29 @@ class StationaryDensity:
         pairs = zip(self.intensities.tolist(), self.log_occupancies, strict=True)
         rows = [[f"{d:g}", *(f"{p:.4g}" for p in np.exp(row))] for d, row in pairs]
         return "\n".join(text_table([["D", *self.names], *rows]))
+
+
+def occupancies(result: RatedResult) -> xarray.DataArray:
+    """Return the stationary probability of each attractor, over (intensity, attractor), from rates alone.
+
+    The rates W between the attractors balance: for two attractors W_IN P_I = W_NI P_N.
+
+    Raises
+    ------
+    StructureError
+        The result has no rates, or none of the exits of some attractor at some intensity.
+    """
+    if not isinstance(result, RatedResult):
+        raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
+    if not result.rates:
+        raise StructureError("the result has no rates; see its findings.")
+    found = [log_stationary(one, result.names) for one in result.log_rates.values]
+    return _by_attractor(np.array(found), np.array(result.intensities), result.names)
+
+
+def _by_attractor(logs: Array, intensities: Array, names: Sequence[str]) -> xarray.DataArray:
+    coordinates = {"intensity": intensities, "attractor": list(names)}
+    return xarray.DataArray(np.exp(logs), coordinates, ("intensity", "attractor"), "occupancy")
 
 
 def log_stationary(log_rates: Array, names: tuple[str, ...]) -> Array:

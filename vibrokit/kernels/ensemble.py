@@ -80,7 +80,7 @@ class Ensemble:
     label : int64 array (count,)
         Label of the cell or point that ended it; −1 if none did.
     visits : array (count, visits, equations)
-        The states at its latest sections: that of section number n is in row (n − 1) mod `visits`.
+        The latest states that were kept: the n-th is in row (n − 1) mod `visits`.
     streams : uint64 array (count, 4)
         States of the random streams at the end; empty without noise.
     """
@@ -104,7 +104,9 @@ def run_ensemble(
     start_time: float = 0.0,
     interval: float | None = None,
     streams: Array | None = None,
+    phases: int | Array = 0,
     visits: int = 0,
+    keep: int = 1,
     executor: futures.Executor | None = None,
 ) -> Ensemble:
     """Advance trajectories interval by interval until each meets a stop test or has spent its budget.
@@ -130,8 +132,10 @@ def run_ensemble(
     streams : uint64 array (count, 4), optional
         For the noisy flow: the state of each trajectory's own random stream, as `vibrokit.kernels.streams.streams_of`
         starts it, or as an ensemble ended.
-    visits : int
-        How many of the latest sections to keep of each trajectory.
+    phases : int or array (count,)
+        Intervals from `start_time` to the start of each trajectory.
+    visits, keep : int
+        How many states to keep of each trajectory, the latest; one every `keep` intervals from `start_time`.
     executor : concurrent.futures.Executor, optional
         Integrates the blocks; threads of this process by default. The result is the same to the last bit.
 
@@ -142,13 +146,14 @@ def run_ensemble(
     kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     starts = np.ascontiguousarray(states, dtype=float)
-    budgets = np.broadcast_to(budget, len(starts))
+    budgets, begun = (np.broadcast_to(numbers, len(starts)) for numbers in (budget, phases))
     span = scene.section_interval if interval is None else interval
     common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)))
     known = np.empty((len(starts), 0), dtype=np.uint64) if streams is None else streams
     test = stop or Stop()
     tasks = [
-        (kernel, starts[block], budgets[block], common, known[block], test, visits) for block in _blocks(len(starts))
+        (kernel, starts[block], budgets[block], common, known[block], begun[block], test, visits, keep)
+        for block in _blocks(len(starts))
     ]
     steps, parts = stepper.steps_in(scene, span), []
     with contextlib.closing(carry(_advance_block, tasks, executor)) as blocks:
@@ -158,7 +163,7 @@ def run_ensemble(
             count(trajectories=len(part.intervals), intervals=passed, steps=steps * passed)
             advance(len(part.intervals), TRAJECTORIES)
     if not parts:
-        parts = [_advance_block(kernel, starts, budgets, common, known, test, visits)]
+        parts = [_advance_block(kernel, starts, budgets, common, known, begun, test, visits, keep)]
     names = [field.name for field in dataclasses.fields(Ensemble)]
     return Ensemble(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -175,10 +180,10 @@ def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
         nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
         none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)
         with first_call(advance_kernel):
-            _advance_block(kernel, *nothing, common, none, Stop(), 0)
+            _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
             if advance_kernel.stats.cache_misses:
                 store.reload(kernel.name, kernel.source)
-                _advance_block(kernel, *nothing, common, none, Stop(), 0)
+                _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
     return kernel
 
 
@@ -191,7 +196,15 @@ def _blocks(count: int) -> Iterator[slice]:
 
 
 def _advance_block(
-    kernel: Kernel, starts: Array, budget: Array, common: tuple[Any, ...], streams: Array, stop: Stop, visits: int
+    kernel: Kernel,
+    starts: Array,
+    budget: Array,
+    common: tuple[Any, ...],
+    streams: Array,
+    phases: Array,
+    stop: Stop,
+    visits: int,
+    keep: int,
 ) -> Ensemble:
     count, equations = starts.shape
     streams = np.array(streams, dtype=np.uint64)  # the kernel advances them in place
@@ -202,9 +215,10 @@ def _advance_block(
     bounds = stop.region, stop.area, stop.points, stop.metrics
     region, area, points, metrics = (_plain(array, float) for array in bounds)
     labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
+    budget, phases = _plain(budget, np.int64), _plain(phases, np.int64)
     kernel.module.advance(
-        _plain(starts, float), *common, *((streams,) if streams.shape[1] else ()), _plain(budget, np.int64),
-        stop.every, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
+        _plain(starts, float), *common, *((streams,) if streams.shape[1] else ()), budget, phases,
+        stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
         ended.states, ended.intervals, ended.status, ended.label, ended.visits,
     )  # fmt: skip
     return ended

@@ -183,6 +183,48 @@ class Code(StrEnum):
         "Raise the number of nodes.",
     )  # fmt: skip
 
+    # Exit times
+    CHECKPOINT_NOT_WRITTEN = (
+        "checkpoint-not-written", WARNING, "The checkpoint {path} could not be written: {reason}",
+        "Free some space, or choose another place.",
+    )  # fmt: skip
+    INTENSITY_FAILED = "intensity-failed", WARNING, "{state} at D = {intensity:g}: {reason}", _SEE_REASON
+    NO_EXIT_SEEN = (
+        "no-exit-seen", WARNING,
+        "No walker left {state} at D = {intensity:g}: with 95 % confidence the mean exit time is above {time:.3g} s.",
+        "Give more time, raise the noise intensity, or use splitting=True.",
+    )  # fmt: skip
+    NOT_METASTABLE = (
+        "not-metastable", WARNING,
+        "{state} is left after {ratio:.2g} relaxation times on average at D = {intensity:g}, below {least:g}: it is no "
+        "metastable state.", "Lower the noise intensity.",
+    )  # fmt: skip
+    TARGET_NOT_METASTABLE = (
+        "target-not-metastable", WARNING,
+        "Only {share:.0%} of the motion that begins on {goal} is still there after some relaxation times at "
+        "D = {intensity:g}: arrivals from {state} do not stay.", "Lower the noise intensity.",
+    )  # fmt: skip
+    NOT_EXPONENTIAL = (
+        "not-exponential", WARNING,
+        "The exit times of {state} at D = {intensity:g} follow no exponential law (probability {p_value:.1e}): one "
+        "rate does not describe them.", "Look at their distribution with plot_exit_times.",
+    )  # fmt: skip
+    STEPS_CHANGE_RATE = (
+        "steps-change-rate", WARNING,
+        "Half the steps change ln of the exit rate of {state} at D = {intensity:g} by {change:.2g} ± {error:.1g}: the "
+        "steps are too long.", _FINER_STEPPER,
+    )  # fmt: skip
+    SPLITTING_NOT_CONVERGED = (
+        "splitting-not-converged", WARNING,
+        "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas} replicas; {wanted:.0%} "
+        "was wanted.", "Expect an error of that size, or raise target_error.",
+    )  # fmt: skip
+    ARRHENIUS_NOT_REACHED = (
+        "arrhenius-not-reached", WARNING,
+        "From {state} to {goal} the slope d ln τ/d(1/D) changes from {first:.3g} to {last:.3g} m² s⁻³ over the noise "
+        "intensities: it is not yet the activation energy.", "Lower the noise intensities.",
+    )  # fmt: skip
+
     # Density
     DENSITY_NOT_CONVERGED = (
         "density-not-converged", WARNING,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,18 +9,14 @@ import xarray
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.results.arrays import Arrays
-from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.labels import exit_between, source_among
-from vibrokit.results.result import Result
+from vibrokit.results.labels import source_among
+from vibrokit.results.rated import RatedResult
 
 if TYPE_CHECKING:
-    from vibrokit.plots.exit_times import ExitTimeArtists, ExitTimes, SlopeArtists
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
 
 
-class SGCMResult(Result):
+class SGCMResult(RatedResult):
     """Quasi-stationary densities, exit rates and activation energies.
 
     `data` has, along ``source``:
@@ -39,42 +33,6 @@ class SGCMResult(Result):
     """
 
     kind: ClassVar[str] = "sgcm"
-
-    @property
-    def intensities(self) -> list[float]:
-        """Noise intensities D (m² s⁻³) at which there are densities, descending."""
-        if "rate_intensity" not in self.data:
-            return []
-        values = Arrays(self.data).numbers("rate_intensity", (None, None), finite=False)
-        found: list[float] = np.nanmax(values, axis=0).tolist()
-        return found
-
-    @property
-    def rates(self) -> tuple[ExitRate, ...]:
-        """Exit rates of all attractors at all intensities."""
-        arrays = Arrays(self.data)
-        if "log_rate" not in arrays:
-            return ()
-        found = []
-        for place, source in enumerate(self.data["source"].values.tolist()):
-            one = self.data.isel(source=place)
-            for i, intensity in enumerate(one["rate_intensity"].values.tolist()):
-                for k, target in enumerate(one["rate_target"].values.tolist()):
-                    log_rate, error = float(one["log_rate"][i, k]), float(one["log_rate_error"][i, k])
-                    if not (math.isfinite(log_rate) and math.isfinite(error)):
-                        continue
-                    found.append(
-                        ExitRate(
-                            source,
-                            target,
-                            intensity,
-                            log_value=log_rate,
-                            log_error=error,
-                            event=str(one["rate_event"].values),
-                            method="SGCM",
-                        )
-                    )
-        return tuple(found)
 
     def barrier(self, source: int | str) -> xarray.DataArray:
         """Return −D ln p at the lowest point of the saddles, above the minimum, over intensity (m² s⁻³).
@@ -149,58 +107,6 @@ class SGCMResult(Result):
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
         """Draw −D ln p at the least intensity; see `Result.plot_quasi_potential`."""
         return self.plot_quasi_potential(source, ax)
-
-    def plot_rates(self, ax: Any = None, source: int | str | None = None) -> ExitTimeArtists:
-        """Draw ln τ against 1/D, τ = 1/rate; see `vibrokit.plots.exit_times.exit_times`.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-        source : int or str, optional
-            By default all attractors.
-        """
-        from vibrokit.plots.exit_times import exit_times
-
-        return exit_times(self._exit_times(source), ax=ax)
-
-    def plot_slopes(
-        self, ax: Any = None, source: int | str | None = None, limits: Iterable[ActivationEnergy] = ()
-    ) -> SlopeArtists:
-        """Draw d ln τ/d(1/D) against D; see `vibrokit.plots.exit_times.exit_slopes`.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-        source : int or str, optional
-            By default all attractors.
-        limits : iterable of ActivationEnergy
-            Drawn with their bounds; the slopes tend to them as D → 0. Those of `LeastAction` do not depend on D.
-        """
-        from vibrokit.plots.exit_times import exit_slopes
-
-        lines = [(e.source, f"{self.exit_of(e)}, {e.method}", e.value, e.lower, e.upper) for e in limits]
-        return exit_slopes(self._exit_times(source), lines, ax=ax)
-
-    def _exit_times(self, source: int | str | None) -> list[ExitTimes]:
-        """The mean times of every exit of one attractor, or of all, over intensity."""
-        from vibrokit.plots.exit_times import ExitTimes
-
-        found, rates = [], self.rates
-        if source is not None:
-            label = source_among({rate.source for rate in rates}, source, self.names, "rate", "of")
-            rates = tuple(rate for rate in rates if rate.source == label)
-        for start, target in dict.fromkeys((rate.source, rate.target) for rate in rates):
-            own = [rate for rate in rates if (rate.source, rate.target) == (start, target)]
-            found.append(
-                ExitTimes(
-                    [rate.intensity for rate in own],
-                    [-rate.log_value for rate in own],
-                    [rate.log_error for rate in own],
-                    start,
-                    exit_between(self.names, start, target),
-                )
-            )
-        return found
 
 
 def _over_nodes(values: NDArray[np.float64], one: xarray.Dataset, name: str) -> xarray.DataArray:

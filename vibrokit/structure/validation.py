@@ -5,7 +5,8 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -118,6 +119,17 @@ def gibibytes(name: str, amount: Any) -> float:
     if isinstance(amount, bool) or not isinstance(amount, Real) or not float(amount) > 0:
         raise StructureError(f"{name} must be a positive number of GiB, got {shown(amount)}.")
     return float(amount)
+
+
+def intensities(caller: str, given: Any) -> tuple[float, ...]:
+    """Return noise intensities in descending order, each once; raises StructureError unless all are positive."""
+    listed = tuple(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else (given,)
+    for intensity in listed:
+        if isinstance(intensity, bool) or not isinstance(intensity, Real) or not 0 < float(intensity) < math.inf:
+            raise StructureError(f"{caller}: intensities must be positive numbers, got {shown(intensity)}.")
+    if not listed:
+        raise StructureError(f"{caller}: intensities must contain at least one number, got ().")
+    return tuple(sorted({float(intensity) for intensity in listed}, reverse=True))
 
 
 def check_means(osc: Any, stepper: Any, executor: Any) -> None:

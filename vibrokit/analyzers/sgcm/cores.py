@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.paths.local_potential import local_potential
+from vibrokit.analyzers.neighbourhoods import CORE_SIZE, covariances_of, metrics_of, nearest, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid, nearest
-from vibrokit.errors import StructureError
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
-from vibrokit.structure.linear_map import gaussian_map
-from vibrokit.structure.orbits import refine_orbit
-from vibrokit.symbolic.flow_kind import Flow
 
-_SIZE = 1.0  # semi-axes of a core in standard deviations of the density around the attractor: it holds 39 % of it
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
-_SINGULAR = 1e-12  # 1 − correlation², as rounding errors may leave of 0
 _BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
-_RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
 Array = NDArray[np.float64]
 
@@ -82,7 +74,7 @@ class Cores:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
         attractor = self.problem.attractor
         covariances = intensity * self.covariances[attractor.label]
-        return -0.5 * nearest(grid.nodes, *_ellipses(attractor, covariances, 1.0, grid))
+        return -0.5 * nearest(grid.nodes, *self._ellipses(attractor, covariances, 1.0, grid))
 
     def resolved(self, grid: DensityGrid, nodes: float) -> float:
         """Return the least intensity at which the density around the attractor is wider than some node spacings.
@@ -121,11 +113,7 @@ class Cores:
     @property
     def relaxation(self) -> float:
         """Section intervals in which deviations of the density fall by a factor e."""
-        attractor = self.problem.attractor
-        largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
-        if not 0.0 < largest < 1.0 or not attractor.is_fixed:
-            return _RELAXATION
-        return max(1.0, -max(attractor.period, 1) / math.log(largest))
+        return relaxation_of(self.problem.attractor)
 
     def _basin(self, attractor: Attractor, grid: DensityGrid, own: Array, every: int) -> Array:
         """How much of each cell belongs to the basin of another attractor, and not to the own core."""
@@ -134,42 +122,13 @@ class Cores:
         return np.minimum(covered, 1.0 - own)
 
     def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float) -> Array:
-        covariances = _SIZE**2 * intensity * self.covariances[attractor.label]
-        ellipses = _ellipses(attractor, covariances, _LEAST, grid)
+        covariances = CORE_SIZE**2 * intensity * self.covariances[attractor.label]
+        ellipses = self._ellipses(attractor, covariances, _LEAST, grid)
         return grid.covered(lambda states: nearest(states, *ellipses) <= 1)
 
-
-def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
-    """Return the stationary covariances per unit D around the points of an attractor, shape (count, 2, 2).
-
-    They are 0 for an attractor that never repeats: its points are a set of their own.
-
-    Raises
-    ------
-    StructureError
-        The orbit is not stable, or noise does not make it spread.
-    """
-    if not attractor.is_fixed:
-        return np.zeros((len(attractor.points), 2, 2))
-    stepper = problem.single_stepper(Flow.LINEARISED)
-    orbit = refine_orbit(problem.osc, attractor.points[0], attractor.period, stepper)
-    covariances = [local_potential(problem.osc, orbit, stepper).covariance]
-    for point in attractor.points[:-1]:
-        step = gaussian_map(problem.osc, point[None], stepper)
-        covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
-    found = np.array(covariances)
-    if not np.all(np.linalg.det(found) > _SINGULAR * found[:, 0, 0] * found[:, 1, 1]):
-        raise StructureError("the noise is 0 on the attractor or nearly so: the density around it has no width.")
-    return found
-
-
-def _ellipses(attractor: Attractor, covariances: Array, least: float, grid: DensityGrid) -> tuple[Array, Array]:
-    """Centres, and matrices R with Rᵀ R the inverse of the covariances; no semi-axis is below `least` node spacings."""
-    points = attractor.points[:, :2]
-    spacings = grid.local_spacing(points)
-    if not attractor.is_fixed:
-        spacings[:] = spacings.max(axis=0)
-    scales = spacings[:, :, None] * spacings[:, None, :]
-    variances, axes = np.linalg.eigh(covariances / scales)
-    widened = np.einsum("nij,nj,nkj->nik", axes, np.maximum(variances, least**2), axes) * scales
-    return points, np.linalg.cholesky(np.linalg.inv(widened)).transpose(0, 2, 1)
+    def _ellipses(
+        self, attractor: Attractor, covariances: Array, least: float, grid: DensityGrid
+    ) -> tuple[Array, Array]:
+        """Centres and metrics; no semi-axis is below `least` node spacings."""
+        points = attractor.points[:, :2]
+        return points, metrics_of(attractor, covariances, least * grid.local_spacing(points))

@@ -100,6 +100,11 @@ class DensityFlow:
         """The legs of a section interval."""
         return self.between(0.0, self.scene.section_interval)
 
+    @property
+    def leg_times(self) -> Array:
+        """When each leg of a section interval begins (s)."""
+        return np.array([begin for begin, _, _ in self._pieces(0.0, self.scene.section_interval)])
+
     @cached_property
     def backward_legs(self) -> list[Leg]:
         """The legs that carry an expected value back over a section interval, the last one first."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable
 from functools import cached_property
 
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, map_coordinates
-from scipy.spatial import cKDTree
 from scipy.special import logsumexp
 
 from vibrokit.kernels.ensemble import UNBOUNDED
@@ -22,7 +20,6 @@ from vibrokit.structure.validation import pair
 
 _FEWEST = 32  # nodes along each side
 _UNRESOLVED = 2.0  # in ln p above the floor: what is cut at 1 above it leaves an edge that is a little higher
-_FEW = 64  # centres, each with its own ellipse
 _FINER = 5  # points along each side of a cell, which decide how much of it a set covers
 _PLACES = 4001  # in x, where the stiffness is evaluated
 _CLOSEST = 8.0  # times closer than elsewhere, at most
@@ -168,23 +165,6 @@ def _aligned(low: float, high: float, nodes: int, faces: Array) -> Array:
         spacing = np.ptp(faces) / np.floor(np.ptp(faces) / spacing)
     first = faces[0] - (np.ceil((faces[0] - low) / spacing - 0.5) + 0.5) * spacing
     return first + spacing * np.arange(nodes)
-
-
-def nearest(states: Array, centres: Array, roots: Array) -> Array:
-    """Return the least |R (q − c)|² over centres c with their matrices R, at each state q, shape (…).
-
-    Parameters
-    ----------
-    states : array (…, 2)
-    centres : array (count, 2)
-    roots : array (count, 2, 2)
-        If there are more than a few centres, the first R is used for all.
-    """
-    if len(centres) > _FEW:
-        distances: Array = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0]
-        return distances**2
-    each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
-    return functools.reduce(np.minimum, each)
 
 
 def resolved(phi: Array) -> Array:

@@ -104,21 +104,33 @@ class Propagator:
         Where the density, at its time, is too small to matter there is no value, so that nothing is computed, unless
         the node belongs to a core.
         """
-        least = density.level - _RELEVANT
-        reached = [density.phi, *(phi for _, phi, _ in self._carried(self.flow.legs, density.phi, self._weight, least))]
-        there = [phi > least for phi in reached[:-1]]
-        for covered in (cores.own, *cores.others.values()):
-            there[0] |= covered > 0
-        legs = [
-            dataclasses.replace(leg, feet=np.where(mask[..., None], leg.feet, np.nan))
-            for leg, mask in zip(self.flow.backward_legs, reversed(there), strict=True)
-        ]
+        legs = self._backward_legs(density, cores)
 
         def earlier(values: Array, floor: float) -> Array:
             *_, (_, found, _) = self._carried(legs, values, _NO_WEIGHT, floor, at_exit=0.0)
             return found
 
         return earlier
+
+    def stages(self, density: QuasiStationary, cores: CoreSets, values: Array, floor: float) -> Array:
+        """Return ln of an expected value at the beginning of each leg of the section interval before, the first first.
+
+        Shape (legs, nx, nv); values are computed where `backward` computes them.
+        """
+        legs = self._backward_legs(density, cores)
+        carried = self._carried(legs, values, _NO_WEIGHT, floor, at_exit=0.0)
+        return np.array([found.copy() for _, found, _ in carried])[::-1]
+
+    def _backward_legs(self, density: QuasiStationary, cores: CoreSets) -> list[Leg]:
+        least = density.level - _RELEVANT
+        reached = [density.phi, *(phi for _, phi, _ in self._carried(self.flow.legs, density.phi, self._weight, least))]
+        there = [phi > least for phi in reached[:-1]]
+        for covered in (cores.own, *cores.others.values()):
+            there[0] |= covered > 0
+        return [
+            dataclasses.replace(leg, feet=np.where(mask[..., None], leg.feet, np.nan))
+            for leg, mask in zip(self.flow.backward_legs, reversed(there), strict=True)
+        ]
 
     def _carried(
         self, legs: Sequence[Leg], phi: Array, weight: Array, floor: float, at_exit: float = -math.inf

@@ -59,6 +59,8 @@ class AtIntensity:
     intensity : float
     grid : DensityGrid
     found : QuasiStationary
+    transition : Transition
+    cores : CoreSets
     committors : mapping of int to Committor
         By target.
     step_errors : mapping of int to float
@@ -68,6 +70,8 @@ class AtIntensity:
     intensity: float
     grid: DensityGrid
     found: QuasiStationary
+    transition: Transition
+    cores: CoreSets
     committors: Mapping[int, Committor] = dataclasses.field(default_factory=dict)
     step_errors: Mapping[int, float] = dataclasses.field(default_factory=dict)
 
@@ -146,7 +150,7 @@ class DensitySolver:
         """
         with ExitStack() as stack:
             executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
-            explored, closer = self._explored(intensities[0], executor)
+            explored, closer = self.explored(intensities[0], executor)
             grid = self._grid(closer.region, self._shape(closer, intensities[-1]))
             self._check_resolution(grid, intensities[-1])
             needed = _ALL_FLOWS * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
@@ -168,10 +172,11 @@ class DensitySolver:
                     if target in long.log_rates
                 }
                 solved = self._committors(transition, found, cores, committors, _CONVERGED)
-                before = AtIntensity(intensity, grid, found, {target: solved[target] for target in steps}, steps)
+                known = {target: solved[target] for target in steps}
+                before = AtIntensity(intensity, grid, found, transition, cores, known, steps)
                 yield before
 
-    def _explored(self, intensity: float, executor: Executor) -> tuple[AtIntensity, DensityGrid]:
+    def explored(self, intensity: float, executor: Executor) -> tuple[AtIntensity, DensityGrid]:
         """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
         Where the nodes of the whole region are too far apart for the density, a stronger noise is used.
@@ -198,7 +203,7 @@ class DensitySolver:
                 break
             grid = closer
         committors = self._committors(propagator, found, cores, {}, _EXPLORED_TO)
-        return AtIntensity(stronger, propagator.grid, found, committors), closer
+        return AtIntensity(stronger, propagator.grid, found, propagator, cores, committors), closer
 
     def _grid(self, region: Region, shape: tuple[int, int]) -> DensityGrid:
         return DensityGrid.of(self.problem.scene, region, shape, self.problem.exit.faces(self.problem.osc))

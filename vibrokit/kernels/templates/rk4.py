@@ -1,7 +1,7 @@
 """Classical Runge–Kutta with fixed steps, trajectories packed in lanes.
 
 All lanes of a block share the phase of the forcing, so it is tabulated once, for all intervals after which it repeats.
-A lane whose trajectory has ended is given the next one when the phase is that of the start again.
+A lane whose trajectory has ended is given the next one as soon as the phase is that of its start.
 
 With noise, a step of length h draws ΔW and ΔZ = ∫W dt exactly and gives them as two kicks, ΔZ/h before a Runge–Kutta
 step of the drift and ΔW − ΔZ/h after it, so that the driven state and its integral both receive the right
@@ -38,7 +38,9 @@ def advance(
     settings,
     streams,  # noisy
     budget,
+    phases,
     every,
+    keep,
     region,
     between,
     area,
@@ -72,10 +74,13 @@ def advance(
         tabulate(start_time + phase * interval, h, theta, table[phase])  # forced
     while waiting < count or active > 0:
         # Lanes that do not share the phase of a newcomer go on first.
-        if active == 0 or (cycle > 0 and elapsed % cycle == 0):
-            elapsed = elapsed if active > 0 else 0
+        if active == 0 or cycle > 0:
+            elapsed = elapsed if active > 0 else phases[waiting]
             for lane in range(LANES):
                 while holder[lane] < 0 and waiting < count:
+                    ahead = elapsed - phases[waiting]
+                    if budget[waiting] > 0 and ahead != 0 and (cycle == 0 or ahead % cycle != 0):
+                        break
                     if budget[waiting] > 0:
                         holder[lane] = waiting
                         done[lane] = 0
@@ -121,9 +126,10 @@ def advance(
                 status = DIVERGED
             else:
                 done[lane] += 1
-                at_section = done[lane] % every == 0
-                if at_section and visits.shape[1] > 0:
-                    visit = (done[lane] // every - 1) % visits.shape[1]
+                passed = phases[index] + done[lane]
+                at_section = passed % every == 0
+                if visits.shape[1] > 0 and passed % keep == 0:
+                    visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
                     for e in range(EQUATIONS):
                         visits[index, visit, e] = z[e, lane]
                 status, label = stop_status(

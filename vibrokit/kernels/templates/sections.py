@@ -69,7 +69,9 @@ def advance(
     interval,
     settings,
     budget,
+    phases,
     every,
+    keep,
     region,
     between,
     area,
@@ -92,7 +94,8 @@ def advance(
         copy_state(states[index], out_states[index])
         while status == COMPLETED and done < budget[index]:
             # Where the forcing repeats, so do the times: the phase cannot drift.
-            start = start_time + (done % cycle if cycle > 0 else done) * interval
+            passed = phases[index] + done
+            start = start_time + (passed % cycle if cycle > 0 else passed) * interval
             copy_state(out_states[index], y)
             x, v = y[0], y[1]
             y[CLOCK] = start
@@ -100,10 +103,12 @@ def advance(
             status = travel(y, start + interval, memory, pushing, theta, settings, workspace, coefficients)
             if status == COMPLETED:
                 done += 1
+                passed += 1
                 copy_state(y, out_states[index])
-                at_section = done % every == 0
-                if at_section and visits.shape[1] > 0:
-                    copy_state(y, visits[index, (done // every - 1) % visits.shape[1]])
+                at_section = passed % every == 0
+                if visits.shape[1] > 0 and passed % keep == 0:
+                    visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
+                    copy_state(y, visits[index, visit])
                 status, label = stop_status(
                     y[0], y[1], at_section, region, area, labels, home, points, point_labels, metrics
                 )

@@ -1,0 +1,189 @@
+"""MFET: mean first exit times by simulation, and the activation energies that follow."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import ClassVar
+
+from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.mfet.dataset import dataset_of
+from vibrokit.analyzers.mfet.importance import Importance, from_committor
+from vibrokit.analyzers.mfet.measurement import AtIntensity, Measurement
+from vibrokit.analyzers.neighbourhoods import covariances_of
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.stages import committor_stages
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import stage
+from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.finding import Code, Finding
+from vibrokit.results.mfet import MFETResult
+from vibrokit.results.result import Result
+from vibrokit.structure.validation import intensities, whole
+from vibrokit.symbolic.flow_kind import Flow
+
+METHOD = "Arrhenius fit"
+_INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's, as SGCM has them
+_SMALLEST_ERROR = 1e-3  # a million exits
+_DEVIATIONS = 2.0  # standard errors on each side of an energy
+
+
+class MFET(Analyzer):
+    """Mean first exit times by simulation, and activation energies from their dependence on D.
+
+    Walkers start in the quasi-stationary state of an attractor and go on until they leave. With `LeaveBasin`, that is
+    when they are in the core of another attractor on the section: an ellipse with the shape and the standard deviations
+    of the density around it. With `LeaveBasin(for_good=False)` it is the first section in another basin, and with an
+    exit by position the first time that satisfies the condition.
+
+    Where direct simulation would take too long, adaptive multilevel splitting gives the rate, down to e⁻¹⁰⁰ and below.
+
+    Parameters
+    ----------
+    intensities : tuple of float, optional
+        Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
+    target_error : float
+        Relative standard error of each rate: 1/√n needs n exits.
+    seed : int
+        Chooses the random numbers; the same seed gives the same result to the last bit.
+    splitting : bool, optional
+        Whether to use splitting; by default where it is faster.
+    from_orbit : bool
+        Whether walkers start on the attractor's orbit, in place of its quasi-stationary state. Splitting never does.
+    escapes : int
+        Realizations whose last part is kept at each intensity that is simulated directly.
+
+    Raises
+    ------
+    StructureError
+        A setting has a value that is not allowed.
+
+    Notes
+    -----
+    The rate of exits to a target is their number over the time that all walkers spent, the maximum-likelihood estimate
+    for exponential exit times; walkers that have not left count with their time. A quarter of the exits is simulated
+    again with half the steps: `MFETResult.step_change` is the difference in ln of the rate.
+
+    An activation energy is the slope of ln τ against 1/D. It is given only if the slope does not change with D by more
+    than the errors of the rates allow.
+    """
+
+    result: ClassVar[type[Result]] = MFETResult
+    keeps_checkpoints: ClassVar[bool] = True
+
+    intensities: tuple[float, ...] | None = None
+    target_error: float = 0.05
+    seed: int = 0
+    splitting: bool | None = None
+    from_orbit: bool = False
+    escapes: int = 50
+
+    def __post_init__(self) -> None:
+        error = self.target_error
+        if isinstance(error, bool) or not isinstance(error, Real) or not _SMALLEST_ERROR <= error <= 1:
+            raise StructureError(f"MFET: target_error must be from {_SMALLEST_ERROR:g} to 1, got {shown(error)}.")
+        whole("MFET: seed", self.seed, 0, 2**63 - 1)
+        whole("MFET: escapes", self.escapes, 0, 100_000)
+        if self.splitting not in (None, True, False):
+            raise StructureError(f"MFET: splitting must be True, False or None, got {shown(self.splitting)}.")
+        if self.intensities is not None:
+            object.__setattr__(self, "intensities", intensities("MFET", self.intensities))
+
+    def least_intensity(self, osc: Oscillator) -> float:
+        """The least of the intensities."""
+        return min(self.intensities) if self.intensities else super().least_intensity(osc)
+
+    def analyze(self, problem: ExitProblem) -> Analysis:
+        """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
+        wanted = self._intensities(problem.osc)
+        if problem.at_exit:
+            return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
+        attractors = problem.structure.attractors
+        measured: list[AtIntensity] = []
+        findings: list[Finding] = []
+        complete = True
+        covariances = {a.label: covariances_of(problem, a) for a in attractors}
+        stepper = problem.ensemble_stepper(Flow.NOISY)
+        for number, intensity in enumerate(wanted):
+            measurement = Measurement(
+                problem, intensity, self, stepper, covariances, _importance,
+                problem.checkpoint.slot(problem.source, number),
+            )  # fmt: skip
+            try:
+                with stage("exit times", subject=f"{problem.attractor.name}, D = {intensity:g}"):
+                    measured.append(measurement.run())
+            except StructureError as error:
+                findings.append(
+                    Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=intensity, reason=str(error))
+                )
+            except KeyboardInterrupt as interrupt:
+                so_far = measurement.so_far()
+                if so_far is not None:
+                    measured.append(so_far)
+                elif not measured:
+                    raise
+                findings.append(Finding.stopped("exit times", interrupt, problem.source))
+                complete = False
+                break
+        if not measured:
+            return Analysis(findings=tuple(findings), complete=complete)
+        for one in measured:
+            findings += one.findings
+        energies, more = _energies(problem, measured)
+        return Analysis(energies, dataset_of(problem, measured), (*findings, *more), complete=complete)
+
+    def _intensities(self, osc: Oscillator) -> tuple[float, ...]:
+        assert osc.noise is not None  # every analyzer checks that
+        if self.intensities is None and not osc.noise.intensity > 0:
+            raise StructureError("the noise has the intensity 0, so nothing leaves; give intensities=(…,).")
+        return self.intensities or tuple(factor * osc.noise.intensity for factor in _INTENSITIES)
+
+
+def _importance(problem: ExitProblem, intensity: float) -> Importance | None:
+    """The committor of a density; None if there is none for this scene."""
+    try:
+        found = committor_stages(problem, intensity)
+    except (SceneError, StructureError):
+        return None
+    shares = found.times / problem.osc.section_interval
+    return from_committor(shares, found.grid.x, found.grid.v, found.log_values, problem.attractor.points)
+
+
+def _energies(
+    problem: ExitProblem, measured: list[AtIntensity]
+) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+    """Slopes of ln τ against 1/D that do not change with D."""
+    energies, findings = list[ActivationEnergy](), list[Finding]()
+    for target in sorted({target for one in measured for target in one.rates}):
+        rates = [
+            ExitRate(
+                problem.source, target, one.intensity, known.log_value, known.log_error, problem.exit.event, one.method
+            )
+            for one in measured
+            if (known := one.rates.get(target)) is not None and math.isfinite(known.log_value)
+        ]
+        if len(rates) < 2:
+            continue
+        fit = ArrheniusFit.of(rates)
+        if fit.drifts:
+            slopes, _ = fit.local_slopes
+            findings.append(
+                Finding.of(
+                    Code.ARRHENIUS_NOT_REACHED, problem.source, target, first=float(slopes[0]), last=float(slopes[-1])
+                )
+            )
+            continue
+        if not fit.slope > 0:
+            continue
+        # The prefactor depends on D, by a share D/ΔU as in Kramers' formula; that shifts the slope by about D²/ΔU.
+        error = _DEVIATIONS * fit.slope_error + float(fit.intensities[0] * fit.intensities[-1]) / fit.slope
+        bounds = max(fit.slope - error, 0.0), fit.slope + error
+        energies.append(
+            ActivationEnergy(
+                problem.source, target, fit.slope, *bounds, METHOD, Bound.ESTIMATE, numerical_error=fit.slope_error
+            )
+        )
+    return tuple(energies), tuple(findings)

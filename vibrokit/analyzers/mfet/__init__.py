@@ -1,0 +1,1 @@
+"""Mean first exit times: walks with noise, until they leave."""

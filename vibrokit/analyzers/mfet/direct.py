@@ -1,0 +1,196 @@
+"""Direct simulation: walkers go on until they leave."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.checkpoint import Slot
+from vibrokit.analyzers.mfet.walk import Walk, Walkers
+from vibrokit.kernels.ensemble import Stop
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED
+from vibrokit.progress import report, stage
+
+_MORE = 1.25  # walkers for each exit that is wanted: the last of them would take long, and they are not waited for
+_PART = 8  # a round lasts as long as that part of all rounds before it
+_SHORTEST = 5.0  # relaxations of a round: what leads out within one or two rounds can be repeated
+_KEPT, _KEPT_AT_LEAST, _KEPT_AT_MOST = 5.0, 16, 128  # relaxations and section intervals before an exit
+_SAMPLES = 16  # states in a section interval on the way out
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Exits:
+    """What some walkers have done so far.
+
+    Attributes
+    ----------
+    tests : int64 array (count,)
+        Exit tests until each exit, in ascending order.
+    targets : int64 array (count,)
+        Label of the attractor that each exit leads to; −1 for an exit that is no attractor.
+    at_risk : int
+        Exit tests of all walkers together, also of those that have not left.
+    censored : int
+        Walkers that have not left.
+    """
+
+    tests: Whole
+    targets: Whole
+    at_risk: int
+    censored: int
+
+    def __len__(self) -> int:
+        return len(self.tests)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Escapes:
+    """Realizations on their way out, aligned at the exit.
+
+    Attributes
+    ----------
+    times : array (samples,)
+        Time since the exit (s), up to 0.
+    paths : array (count, samples, 2)
+        x and v; NaN before the start of a walker.
+    targets : int64 array (count,)
+    """
+
+    times: Array
+    paths: Array
+    targets: Whole
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _State:
+    """All walkers. `earlier_…` are those at the beginning of the round before the last, and of the last."""
+
+    states: Array
+    streams: NDArray[np.uint64]
+    tests: Whole  # exit tests so far
+    status: Whole
+    targets: Whole
+    earlier_states: Array
+    earlier_streams: NDArray[np.uint64]
+    earlier_tests: Whole
+
+
+class DirectRun:
+    """Simulation of exits, which can be stopped and goes on where it was.
+
+    It ends with the first round after which the wanted number of walkers have left. The others are censored at that
+    time, all at the same one, so that nothing waits for the last walkers, and the estimate is unbiased for exponential
+    times.
+
+    Parameters
+    ----------
+    walk : Walk
+    wanted : int
+        Exits.
+    begun : Walkers
+    slot : Slot
+        Where the state is kept.
+    """
+
+    def __init__(self, walk: Walk, wanted: int, begun: Walkers, slot: Slot) -> None:
+        self.walk, self.wanted, self.slot = walk, wanted, slot
+        count = len(begun)
+        none = np.zeros(count, dtype=np.int64)
+        self.state = _State(
+            begun.states, begun.streams, none, np.full(count, COMPLETED, dtype=np.int64), none - 1,
+            np.stack([begun.states] * 2), np.stack([begun.streams] * 2), np.stack([none] * 2),
+        )  # fmt: skip
+        known = slot.read([field.name for field in dataclasses.fields(_State)])
+        if known is not None:
+            self.state = _State(**known)
+
+    @staticmethod
+    def walkers_for(wanted: int) -> int:
+        """Return how many walkers begin."""
+        return math.ceil(_MORE * wanted)
+
+    @property
+    def left(self) -> int:
+        """Walkers that have left."""
+        return int((self.state.status != COMPLETED).sum())
+
+    @property
+    def at_risk(self) -> float:
+        """Section intervals of all walkers."""
+        return float(self.state.tests.sum()) / self.walk.checks
+
+    @property
+    def done(self) -> bool:
+        """Whether as many have left as are wanted."""
+        return self.left >= self.wanted
+
+    def run(self, most: float = math.inf, hopeless: float = math.inf) -> bool:
+        """Go on until it is done; return False if direct simulation would take too long.
+
+        That is so if, after `most` section intervals of all walkers, the expected number exceeds `hopeless`.
+        """
+        with stage("direct simulation", unit="exits", total=self.wanted):
+            while not self.done:
+                report(self.left, self.wanted)
+                if self.at_risk > most and self.at_risk * self.wanted > hopeless * max(self.left, 1):
+                    return False
+                self.state = self._later()
+                self.slot.write(vars(self.state))
+            report(self.wanted, self.wanted)
+        return True
+
+    def _later(self) -> _State:
+        """The state one round later, all in new arrays, so that an interrupt leaves that of the round before."""
+        now, checks = self.state, self.walk.checks
+        alive = np.flatnonzero(now.status == COMPLETED)
+        passed = int(now.tests[alive].max()) // checks
+        shortest = math.ceil(_SHORTEST * self.walk.relaxation)
+        sections = min(max(shortest, passed // _PART), self.walk.sections_at_once(len(alive)))
+        ended = self.walk.advance(Walkers(now.states[alive], now.streams[alive]), sections)
+        later = _State(*(value.copy() for value in vars(now).values()))
+        for earlier, current in (
+            (later.earlier_states, now.states), (later.earlier_streams, now.streams), (later.earlier_tests, now.tests),
+        ):  # fmt: skip
+            earlier[0, alive], earlier[1, alive] = earlier[1, alive], current[alive]
+        later.states[alive], later.streams[alive] = ended.states, ended.streams
+        later.status[alive], later.targets[alive] = ended.status, ended.label
+        later.tests[alive] += ended.intervals + (ended.status == DIVERGED)
+        return later
+
+    def exits(self) -> Exits:
+        """Return what has happened so far."""
+        tests = self.state.tests
+        gone = self._in_order()
+        return Exits(tests[gone], self.state.targets[gone], int(tests.sum()), len(tests) - len(gone))
+
+    def escapes(self, most: int) -> Escapes:
+        """Repeat the last part of the first walkers that have left, with states between the sections."""
+        walk, state = self.walk, self.state
+        gone = self._in_order()[:most]
+        sections = min(math.ceil(_KEPT * walk.relaxation) + _KEPT_AT_LEAST, _KEPT_AT_MOST)
+        pieces = walk.pieces(_SAMPLES)
+        left = state.tests[gone] - state.earlier_tests[0, gone]
+        ahead = np.maximum(left - sections * walk.checks, 0)
+        ahead -= ahead % walk.checks
+        start = Walkers(state.earlier_states[0, gone], state.earlier_streams[0, gone])
+        begun = walk.advance(start, ahead // walk.checks, stop=Stop())
+        count = (sections + 1) * walk.checks * pieces
+        tests = np.minimum((left - ahead) * pieces, count)
+        ended = walk.tested(Walkers(begun.states, begun.streams), tests, Stop(), visits=count, pieces=pieces)
+        paths = np.full((len(gone), count + 1, 2), np.nan)
+        for number, (length, first) in enumerate(zip(tests, begun.states, strict=True)):
+            paths[number, count - length] = first[:2]
+            paths[number, count + 1 - length :] = ended.visits[number, :length, :2]
+        spacing = walk.interval / pieces
+        return Escapes(spacing * np.arange(-count, 1.0), paths, state.targets[gone])
+
+    def _in_order(self) -> Whole:
+        """The walkers that have left, in the order of their exits."""
+        gone = np.flatnonzero(self.state.status != COMPLETED)
+        return gone[np.argsort(self.state.tests[gone], kind="stable")]

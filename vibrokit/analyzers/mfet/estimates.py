@@ -1,0 +1,62 @@
+"""Rates from exit times, with confidence intervals, and the test for an exponential law."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from scipy import stats
+
+from vibrokit.analyzers.mfet.direct import Exits
+
+CONFIDENCE = 0.95
+"""Of all intervals."""
+
+_FEWEST = 20  # exits for which the law is tested
+
+
+@dataclasses.dataclass(frozen=True)
+class RateEstimate:
+    """ln of the number of exits in an interval between tests, its standard error, and its confidence interval."""
+
+    log_value: float
+    log_error: float
+    log_lower: float
+    log_upper: float
+
+
+def rate_of(count: int, at_risk: float) -> RateEstimate:
+    """Return the maximum-likelihood estimate from a number of exits in some time, of exponential exit times.
+
+    The interval is the exact one of a Poisson number. With no exit, the estimate is −∞ and the upper end a bound.
+    """
+    tail = (1.0 - CONFIDENCE) / 2.0
+    upper = stats.chi2.ppf(1.0 - (tail if count else 2.0 * tail), 2 * count + 2) / 2.0 / at_risk
+    if count == 0:
+        return RateEstimate(-math.inf, math.inf, -math.inf, math.log(upper))
+    lower = stats.chi2.ppf(tail, 2 * count) / 2.0 / at_risk
+    return RateEstimate(math.log(count / at_risk), count**-0.5, math.log(lower), math.log(upper))
+
+
+def rate_around(log_value: float, relative_error: float, count: int) -> RateEstimate:
+    """Return the estimate that is the mean of a number of independent ones, with Student's interval for its ln."""
+    factor = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1))
+    spread = math.log1p(factor * relative_error)
+    return RateEstimate(log_value, relative_error, log_value - spread, log_value + spread)
+
+
+def exponential_p_value(exits: Exits, seed: int) -> float:
+    """Return the probability of exit times that deviate more from an exponential law, whatever its mean.
+
+    The total times on test at the exits, over that at the last one, are those of independent uniform numbers in order
+    (Epstein & Sobel, J. Am. Stat. Assoc. 48, 486, 1953), also if other walkers have not left. Kolmogorov's test
+    compares them. A time is known to one interval between tests, in which it is drawn. NaN with fewer than 20 exits.
+    """
+    count = len(exits)
+    if count < _FEWEST:
+        return math.nan
+    times = np.sort(exits.tests - np.random.default_rng(seed).random(count))
+    remaining = count + exits.censored - np.arange(count)
+    on_test = np.cumsum(np.diff(times, prepend=0.0) * remaining)
+    return float(stats.kstest(on_test[:-1] / on_test[-1], "uniform").pvalue)

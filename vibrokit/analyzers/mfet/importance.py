@@ -1,0 +1,123 @@
+"""Importance functions: how far a state is on its way out. Any of them gives unbiased rates."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from vibrokit.analyzers.mfet.walk import Walk
+from vibrokit.analyzers.neighbourhoods import metrics_of, nearest
+from vibrokit.analyzers.paths.local_potential import potential_along
+from vibrokit.kernels.climbing import climb
+from vibrokit.results.attractor import Attractor
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
+
+_NODES = 160  # of the score from distances, along each side
+_BEYOND = 0.25  # of the region's widths, on each side of it
+_DEPTH = 20.0  # where it is not known
+_TIMES = 16  # in a section interval
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Importance:
+    """A score on nodes and at several times, larger the closer a state is to an exit.
+
+    Attributes
+    ----------
+    times : array (stages,)
+        In section intervals after the section, ascending from 0.
+    x, v : array (nx,), (nv,)
+    values : array (stages, nx, nv)
+    depth : float
+        ln of the probability to leave, from the attractor to the exit; a guess if it is not known.
+    """
+
+    times: Array
+    x: Array
+    v: Array
+    values: Array
+    depth: float
+
+    def records(self, visits: Array, counts: Whole, phases: Whole, looks: int, highest: Array) -> Array:
+        """Return the scores of states that are higher than all before in their row, −∞ elsewhere; raise `highest`.
+
+        Parameters
+        ----------
+        visits : array (count, most, n)
+        counts : int64 array (count,)
+            How many states each row has.
+        phases : int64 array (count,)
+            Looks from a section to the start of each row.
+        looks : int
+            In a section interval.
+        highest : array (count,)
+            Changed in place.
+        """
+        scores = np.empty(visits.shape[:2])
+        climb(visits, counts, phases, looks, self.times, self.x, self.v, self.values, highest, scores)
+        return scores
+
+
+def from_committor(times: Array, x: Array, v: Array, logs: Array, points: Array) -> Importance:
+    """Return ln of the probability to leave before a return to the core; where it is NaN, the nearest known value.
+
+    Parameters
+    ----------
+    times : array (stages,)
+        In section intervals.
+    x, v : array (nx,), (nv,)
+    logs : array (stages, nx, nv)
+    points : array (count, n)
+        Of the attractor, on the section.
+    """
+    filled = np.empty_like(logs)
+    for stage, known in zip(filled, logs, strict=True):
+        nodes = distance_transform_edt(np.isnan(known), return_distances=False, return_indices=True)
+        stage[:] = known[tuple(nodes)]
+    (i, j) = (np.abs(axis[:, None] - points[:, k]).argmin(axis=0) for k, axis in enumerate((x, v)))
+    return Importance(times, x, v, filled, max(1.0, float(-filled[0, i, j].min())))
+
+
+def from_distances(walk: Walk) -> Importance:
+    """Return a / (a + b), with the squared distances a from the attractor and b from the nearest other one.
+
+    Distances are in standard deviations of the densities around the attractors, which move with the forcing. This is a
+    score where no density is at hand; the more the motion turns on its way out, the less good.
+    """
+    region = walk.problem.structure.basins.region
+    x, v = (
+        np.linspace(low - _BEYOND * (high - low), high + _BEYOND * (high - low), _NODES)
+        for low, high in (region.x, region.v)
+    )
+    nodes = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
+    times = np.arange(_TIMES + 1) / _TIMES
+    own = _distances(walk, walk.problem.attractor, nodes)
+    others = [_distances(walk, a, nodes) for a in walk.problem.structure.attractors if a.label != walk.problem.source]
+    to_others = np.min(others, axis=0) if others else np.full_like(own, own.max())
+    values = own / (own + to_others)
+    return Importance(times, x, v, np.concatenate([values, values[:1]]), _DEPTH)
+
+
+def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:
+    """Squared distances of nodes from an attractor at the times of a section interval, shape (times, nx, nv)."""
+    if not attractor.is_fixed:
+        stop = walk.around([attractor])
+        return np.repeat(nearest(nodes, stop.points, stop.metrics)[None], _TIMES, axis=0)
+    stepper = walk.problem.single_stepper(Flow.LINEARISED)
+    orbit = refine_orbit(walk.problem.osc, attractor.points[0], attractor.period, stepper)
+    phases = potential_along(walk.problem.osc, orbit, stepper)
+    found = []
+    for first in range(_TIMES):
+        here = phases[first::_TIMES]
+        covariances = walk.intensity * np.array([phase.covariance[:2, :2] for phase in here])
+        least = 1e-9 * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+        points = np.array([phase.point[:2] for phase in here])
+        found.append(nearest(nodes, points, metrics_of(attractor, covariances, least)))
+    return np.array(found)

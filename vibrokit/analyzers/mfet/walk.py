@@ -1,0 +1,251 @@
+"""Walk: the motion with noise around one attractor, and the tests that end it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.neighbourhoods import CORE_SIZE, metrics_of, nearest, relaxation_of
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.kernels.ensemble import UNBOUNDED, Ensemble, Stop, run_ensemble
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.streams import streams_of
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Attractor
+from vibrokit.symbolic.flow_kind import Flow
+
+_LEAST = 1 / 60  # semi-axes of the core of motion that never repeats, in widths of the region
+_FORGETS = 5.0  # relaxations after which the start on the orbit is forgotten to e⁻⁵ of the deviations
+_ATTEMPTS = 20  # to get so far without leaving: 0.95 of the walks succeed if the mean exit time is one relaxation
+# Looks at an excursion in a relaxation, in units of the depth. On a double well of damping 0.2 and ΔU/D = 25, ln of the
+# estimates of replicas spreads by 1.8 with 0.5, 1.0 with 1, 0.8 with 2 and 0.8 with 4; each takes half as long again.
+_LOOKS = 2.0
+_POWERS = tuple(2**n for n in range(9))
+_SHORTEST = 0.05  # section intervals of a relaxation that is followed
+_MOST_STEPS = 2e8  # of all walks between two reports: a second or two
+
+Array = NDArray[np.float64]
+Words = NDArray[np.uint64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walkers:
+    """States on the section, and the random streams that go on from there.
+
+    Attributes
+    ----------
+    states : array (count, n)
+    streams : uint64 array (count, 4)
+    """
+
+    states: Array
+    streams: Words
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __getitem__(self, which: NDArray[np.int64] | slice) -> Walkers:
+        return Walkers(self.states[which], self.streams[which])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Walk:
+    """The motion with noise around one attractor, at one intensity.
+
+    Attributes
+    ----------
+    problem : ExitProblem
+    intensity : float
+        D (m² s⁻³).
+    seed : int
+    stepper : Stepper
+    covariances : mapping of int to array (count, 2, 2)
+        By label: the stationary covariances per unit D at the points of each attractor.
+    """
+
+    problem: ExitProblem
+    intensity: float
+    seed: int
+    stepper: Stepper
+    covariances: Mapping[int, Array]
+
+    @cached_property
+    def scene(self) -> Oscillator:
+        """The oscillator with this intensity."""
+        osc = self.problem.osc
+        assert osc.noise is not None  # every analyzer checks that
+        return dataclasses.replace(osc, noise=dataclasses.replace(osc.noise, intensity=self.intensity))
+
+    @property
+    def checks(self) -> int:
+        """Exit tests in a section interval."""
+        return self.problem.checks if self.problem.exit.by_position else 1
+
+    @property
+    def interval(self) -> float:
+        """Time between two exit tests (s)."""
+        return self.scene.section_interval / self.checks
+
+    @cached_property
+    def relaxation(self) -> float:
+        """Section intervals in which deviations from the attractor fall by a factor e."""
+        return relaxation_of(self.problem.attractor)
+
+    @cached_property
+    def stop(self) -> Stop:
+        """The test for the exit."""
+        exit_ = self.problem.exit
+        if exit_.by_position:
+            return dataclasses.replace(self.problem.stop, between=True, every=self.checks)
+        if exit_.at_boundary:
+            return dataclasses.replace(self.problem.stop, region=UNBOUNDED)
+        return self.arrival
+
+    @cached_property
+    def arrival(self) -> Stop:
+        """The test for being in the core of another attractor, on the section."""
+        return self.around([a for a in self.problem.structure.attractors if a.label != self.problem.source])
+
+    @cached_property
+    def own(self) -> Stop:
+        """The test for being in the attractor's own core, on the section."""
+        return self.around([self.problem.attractor])
+
+    @cached_property
+    def stop_or_return(self) -> Stop:
+        """The test for the exit, and for being in the attractor's own core on the section."""
+        stop, own = self.stop, self.own
+        return dataclasses.replace(
+            stop,
+            points=np.concatenate([stop.points, own.points]),
+            point_labels=np.concatenate([stop.point_labels, own.point_labels]),
+            metrics=np.concatenate([stop.metrics, own.metrics]),
+        )
+
+    def at_home(self, states: Array) -> NDArray[np.bool_]:
+        """Return which states (…, n) on the section are in the attractor's core."""
+        own = self.own
+        inside: NDArray[np.bool_] = nearest(states[..., :2], own.points, own.metrics) <= 1
+        return inside
+
+    def from_attractor(self, attractor: Attractor, count: int, *key: int) -> Walkers:
+        """Return walkers on the points of an attractor; the key chooses their random streams."""
+        places = np.arange(count) % len(attractor.points)
+        return Walkers(attractor.points[places], streams_of(self.key(*key), np.arange(count)))
+
+    def key(self, *numbers: int) -> int:
+        """Return the seed of the streams of one purpose."""
+        entropy = [self.seed, self.problem.source, *np.array([self.intensity]).view(np.uint32).tolist(), *numbers]
+        return int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+    def settled(self, count: int, *key: int) -> Walkers:
+        """Return walkers of the quasi-stationary state: on the section, having forgotten that they began on the orbit.
+
+        A walker that leaves meanwhile begins again.
+
+        Raises
+        ------
+        StructureError
+            The attractor is left before its orbit is forgotten.
+        """
+        begun = self.from_attractor(self.problem.attractor, count, *key)
+        states, streams = begun.states.copy(), begun.streams.copy()
+        waiting = np.arange(count)
+        sections = math.ceil(_FORGETS * self.relaxation)
+        for _ in range(_ATTEMPTS):
+            ended = self.advance(Walkers(begun.states[waiting], streams[waiting]), sections)
+            streams[waiting] = ended.streams
+            good = ended.status == COMPLETED
+            states[waiting[good]] = ended.states[good]
+            waiting = waiting[~good]
+            if not len(waiting):
+                return Walkers(states, streams)
+        raise StructureError(
+            f"at D = {self.intensity:g} motion leaves the attractor before it has forgotten its start: there is no "
+            "metastable state to leave; lower the noise intensity."
+        )
+
+    def advance(
+        self, walkers: Walkers, sections: int | NDArray[np.int64], stop: Stop | None = None, visits: int = 0
+    ) -> Ensemble:
+        """Advance walkers over some section intervals, or until a test ends them; by default that for the exit."""
+        return self.tested(walkers, sections * self.checks, self.stop if stop is None else stop, visits)
+
+    def tested(
+        self, walkers: Walkers, tests: int | NDArray[np.int64], stop: Stop, visits: int = 0, pieces: int = 1
+    ) -> Ensemble:
+        """Advance walkers over some intervals between tests, each made of several pieces.
+
+        `visits` then holds states after each piece; without pieces, after each section interval.
+        """
+        return run_ensemble(
+            self.scene, Flow.NOISY, self.stepper, walkers.states, tests,
+            stop=stop, interval=self.interval / pieces, streams=walkers.streams, visits=visits,
+            keep=1 if pieces > 1 else self.checks, executor=self.problem.executor,
+        )  # fmt: skip
+
+    def pieced(
+        self, walkers: Walkers, count: int, pieces: int, phases: NDArray[np.int64], visits: int, keep: int
+    ) -> Ensemble:
+        """Advance walkers that are between sections until they leave or are in the core, or over `count` pieces.
+
+        Parameters
+        ----------
+        walkers : Walkers
+        count : int
+        pieces : int
+            In a section interval.
+        phases : int64 array
+            Pieces from a section to the start of each walker.
+        visits, keep : int
+            How many states are kept, one every `keep` pieces.
+        """
+        return run_ensemble(
+            self.scene, Flow.NOISY, self.stepper, walkers.states, count,
+            stop=dataclasses.replace(self.stop_or_return, every=pieces),
+            interval=self.scene.section_interval / pieces, streams=walkers.streams, phases=phases,
+            visits=visits, keep=keep, executor=self.problem.executor,
+        )  # fmt: skip
+
+    def looks(self, depth: float) -> int:
+        """Return how often an excursion that climbs so far is looked at in a section interval: a power of two.
+
+        On its way out, ln of the probability to leave grows by less than one between two looks. Exit tests and time
+        steps are multiples of these intervals.
+        """
+        steps = self.stepper.steps_in(self.scene, self.scene.section_interval)
+        wanted = _LOOKS * depth / relaxation_of(self.problem.attractor, least=_SHORTEST)
+        most = self.checks if self.problem.exit.by_position else steps
+        allowed = [n for n in _POWERS if most % n == 0 and steps % n == 0]
+        return min((n for n in allowed if n >= wanted), default=max(allowed))
+
+    def pieces(self, most: int) -> int:
+        """Return into how many pieces the interval between tests can be divided without a change of the steps."""
+        steps = self.stepper.steps_in(self.scene, self.interval)
+        return max(n for n in range(1, max(1, most // self.checks) + 1) if steps % n == 0)
+
+    def sections_at_once(self, count: int) -> int:
+        """Return the section intervals that some walkers may be advanced between two reports."""
+        steps = max(1, self.stepper.steps_in(self.scene, self.scene.section_interval))
+        return max(1, int(_MOST_STEPS / (steps * max(count, 1))))
+
+    def around(self, attractors: Sequence[Attractor]) -> Stop:
+        """Return the test for being in the core of one of some attractors, on the section."""
+        region = self.problem.structure.basins.region
+        widths = _LEAST * np.array([np.ptp(region.x), np.ptp(region.v)])
+        points, metrics = [np.empty((0, 2))], [np.empty((0, 2, 2))]
+        labels = [np.empty(0, dtype=np.int64)]
+        for attractor in attractors:
+            covariances = CORE_SIZE**2 * self.intensity * self.covariances[attractor.label]
+            least = np.tile(1e-9 * widths if attractor.is_fixed else widths, (len(covariances), 1))
+            points.append(attractor.points[:, :2])
+            metrics.append(metrics_of(attractor, covariances, least))
+            labels.append(np.full(len(covariances), attractor.label, dtype=np.int64))
+        return Stop(points=np.concatenate(points), point_labels=np.concatenate(labels), metrics=np.concatenate(metrics))

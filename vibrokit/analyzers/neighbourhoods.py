@@ -1,0 +1,89 @@
+"""Neighbourhoods of attractors: how far noise spreads the motion around them, and how fast that is forgotten."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from vibrokit.analyzers.paths.local_potential import local_potential
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.results.attractor import Attractor
+from vibrokit.structure.linear_map import gaussian_map
+from vibrokit.structure.orbits import refine_orbit
+from vibrokit.symbolic.flow_kind import Flow
+
+CORE_SIZE = 1.0
+"""Semi-axes of an attractor's core in standard deviations of the density around it: it holds 39 % of that."""
+
+_FEW = 64  # centres, each with its own ellipse
+_SINGULAR = 1e-12  # 1 − correlation², as rounding errors may leave of 0
+_RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
+
+Array = NDArray[np.float64]
+
+
+def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
+    """Return the stationary covariances of x and v per unit D at the points of an attractor, shape (count, 2, 2).
+
+    They are 0 for an attractor that never repeats: its points are a set of their own.
+
+    Raises
+    ------
+    StructureError
+        The orbit is not stable, or noise does not make it spread.
+    """
+    if not attractor.is_fixed:
+        return np.zeros((len(attractor.points), 2, 2))
+    stepper = problem.single_stepper(Flow.LINEARISED)
+    orbit = refine_orbit(problem.osc, attractor.points[0], attractor.period, stepper)
+    covariances = [local_potential(problem.osc, orbit, stepper).covariance]
+    for point in attractor.points[:-1]:
+        step = gaussian_map(problem.osc, point[None], stepper)
+        covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
+    found = np.array(covariances)[:, :2, :2]
+    if not np.all(np.linalg.det(found) > _SINGULAR * found[:, 0, 0] * found[:, 1, 1]):
+        raise StructureError("the noise is 0 on the attractor or nearly so: the density around it has no width.")
+    return found
+
+
+def metrics_of(attractor: Attractor, covariances: Array, least: Array) -> Array:
+    """Return a matrix R for each point, so that |R δq| ≤ 1 is an ellipse with the shape of the covariance.
+
+    No semi-axis is below `least`, array (count, 2) in x and v; for motion that never repeats the largest of these holds
+    everywhere.
+    """
+    widths = least if attractor.is_fixed else np.broadcast_to(least.max(axis=0), least.shape)
+    scales = widths[:, :, None] * widths[:, None, :]
+    variances, axes = np.linalg.eigh(covariances / scales)
+    widened = np.einsum("nij,nj,nkj->nik", axes, np.maximum(variances, 1.0), axes) * scales
+    return np.linalg.cholesky(np.linalg.inv(widened)).transpose(0, 2, 1)
+
+
+def relaxation_of(attractor: Attractor, least: float = 1.0) -> float:
+    """Return the section intervals in which deviations of the density around an attractor fall by a factor e."""
+    largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
+    if not 0.0 < largest < 1.0 or not attractor.is_fixed:
+        return _RELAXATION
+    return max(least, -max(attractor.period, 1) / math.log(largest))
+
+
+def nearest(states: Array, centres: Array, roots: Array) -> Array:
+    """Return the least |R (q − c)|² over centres c with their matrices R, at each state q, shape (…).
+
+    Parameters
+    ----------
+    states : array (…, 2)
+    centres : array (count, 2)
+    roots : array (count, 2, 2)
+        If there are more than a few centres, the first R is used for all.
+    """
+    if len(centres) > _FEW:
+        distances: Array = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0]
+        return distances**2
+    each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
+    return functools.reduce(np.minimum, each)

@@ -1,0 +1,93 @@
+"""The Arrhenius law ln τ = ln τ₀ + ΔU/D, fitted to exit rates at several noise intensities."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import StructureError
+from vibrokit.results.exit_rate import ExitRate
+
+_DEVIATIONS = 1.96  # of the normal law, for intervals of 95 %
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ArrheniusFit:
+    """A straight line through ln τ against 1/D, each point with the weight of its error.
+
+    Attributes
+    ----------
+    slope, slope_error : float
+        d ln τ/d(1/D) (m² s⁻³) and its standard error. It tends to ΔU as D → 0.
+    log_prefactor, log_prefactor_error : float
+        ln τ₀, τ₀ in s.
+    intensities : array (count,)
+        D (m² s⁻³), descending.
+    log_times, errors : array (count,)
+        ln τ and its standard errors.
+    curvature, curvature_error : float
+        Of ln τ against 1/D (m⁴ s⁻⁶), by a parabola; NaN with fewer than three intensities.
+    """
+
+    slope: float
+    slope_error: float
+    log_prefactor: float
+    log_prefactor_error: float
+    intensities: Array
+    log_times: Array
+    errors: Array
+    curvature: float
+    curvature_error: float
+
+    @classmethod
+    def of(cls, rates: Sequence[ExitRate]) -> ArrheniusFit:
+        """Fit the rates of one exit; raises StructureError unless there are two intensities or more."""
+        known = sorted(rates, key=lambda rate: -rate.intensity)
+        intensities = np.array([rate.intensity for rate in known])
+        if len(np.unique(intensities)) < 2 or len(np.unique(intensities)) < len(known):
+            raise StructureError(
+                f"a fit needs the rates of one exit at two noise intensities or more, got {len(known)} rates at "
+                f"{len(np.unique(intensities))} intensities."
+            )
+        log_times = np.array([-rate.log_value for rate in known])
+        errors = np.maximum([rate.log_error for rate in known], 1e-12)
+        line, spread = _fitted(1 / intensities, log_times, errors, 1)
+        curvature, curvature_error = math.nan, math.nan
+        if len(known) > 2:
+            parabola, around = _fitted(1 / intensities, log_times, errors, 2)
+            curvature, curvature_error = 2 * float(parabola[2]), 2 * float(around[2])
+        return cls(
+            float(line[1]), float(spread[1]), float(line[0]), float(spread[0]),
+            intensities, log_times, errors, curvature, curvature_error,
+        )  # fmt: skip
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The slope's interval of 95 % (m² s⁻³), if the line is straight."""
+        return self.slope - _DEVIATIONS * self.slope_error, self.slope + _DEVIATIONS * self.slope_error
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the slope changes with D by more than its errors allow: then it is not yet ΔU."""
+        return abs(self.curvature) > _DEVIATIONS * self.curvature_error
+
+    @property
+    def local_slopes(self) -> tuple[Array, Array]:
+        """Slopes between neighbouring intensities, and their standard errors, shape (count − 1,)."""
+        steps = np.diff(1 / self.intensities)
+        return np.diff(self.log_times) / steps, np.hypot(self.errors[1:], self.errors[:-1]) / steps
+
+
+def _fitted(places: Array, values: Array, errors: Array, degree: int) -> tuple[Array, Array]:
+    """Coefficients of a weighted polynomial, the constant first, and their standard errors from the known errors."""
+    scale = places.max()
+    matrix = np.vander(places / scale, degree + 1, increasing=True) / errors[:, None]
+    inverse = np.linalg.pinv(matrix)
+    units = scale ** -np.arange(degree + 1.0)
+    return inverse @ (values / errors) * units, np.linalg.norm(inverse, axis=1) * units

@@ -1,0 +1,145 @@
+"""Results with exit rates at several noise intensities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import xarray
+
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.labels import exit_between, label_of, source_among
+from vibrokit.results.result import Result
+
+if TYPE_CHECKING:
+    from vibrokit.plots.exit_times import ExitTimeArtists, ExitTimes, SlopeArtists
+
+
+class RatedResult(Result):
+    """Exit rates at finite noise, and activation energies.
+
+    `data` has, along ``source``: ``log_rate`` and ``log_rate_error`` over (``intensity_index``, ``exit_index``),
+    ``rate_target`` over ``exit_index``, ``rate_intensity`` and ``rate_method`` over ``intensity_index``, and
+    ``rate_event``.
+    """
+
+    kind: ClassVar[str] = "rates"
+
+    @property
+    def intensities(self) -> list[float]:
+        """Noise intensities D (m² s⁻³) of the analysis, descending."""
+        if "rate_intensity" not in self.data:
+            return []
+        values = Arrays(self.data).numbers("rate_intensity", (None, None), finite=False)
+        known: list[float] = np.unique(values[np.isfinite(values)])[::-1].tolist()
+        return known
+
+    @property
+    def rates(self) -> tuple[ExitRate, ...]:
+        """Exit rates of all attractors at all intensities."""
+        arrays = Arrays(self.data)
+        if "log_rate" not in arrays:
+            return ()
+        labels = arrays.wholes("source", (None,), 0, len(self.names) - 1).tolist()
+        values, errors = (
+            arrays.numbers(name, (len(labels), None, None), finite=False) for name in ("log_rate", "log_rate_error")
+        )
+        intensities = arrays.numbers("rate_intensity", values.shape[:2], finite=False)
+        methods = np.reshape(arrays.words("rate_method", values.shape[:2]), values.shape[:2])
+        targets = arrays.wholes("rate_target", (values.shape[0], values.shape[2]), -1, len(self.names) - 1)
+        events = arrays.words("rate_event", (len(labels),))
+        known = np.argwhere(np.isfinite(values) & np.isfinite(errors)).tolist()
+        return tuple(
+            ExitRate(
+                labels[s], int(targets[s, k]), float(intensities[s, i]), float(values[s, i, k]),
+                float(errors[s, i, k]), events[s], str(methods[s, i]),
+            )
+            for s, i, k in known
+        )  # fmt: skip
+
+    @property
+    def log_rates(self) -> xarray.DataArray:
+        """ln of the rates (s⁻¹) over (intensity, source, target), by names; −∞ where no rate is known."""
+        known, names = self.intensities, list(self.names)
+        values = np.full((len(known), len(names), len(names)), -np.inf)
+        for rate in self.rates:
+            if rate.target >= 0:
+                values[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
+        coordinates = {"intensity": known, "source": names, "target": names}
+        return xarray.DataArray(values, coordinates, ("intensity", "source", "target"), "log_rates")
+
+    def arrhenius(self, source: int | str, target: int | str | None = None) -> ArrheniusFit:
+        """Fit the Arrhenius law to the rates of one exit.
+
+        Parameters
+        ----------
+        source : int or str
+        target : int or str, optional
+            By default the only one, or an exit that is no attractor.
+
+        Raises
+        ------
+        StructureError
+            There is no such exit, or there are not two intensities.
+        """
+        label = source_among({rate.source for rate in self.rates}, source, self.names, "rate", "of")
+        own = [rate for rate in self.rates if rate.source == label]
+        reached = sorted({rate.target for rate in own})
+        wanted = reached[0] if target is None else label_of(target, self.names) if target != -1 else -1
+        return ArrheniusFit.of([rate for rate in own if rate.target == wanted])
+
+    def plot_rates(self, ax: Any = None, source: int | str | None = None) -> ExitTimeArtists:
+        """Draw ln τ against 1/D, τ = 1/rate; see `vibrokit.plots.exit_times.exit_times`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        source : int or str, optional
+            By default all attractors.
+        """
+        from vibrokit.plots.exit_times import exit_times
+
+        return exit_times(self._exit_times(source), ax=ax)
+
+    def plot_slopes(
+        self, ax: Any = None, source: int | str | None = None, limits: Iterable[ActivationEnergy] = ()
+    ) -> SlopeArtists:
+        """Draw d ln τ/d(1/D) against D; see `vibrokit.plots.exit_times.exit_slopes`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        source : int or str, optional
+            By default all attractors.
+        limits : iterable of ActivationEnergy
+            Drawn with their bounds; the slopes tend to them as D → 0. Those of `LeastAction` do not depend on D.
+        """
+        from vibrokit.plots.exit_times import exit_slopes
+
+        lines = [(e.source, f"{self.exit_of(e)}, {e.method}", e.value, e.lower, e.upper) for e in limits]
+        return exit_slopes(self._exit_times(source), lines, ax=ax)
+
+    def _exit_times(self, source: int | str | None) -> list[ExitTimes]:
+        """The mean times of every exit of one attractor, or of all, over intensity."""
+        from vibrokit.plots.exit_times import ExitTimes
+
+        found, rates = [], self.rates
+        if source is not None:
+            label = source_among({rate.source for rate in rates}, source, self.names, "rate", "of")
+            rates = tuple(rate for rate in rates if rate.source == label)
+        for start, target in dict.fromkeys((rate.source, rate.target) for rate in rates):
+            own = [rate for rate in rates if (rate.source, rate.target) == (start, target)]
+            found.append(
+                ExitTimes(
+                    [rate.intensity for rate in own],
+                    [-rate.log_value for rate in own],
+                    [rate.log_error for rate in own],
+                    start,
+                    exit_between(self.names, start, target),
+                )
+            )
+        return found
