@@ -25,8 +25,9 @@ from numba import njit
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.registers import use_widest_registers
 from vibrokit.kernels.rk4 import RK4
-from vibrokit.kernels.streams import normal_pairs, seed_lane, streams_of
+from vibrokit.kernels.streams import normal_pair, seed_lane, streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 SCENE = vibrokit.load_scene("hertz-0.570")
@@ -57,7 +58,15 @@ def smooth_drift(x, v, forcing):
 
 
 @njit(**FLAGS)
+def packed_normals(streams, u, w):
+    use_widest_registers()
+    for i in range(LANES):
+        u[i], w[i] = normal_pair(streams, i)
+
+
+@njit(**FLAGS)
 def packed_step(x, v, u, w, f0, f1, f2):
+    use_widest_registers()
     for i in range(LANES):
         q = x[i]
         p = v[i] + HALF_KICK * (u[i] + ROOT_THIRD * w[i])
@@ -83,7 +92,7 @@ def packed_ensemble(final, periods, seed, forcing):
         v[:] = 0.0
         for _ in range(periods):
             for step in range(STEPS):
-                normal_pairs(streams, u, w)
+                packed_normals(streams, u, w)
                 packed_step(x, v, u, w, forcing[2 * step], forcing[2 * step + 1], forcing[2 * step + 2])
         final[start : start + LANES] = x
 
