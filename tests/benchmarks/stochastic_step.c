@@ -14,7 +14,7 @@
 #define LAYERS 256
 static const double PI = 3.14159265358979323846;
 static const double DAMPING = 0.02, STIFFNESS = 50.0, GAP = 0.5; /* 2 zeta omega; omega = 1 */
-static const double AMPLITUDE = 0.18, FREQUENCY = 0.57, CONSTANT = 0.2, INTENSITY = 2e-5;
+static const double AMPLITUDE = 0.18, FREQUENCY = 0.57, CONSTANT = 0.2;
 
 /* Layer i lies under the density between heights f[i] and f[i+1] and is edge[i] wide; layer 0 is the base. */
 static double edge[LAYERS + 1], height[LAYERS + 1], width[LAYERS];
@@ -102,40 +102,59 @@ static inline double drift(double x, double v, double forcing) {
     return free_flight - copysign(STIFFNESS * depth * sqrt(depth), x);
 }
 
+typedef struct { double length, half_kick, forcing[2 * STEPS + 1]; } Steps;
+
+static Stream prepare(Steps *steps, double intensity, uint64_t seed) {
+    build_tables();
+    steps->length = 2.0 * PI / FREQUENCY / STEPS;
+    steps->half_kick = 0.5 * sqrt(intensity * steps->length);
+    for (int i = 0; i <= 2 * STEPS; i++) steps->forcing[i] = AMPLITUDE * cos(FREQUENCY * i * steps->length / 2) + CONSTANT;
+    Stream s;
+    s.a = split_mix(&seed), s.b = split_mix(&seed), s.c = split_mix(&seed), s.d = split_mix(&seed);
+    return s;
+}
+
+static inline void period(double *position, double *velocity, const Steps *steps, Stream *s) {
+    double x = *position, v = *velocity, h = steps->length, half = steps->half_kick;
+    for (long step = 0; step < STEPS; step++) {
+        const double *f = steps->forcing + 2 * step;
+        double u = normal(s), w = normal(s) * 0.57735026918962576;
+        v += half * (u + w);
+        double x1 = v, v1 = drift(x, v, f[0]);
+        double x2 = v + 0.5 * h * v1, v2 = drift(x + 0.5 * h * x1, x2, f[1]);
+        double x3 = v + 0.5 * h * v2, v3 = drift(x + 0.5 * h * x2, x3, f[1]);
+        double x4 = v + h * v3, v4 = drift(x + h * x3, x4, f[2]);
+        x += h / 6.0 * (x1 + 2.0 * (x2 + x3) + x4);
+        v += h / 6.0 * (v1 + 2.0 * (v2 + v3) + v4) + half * (u - w);
+    }
+    *position = x, *velocity = v;
+}
+
+static double nanoseconds_since(const struct timespec *start) {
+    struct timespec stop;
+    clock_gettime(CLOCK_MONOTONIC, &stop);
+    return 1e9 * (double)(stop.tv_sec - start->tv_sec) + (double)(stop.tv_nsec - start->tv_nsec);
+}
+
+#ifndef ESCAPES /* escapes.c has a main of its own */
 int main(int count, char **argument) {
     if (count != 4) return fprintf(stderr, "usage: stochastic_step TRAJECTORIES PERIODS SEED\n"), 2;
     long trajectories = atol(argument[1]), periods = atol(argument[2]);
-    static double forcing[2 * STEPS + 1];
-    double period = 2.0 * PI / FREQUENCY, h = period / STEPS;
-    double half = 0.5 * sqrt(INTENSITY * h), sum = 0.0, squares = 0.0;
-    struct timespec start, stop;
+    static Steps steps;
+    Stream s = prepare(&steps, 2e-5, strtoull(argument[3], NULL, 10));
+    double sum = 0.0, squares = 0.0;
+    struct timespec start;
 
-    build_tables();
-    uint64_t seed = strtoull(argument[3], NULL, 10);
-    Stream s;
-    s.a = split_mix(&seed), s.b = split_mix(&seed), s.c = split_mix(&seed), s.d = split_mix(&seed);
-    for (int i = 0; i <= 2 * STEPS; i++) forcing[i] = AMPLITUDE * cos(FREQUENCY * i * h / 2) + CONSTANT;
     clock_gettime(CLOCK_MONOTONIC, &start);
     for (long n = 0; n < trajectories; n++) {
         double x = 0.0, v = 0.0;
-        for (long step = 0; step < periods * STEPS; step++) {
-            const double *f = forcing + 2 * (step % STEPS);
-            double u = normal(&s), w = normal(&s) * 0.57735026918962576;
-            v += half * (u + w);
-            double x1 = v, v1 = drift(x, v, f[0]);
-            double x2 = v + 0.5 * h * v1, v2 = drift(x + 0.5 * h * x1, x2, f[1]);
-            double x3 = v + 0.5 * h * v2, v3 = drift(x + 0.5 * h * x2, x3, f[1]);
-            double x4 = v + h * v3, v4 = drift(x + h * x3, x4, f[2]);
-            x += h / 6.0 * (x1 + 2.0 * (x2 + x3) + x4);
-            v += h / 6.0 * (v1 + 2.0 * (v2 + v3) + v4) + half * (u - w);
-        }
+        for (long k = 0; k < periods; k++) period(&x, &v, &steps, &s);
         sum += x;
         squares += x * x;
     }
-    clock_gettime(CLOCK_MONOTONIC, &stop);
-    double nanoseconds = 1e9 * (double)(stop.tv_sec - start.tv_sec) + (double)(stop.tv_nsec - start.tv_nsec);
-    double mean = sum / (double)trajectories;
+    double nanoseconds = nanoseconds_since(&start), mean = sum / (double)trajectories;
     printf("%.6f %.17g %.17g\n", nanoseconds / ((double)trajectories * (double)periods * STEPS), mean,
            sqrt(fmax(squares / (double)trajectories - mean * mean, 0.0)));
     return 0;
 }
+#endif

@@ -25,8 +25,9 @@ from numba import njit
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.registers import use_widest_registers
 from vibrokit.kernels.rk4 import RK4
-from vibrokit.kernels.streams import normal_pairs, seed_lane, streams_of
+from vibrokit.kernels.streams import normal_pair, seed_lane, streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 SCENE = vibrokit.load_scene("hertz-0.570")
@@ -57,7 +58,15 @@ def smooth_drift(x, v, forcing):
 
 
 @njit(**FLAGS)
+def packed_normals(streams, u, w):
+    use_widest_registers()
+    for i in range(LANES):
+        u[i], w[i] = normal_pair(streams, i)
+
+
+@njit(**FLAGS)
 def packed_step(x, v, u, w, f0, f1, f2):
+    use_widest_registers()
     for i in range(LANES):
         q = x[i]
         p = v[i] + HALF_KICK * (u[i] + ROOT_THIRD * w[i])
@@ -83,7 +92,7 @@ def packed_ensemble(final, periods, seed, forcing):
         v[:] = 0.0
         for _ in range(periods):
             for step in range(STEPS):
-                normal_pairs(streams, u, w)
+                packed_normals(streams, u, w)
                 packed_step(x, v, u, w, forcing[2 * step], forcing[2 * step + 1], forcing[2 * step + 2])
         final[start : start + LANES] = x
 
@@ -101,8 +110,8 @@ def branching_drift(x, v, forcing):
 
 
 @njit(**FLAGS)
-def scalar_step(q, v, u, w, f0, f1, f2):
-    p = v + HALF_KICK * (u + ROOT_THIRD * w)
+def scalar_step(q, v, u, w, f0, f1, f2, half_kick):
+    p = v + half_kick * (u + ROOT_THIRD * w)
     a1 = branching_drift(q, p, f0)
     p2 = p + 0.5 * H * a1
     a2 = branching_drift(q + 0.5 * H * p, p2, f1)
@@ -111,7 +120,7 @@ def scalar_step(q, v, u, w, f0, f1, f2):
     p4 = p + H * a3
     a4 = branching_drift(q + H * p3, p4, f2)
     position = q + H / 6 * (p + 2 * (p2 + p3) + p4)
-    velocity = p + H / 6 * (a1 + 2 * (a2 + a3) + a4) + HALF_KICK * (u - ROOT_THIRD * w)
+    velocity = p + H / 6 * (a1 + 2 * (a2 + a3) + a4) + half_kick * (u - ROOT_THIRD * w)
     return position, velocity
 
 
@@ -124,7 +133,7 @@ def scalar_ensemble(final, periods, seed, forcing):
             for step in range(STEPS):
                 u, w = np.random.standard_normal(), np.random.standard_normal()  # noqa: NPY002
                 f0, f1, f2 = forcing[2 * step], forcing[2 * step + 1], forcing[2 * step + 2]
-                x, v = scalar_step(x, v, u, w, f0, f1, f2)
+                x, v = scalar_step(x, v, u, w, f0, f1, f2, HALF_KICK)
         final[n] = x
 
 
@@ -136,7 +145,7 @@ def scalar_ensemble_ziggurat(final, periods, rng, forcing):
             for step in range(STEPS):
                 u, w = rng.standard_normal(), rng.standard_normal()
                 f0, f1, f2 = forcing[2 * step], forcing[2 * step + 1], forcing[2 * step + 2]
-                x, v = scalar_step(x, v, u, w, f0, f1, f2)
+                x, v = scalar_step(x, v, u, w, f0, f1, f2, HALF_KICK)
         final[n] = x
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from numbers import Real
 from typing import ClassVar
@@ -34,10 +35,10 @@ _DEVIATIONS = 2.0  # standard errors on each side of an energy
 class MFET(Analyzer):
     """Mean first exit times by simulation, and activation energies from their dependence on D.
 
-    Walkers start in the quasi-stationary state of an attractor and go on until they leave. With `LeaveBasin`, that is
-    when they are in the core of another attractor on the section: an ellipse with the shape and the standard deviations
-    of the density around it. With `LeaveBasin(for_good=False)` it is the first section in another basin, and with an
-    exit by position the first time that satisfies the condition.
+    Walkers start in the core of an attractor and go on until they leave. A core is an ellipse on the section with the
+    shape and the standard deviations of the density around the attractor. With `LeaveBasin`, a walker has left when it
+    is in the core of another attractor. With `LeaveBasin(for_good=False)` it has left at the first section in another
+    basin, and with an exit by position at the first time that satisfies the condition.
 
     Where direct simulation would take too long, adaptive multilevel splitting gives the rate, down to e⁻¹⁰⁰ and below.
 
@@ -52,7 +53,7 @@ class MFET(Analyzer):
     splitting : bool, optional
         Whether to use splitting; by default where it is faster.
     from_orbit : bool
-        Whether walkers start on the attractor's orbit, in place of its quasi-stationary state. Splitting never does.
+        Whether walkers start on the attractor's orbit, in place of the density in its core. Splitting never does.
     escapes : int
         Realizations whose last part is kept at each intensity that is simulated directly.
 
@@ -63,9 +64,10 @@ class MFET(Analyzer):
 
     Notes
     -----
-    The rate of exits to a target is their number over the time that all walkers spent, the maximum-likelihood estimate
-    for exponential exit times; walkers that have not left count with their time. A quarter of the exits is simulated
-    again with half the steps: `MFETResult.step_change` is the difference in ln of the rate.
+    A rate is the inverse of the mean time, times the share of the target. Simulation ends when enough walkers have
+    left. Those that remain count with their time, and as if they went on to leave at the rate of the later exits. A
+    quarter of the exits is simulated again with half the steps: ``data["step_change"]`` is the difference in ln of the
+    rate.
 
     An activation energy is the slope of ln τ against 1/D. It is given only if the slope does not change with D by more
     than the errors of the rates allow.
@@ -149,7 +151,8 @@ def _importance(problem: ExitProblem, intensity: float) -> Importance | None:
     except (SceneError, StructureError):
         return None
     shares = found.times / problem.osc.section_interval
-    return from_committor(shares, found.grid.x, found.grid.v, found.log_values, problem.attractor.points)
+    known = from_committor(shares, found.grid.x, found.grid.v, found.log_values, problem.attractor.points)
+    return dataclasses.replace(known, depth=known.depth * found.intensity / intensity)
 
 
 def _energies(

@@ -12,6 +12,12 @@ _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
 _NORMALS = ("first", "second")
+_REGISTERS = "from vibrokit.kernels.registers import use_widest_registers"
+_DRAWING = (
+    "from vibrokit.kernels.streams import normal_pair", "", "",
+    "@njit(**INLINED)", "def draw_lanes(streams, first, second):", "    use_widest_registers()",
+    "    for lane in range(LANES):", "        first[lane], second[lane] = normal_pair(streams, lane)",
+)  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 
 
@@ -25,7 +31,10 @@ def lane_step(text: SceneText) -> str:
 
     `z` has shape (EQUATIONS, LANES); f0, f1, f2 is the forcing at the step's start, middle and end, the same for
     all lanes because they share the phase; first, second are two standard normals for each lane. A scene without
-    forcing and a flow without noise have no such arguments.
+    forcing and a flow without noise have no such arguments. `draw_lanes(streams, first, second)` draws the normals.
+
+    LLVM turns loops into vector code before it inlines, so each function here asks for wide registers itself, and knows
+    the number of lanes.
 
     The step is a classical Runge–Kutta step, between two kicks where there is noise. With U₁, U₂ standard normal,
     ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
@@ -34,7 +43,9 @@ def lane_step(text: SceneText) -> str:
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
     arguments = ["z", *(_FORCES if text.forced else []), *(_NORMALS if noisy else []), "theta", "h"]
-    lines = [f"LANES = {lane_count(text)}", "", "", "@njit(**INLINED)", f"def step_lanes({', '.join(arguments)}):"]
+    lines = [_REGISTERS, f"LANES = {lane_count(text)}", *(_DRAWING if noisy else []), "", ""]
+    lines += ["@njit(**INLINED)", f"def step_lanes({', '.join(arguments)}):"]
+    lines += ["    use_widest_registers()"]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]

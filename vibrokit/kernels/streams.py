@@ -187,18 +187,24 @@ def _normals(radius_word: _Word, angle_word: _Word) -> tuple[float, float]:
 
 
 @njit(nogil=True, cache=True)
-def normal_pairs(state: _Words, first: NDArray[np.float64], second: NDArray[np.float64]) -> None:
-    """Draw two independent standard normals for every lane.
+def normal_pair(state: _Words, lane: int) -> tuple[float, float]:
+    """Draw two independent standard normals for one lane.
 
-    The block's states, uint64[4, LANES], advance by two draws each. Normals reach |z| = 9.4, beyond which one falls
-    with probability 5e-21.
+    Of the block's states, uint64[4, LANES], the column `lane` advances by two draws. Normals reach |z| = 9.4, beyond
+    which one falls with probability 5e-21.
     """
+    s0, s1, s2, s3 = state[0, lane], state[1, lane], state[2, lane], state[3, lane]
+    radius_word, s0, s1, s2, s3 = _draw(s0, s1, s2, s3)
+    angle_word, s0, s1, s2, s3 = _draw(s0, s1, s2, s3)
+    state[0, lane] = s0
+    state[1, lane] = s1
+    state[2, lane] = s2
+    state[3, lane] = s3
+    return _normals(radius_word, angle_word)
+
+
+@njit(nogil=True, cache=True)
+def normal_pairs(state: _Words, first: NDArray[np.float64], second: NDArray[np.float64]) -> None:
+    """Draw two independent standard normals for every lane; a loop over a fixed number of lanes is faster."""
     for lane in range(state.shape[1]):
-        s0, s1, s2, s3 = state[0, lane], state[1, lane], state[2, lane], state[3, lane]
-        radius_word, s0, s1, s2, s3 = _draw(s0, s1, s2, s3)
-        angle_word, s0, s1, s2, s3 = _draw(s0, s1, s2, s3)
-        state[0, lane] = s0
-        state[1, lane] = s1
-        state[2, lane] = s2
-        state[3, lane] = s3
-        first[lane], second[lane] = _normals(radius_word, angle_word)
+        first[lane], second[lane] = normal_pair(state, lane)

@@ -26,17 +26,36 @@ class RateEstimate:
     log_upper: float
 
 
-def rate_of(count: int, at_risk: float) -> RateEstimate:
-    """Return the maximum-likelihood estimate from a number of exits in some time, of exponential exit times.
+def mean_tests(exits: Exits) -> float:
+    """Return the mean number of tests until an exit, from walkers that have left and others that have not.
 
-    The interval is the exact one of a Poisson number. With no exit, the estimate is −∞ and the upper end a bound.
+    Up to the last exit it is that of all walkers; after it, those that are left go on leaving at the rate of the later
+    half of the exits. So a time that all need before they can leave does no harm, and if exit times are exponential,
+    this is as exact as the maximum-likelihood estimate, the time of all walkers over the number of exits.
+    """
+    count = len(exits)
+    walkers = count + exits.censored
+    if count < _FEWEST or not exits.censored:
+        return exits.at_risk / count
+    middle = exits.tests[count // 2 - 1]
+    later = np.maximum(exits.tests - middle, 0)
+    after = later.sum() + exits.censored * later[-1]
+    rate = int((later > 0).sum()) / float(after) if after > 0 else count / exits.at_risk
+    return exits.at_risk / walkers + exits.censored / walkers / rate
+
+
+def rate_of(exits: Exits, count: int) -> RateEstimate:
+    """Return the rate of those exits that lead to one of the targets; the interval is that of a Poisson number.
+
+    With no exit at all, the estimate is −∞ and the upper end a bound.
     """
     tail = (1.0 - CONFIDENCE) / 2.0
-    upper = stats.chi2.ppf(1.0 - (tail if count else 2.0 * tail), 2 * count + 2) / 2.0 / at_risk
     if count == 0:
-        return RateEstimate(-math.inf, math.inf, -math.inf, math.log(upper))
-    lower = stats.chi2.ppf(tail, 2 * count) / 2.0 / at_risk
-    return RateEstimate(math.log(count / at_risk), count**-0.5, math.log(lower), math.log(upper))
+        return RateEstimate(-math.inf, math.inf, -math.inf, math.log(-math.log(2.0 * tail) / exits.at_risk))
+    value = math.log(count / len(exits) / mean_tests(exits))
+    lower = stats.chi2.ppf(tail, 2 * count) / 2.0 / count
+    upper = stats.chi2.ppf(1.0 - tail, 2 * count + 2) / 2.0 / count
+    return RateEstimate(value, count**-0.5, value + math.log(lower), value + math.log(upper))
 
 
 def rate_around(log_value: float, relative_error: float, count: int) -> RateEstimate:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.checkpoint import Slot
 from vibrokit.analyzers.mfet.direct import DirectRun, Escapes, Exits
-from vibrokit.analyzers.mfet.estimates import RateEstimate, exponential_p_value, rate_around, rate_of
+from vibrokit.analyzers.mfet.estimates import RateEstimate, exponential_p_value, mean_tests, rate_around, rate_of
 from vibrokit.analyzers.mfet.importance import Importance, from_distances
 from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
@@ -143,9 +143,9 @@ class Measurement:
     def _begun(self, walk: Walk, wanted: int, name: str, *key: int) -> DirectRun:
         count = DirectRun.walkers_for(wanted)
         if self.settings.from_orbit:
-            begun = walk.from_attractor(self.problem.attractor, count, *key)
+            begun = walk.from_orbit(self.problem.attractor, count, *key)
         else:
-            begun = walk.settled(count, *key)
+            begun = walk.from_core(count, *key)
         return DirectRun(walk, wanted, begun, self.slot.inner(name))
 
     def _checked_steps(self, wanted: int) -> DirectRun | None:
@@ -164,12 +164,12 @@ class Measurement:
     def _from_direct(self, run: DirectRun, coarser: DirectRun | None) -> AtIntensity:
         walk, exits = self.walk, run.exits()
         targets = np.unique(exits.targets).tolist()
-        rates = {t: _in_seconds(rate_of(int((exits.targets == t).sum()), exits.at_risk), walk) for t in targets}
+        rates = {t: _in_seconds(rate_of(exits, int((exits.targets == t).sum())), walk) for t in targets}
         p_value = exponential_p_value(exits, walk.key(12))
         change, change_error = math.nan, math.nan
         if coarser is not None and len(exits) and coarser.left:
             other = coarser.exits()
-            change = math.log(len(other) / other.at_risk) - math.log(len(exits) / exits.at_risk)
+            change = math.log(mean_tests(exits) / mean_tests(other))
             change_error = math.hypot(len(exits) ** -0.5, len(other) ** -0.5)
         return AtIntensity(
             walk.intensity, "direct", rates, exits, walk.interval, p_value, change, change_error,
@@ -182,10 +182,10 @@ class Measurement:
         source, intensity, walk = self.problem.source, self.walk.intensity, self.walk
         found = list[Finding]()
         if not len(exits):
-            bound = math.exp(-_in_seconds(rate_of(0, exits.at_risk), walk).log_upper)
+            bound = math.exp(-_in_seconds(rate_of(exits, 0), walk).log_upper)
             found.append(Finding.of(Code.NO_EXIT_SEEN, source, intensity=intensity, time=bound))
             return found
-        mean = exits.at_risk / len(exits) / walk.checks / walk.relaxation
+        mean = mean_tests(exits) / walk.checks / walk.relaxation
         if mean < _METASTABLE:
             found.append(Finding.of(Code.NOT_METASTABLE, source, intensity=intensity, ratio=mean, least=_METASTABLE))
         if p_value < _UNLIKELY:
@@ -204,7 +204,7 @@ class Measurement:
         """Share of walkers that stay at a target for a few relaxations of it."""
         other = dataclasses.replace(self.problem, attractor=self.problem.structure.attractors[target])
         walk = dataclasses.replace(self.walk, problem=other)
-        begun = walk.from_attractor(other.attractor, 200, 13)
+        begun = walk.from_orbit(other.attractor, 200, 13)
         ended = walk.advance(begun, math.ceil(_METASTABLE / 2 * walk.relaxation))
         return float((ended.status == COMPLETED).mean())
 

@@ -135,10 +135,25 @@ class Walk:
         inside: NDArray[np.bool_] = nearest(states[..., :2], own.points, own.metrics) <= 1
         return inside
 
-    def from_attractor(self, attractor: Attractor, count: int, *key: int) -> Walkers:
+    def from_orbit(self, attractor: Attractor, count: int, *key: int) -> Walkers:
         """Return walkers on the points of an attractor; the key chooses their random streams."""
         places = np.arange(count) % len(attractor.points)
         return Walkers(attractor.points[places], streams_of(self.key(*key), np.arange(count)))
+
+    def from_core(self, count: int, *key: int) -> Walkers:
+        """Return walkers in the core, with the normal density around the orbit there.
+
+        States of the noise are those that go with x and v on average; they are soon forgotten.
+        """
+        begun = self.from_orbit(self.problem.attractor, count, *key)
+        own, rng = self.own, np.random.default_rng(self.key(*key, 1))
+        radius = np.sqrt(-2.0 * np.log1p(-rng.random(count) * -math.expm1(-0.5)))  # of a normal law, up to 1
+        angle = 2.0 * math.pi * rng.random(count)
+        offsets = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        places = np.arange(count) % len(own.points)
+        states = begun.states.copy()
+        states[:, :2] += np.linalg.solve(own.metrics[places], offsets[:, :, None])[:, :, 0]
+        return Walkers(states, begun.streams)
 
     def key(self, *numbers: int) -> int:
         """Return the seed of the streams of one purpose."""
@@ -146,7 +161,7 @@ class Walk:
         return int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def settled(self, count: int, *key: int) -> Walkers:
-        """Return walkers of the quasi-stationary state: on the section, having forgotten that they began on the orbit.
+        """Return walkers of the quasi-stationary state: on the section, having forgotten where they began.
 
         A walker that leaves meanwhile begins again.
 
@@ -155,7 +170,7 @@ class Walk:
         StructureError
             The attractor is left before its orbit is forgotten.
         """
-        begun = self.from_attractor(self.problem.attractor, count, *key)
+        begun = self.from_core(count, *key)
         states, streams = begun.states.copy(), begun.streams.copy()
         waiting = np.arange(count)
         sections = math.ceil(_FORGETS * self.relaxation)

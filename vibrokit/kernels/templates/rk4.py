@@ -16,11 +16,11 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
-from vibrokit.kernels.streams import normal_pairs
 from vibrokit.kernels.templates.scene import (
     EQUATIONS,
     LANES,
     OPTIONS,
+    draw_lanes,
     forcing,
     step_lanes,
     tabulate,
@@ -56,7 +56,8 @@ def advance(
     visits,
 ):
     steps = int(settings[0])
-    cycle = int(settings[1])  # intervals after which the forcing repeats; 0 if it never does
+    # Intervals after which the forcing repeats; 0 if it never does.
+    cycle = int(settings[1])  # forced
     h = interval / steps
     count = states.shape[0]
     table = np.zeros((max(cycle, 1), 2 * steps + 1))  # forced
@@ -69,18 +70,20 @@ def advance(
     done = np.zeros(LANES, dtype=np.int64)
     waiting = 0
     active = 0
-    elapsed = 0
+    elapsed = 0  # forced
     for phase in range(cycle):  # forced
         tabulate(start_time + phase * interval, h, theta, table[phase])  # forced
     while waiting < count or active > 0:
         # Lanes that do not share the phase of a newcomer go on first.
-        if active == 0 or cycle > 0:
-            elapsed = elapsed if active > 0 else phases[waiting]
+        refill = True  # unforced
+        refill = active == 0 or cycle > 0  # forced
+        if refill:
+            elapsed = elapsed if active > 0 else phases[waiting]  # forced
             for lane in range(LANES):
                 while holder[lane] < 0 and waiting < count:
-                    ahead = elapsed - phases[waiting]
-                    if budget[waiting] > 0 and ahead != 0 and (cycle == 0 or ahead % cycle != 0):
-                        break
+                    ahead = elapsed - phases[waiting]  # forced
+                    if budget[waiting] > 0 and ahead != 0 and (cycle == 0 or ahead % cycle != 0):  # forced
+                        break  # forced
                     if budget[waiting] > 0:
                         holder[lane] = waiting
                         done[lane] = 0
@@ -102,7 +105,7 @@ def advance(
             tabulate(start_time + elapsed * interval, h, theta, table[row])  # forced
         before[:, :] = z
         for step in range(steps):
-            normal_pairs(stream, first, second)  # noisy
+            draw_lanes(stream, first, second)  # noisy
             step_lanes(
                 z,
                 table[row, 2 * step],  # forced
@@ -113,7 +116,7 @@ def advance(
                 theta,
                 h,
             )
-        elapsed += 1
+        elapsed += 1  # forced
         for lane in range(LANES):
             index = holder[lane]
             if index < 0:
@@ -179,7 +182,7 @@ def record(
     for sample in range(1, out.shape[0]):
         for step in range(steps):
             t = start_time + (sample - 1) * spacing + step * h  # forced
-            normal_pairs(stream, first, second)  # noisy
+            draw_lanes(stream, first, second)  # noisy
             if given.shape[0] > 0:  # noisy
                 first[0] = given[(sample - 1) * steps + step, 0]  # noisy
                 second[0] = given[(sample - 1) * steps + step, 1]  # noisy
