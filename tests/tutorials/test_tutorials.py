@@ -337,3 +337,52 @@ def test_transients_are_those_of_simulated_trajectories(densities):
 def test_pictures_of_the_densities(densities, tmp_path):
     densities.save_pictures(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(densities.PICTURES)
+
+
+# -- 06: exit times ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def exits(run):
+    return run("06_exit_times")
+
+
+def test_rates_of_simulated_exits_are_those_of_kramers(exits):
+    """The formula has errors of its second order: 1 % of the rate at the largest intensity."""
+    for rate in (*exits.direct.rates, exits.rare):
+        prefactor = (np.sqrt(1.04) - 0.2) / (np.sqrt(2) * np.pi)
+        assert abs(rate.log_value - np.log(prefactor) + 0.2 / rate.intensity) < 3 * rate.log_error + 0.15
+        by_formula, formula_error = exits.kramers(rate.intensity)
+        assert abs(rate.log_value - by_formula) < 3 * rate.log_error + formula_error
+    assert [rate.method for rate in exits.direct.rates] == ["direct"] * 3
+
+
+def test_exit_times_follow_an_exponential_law(exits):
+    assert min(exits.p_values) > 1e-3
+    assert exits.remaining == pytest.approx(np.exp(-1), abs=3 * np.sqrt(np.exp(-1) / 500))
+    assert not exits.direct.found(Code.NOT_EXPONENTIAL)
+
+
+def test_slope_of_the_exit_times_is_the_barrier(exits):
+    assert exits.energy.lower <= 0.2 <= exits.energy.upper
+    assert abs(exits.fit.slope - 0.2) < 3 * exits.fit.slope_error + 0.01  # the prefactor's part
+
+
+def test_splitting_is_as_exact_as_wanted_and_cheaper(exits):
+    assert exits.rare.method == "splitting"
+    assert exits.rare.log_error <= 0.15
+    assert exits.split.stats.steps < 1e-2 * exits.waiting
+
+
+def test_exit_times_of_the_clear_state(exits):
+    """Of 20 000 simulated trajectories, with standard errors of 0.004 and 0.007."""
+    for rate, found, expected in zip(exits.forced.rates, exits.log_periods, (4.304, 6.492), strict=True):
+        assert abs(found - expected) < 3 * np.hypot(rate.log_error, 0.007)
+    energy = exits.forced.energy("clear", "hammering")
+    assert energy.lower <= CERTIFIED_CLEAR <= energy.upper
+    assert len(exits.forced.found(Code.NOT_METASTABLE)) == 1  # at the larger intensity
+
+
+def test_pictures_of_the_exit_times(exits, tmp_path):
+    exits.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(exits.PICTURES)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from numbers import Real
 from typing import ClassVar
 
+import numpy as np
+
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.mfet.dataset import dataset_of
-from vibrokit.analyzers.mfet.importance import Importance, from_committor
+from vibrokit.analyzers.mfet.importance import Importance
 from vibrokit.analyzers.mfet.measurement import AtIntensity, Measurement
+from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.stages import committor_stages
@@ -29,6 +31,7 @@ from vibrokit.symbolic.flow_kind import Flow
 METHOD = "Arrhenius fit"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's, as SGCM has them
 _SMALLEST_ERROR = 1e-3  # a million exits
+_MOST_STAGES = 64  # of an importance function in a section interval: a tenth of a radian, where it may be interpolated
 _DEVIATIONS = 2.0  # standard errors on each side of an energy
 
 
@@ -52,6 +55,8 @@ class MFET(Analyzer):
         Chooses the random numbers; the same seed gives the same result to the last bit.
     splitting : bool, optional
         Whether to use splitting; by default where it is faster.
+    replicas : int
+        Independent estimates of splitting, at most; 16 at least.
     from_orbit : bool
         Whether walkers start on the attractor's orbit, in place of the density in its core. Splitting never does.
     escapes : int
@@ -80,6 +85,7 @@ class MFET(Analyzer):
     target_error: float = 0.05
     seed: int = 0
     splitting: bool | None = None
+    replicas: int = 128
     from_orbit: bool = False
     escapes: int = 50
 
@@ -89,6 +95,9 @@ class MFET(Analyzer):
             raise StructureError(f"MFET: target_error must be from {_SMALLEST_ERROR:g} to 1, got {shown(error)}.")
         whole("MFET: seed", self.seed, 0, 2**63 - 1)
         whole("MFET: escapes", self.escapes, 0, 100_000)
+        whole("MFET: replicas", self.replicas, 16, 1_000_000)
+        if not isinstance(self.from_orbit, bool):
+            raise StructureError(f"MFET: from_orbit must be True or False, got {shown(self.from_orbit)}.")
         if self.splitting not in (None, True, False):
             raise StructureError(f"MFET: splitting must be True, False or None, got {shown(self.splitting)}.")
         if self.intensities is not None:
@@ -144,15 +153,18 @@ class MFET(Analyzer):
         return self.intensities or tuple(factor * osc.noise.intensity for factor in _INTENSITIES)
 
 
-def _importance(problem: ExitProblem, intensity: float) -> Importance | None:
+def _importance(walk: Walk) -> Importance | None:
     """The committor of a density; None if there is none for this scene."""
+    problem = walk.problem
     try:
-        found = committor_stages(problem, intensity)
+        found = committor_stages(problem, walk.intensity)
     except (SceneError, StructureError):
         return None
-    shares = found.times / problem.osc.section_interval
-    known = from_committor(shares, found.grid.x, found.grid.v, found.log_values, problem.attractor.points)
-    return dataclasses.replace(known, depth=known.depth * found.intensity / intensity)
+    points = found.grid.places(problem.attractor.points[:, :2])
+    (i, j) = np.clip(np.rint(points), 0, np.array(found.grid.shape) - 1).astype(int).T
+    depth = max(1.0, -float(found.log_values[0, i, j].min()) * found.intensity / walk.intensity)
+    count = min(walk.looks(depth), _MOST_STAGES)
+    return Importance(np.arange(count) / count, found.grid.x, found.grid.v, found.at(count), depth)
 
 
 def _energies(

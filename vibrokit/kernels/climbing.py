@@ -33,7 +33,7 @@ def climb(
     counts: Whole,  # (count,): how many of them there are
     phases: Whole,  # (count,): looks from a section to the start of each row
     looks: int,  # in a section interval
-    times: Array,  # (stages,): in section intervals, two or more, ascending from 0
+    times: Array,  # (stages,): in section intervals, ascending from 0
     xs: Array,
     vs: Array,
     values: Array,  # (stages, nx, nv)
@@ -41,9 +41,12 @@ def climb(
     scores: Array,  # (count, most): of those that are higher than all before; −∞ elsewhere
 ) -> None:
     """Score all states, by linear interpolation, and keep the records."""
-    stages, shares = np.empty(looks, dtype=np.int64), np.empty(looks)
+    stages, shares = np.empty((looks, 2), dtype=np.int64), np.empty(looks)
     for look in range(looks):
-        stages[look], shares[look] = _bracket(look / looks, times)
+        place = int(np.searchsorted(times, look / looks + 1e-12, side="right")) - 1
+        later = times[place + 1] if place + 1 < times.size else 1.0
+        stages[look, 0], stages[look, 1] = place, (place + 1) % times.size
+        shares[look] = max(look / looks - times[place], 0.0) / (later - times[place])
     for row in range(counts.size):
         for place in range(scores.shape[1]):
             scores[row, place] = -np.inf
@@ -53,7 +56,9 @@ def climb(
             j, b = _bracket(visits[row, place, 1], vs)
             score = 0.0
             for later in range(2):
-                weight, known = (shares[look] if later else 1.0 - shares[look]), values[stages[look] + later]
+                weight, known = (shares[look] if later else 1.0 - shares[look]), values[stages[look, later]]
+                if weight == 0.0:
+                    continue
                 low = (1.0 - b) * known[i, j] + b * known[i, j + 1]
                 high = (1.0 - b) * known[i + 1, j] + b * known[i + 1, j + 1]
                 score += weight * ((1.0 - a) * low + a * high)

@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.neighbourhoods import metrics_of, nearest
@@ -32,7 +31,7 @@ class Importance:
     Attributes
     ----------
     times : array (stages,)
-        In section intervals after the section, ascending from 0.
+        In section intervals after the section, ascending from 0; that of the next section is the first.
     x, v : array (nx,), (nv,)
     values : array (stages, nx, nv)
     depth : float
@@ -65,26 +64,6 @@ class Importance:
         return scores
 
 
-def from_committor(times: Array, x: Array, v: Array, logs: Array, points: Array) -> Importance:
-    """Return ln of the probability to leave before a return to the core; where it is NaN, the nearest known value.
-
-    Parameters
-    ----------
-    times : array (stages,)
-        In section intervals.
-    x, v : array (nx,), (nv,)
-    logs : array (stages, nx, nv)
-    points : array (count, n)
-        Of the attractor, on the section.
-    """
-    filled = np.empty_like(logs)
-    for stage, known in zip(filled, logs, strict=True):
-        nodes = distance_transform_edt(np.isnan(known), return_distances=False, return_indices=True)
-        stage[:] = known[tuple(nodes)]
-    (i, j) = (np.abs(axis[:, None] - points[:, k]).argmin(axis=0) for k, axis in enumerate((x, v)))
-    return Importance(times, x, v, filled, max(1.0, float(-filled[0, i, j].min())))
-
-
 def from_distances(walk: Walk) -> Importance:
     """Return a / (a + b), with the squared distances a from the attractor and b from the nearest other one.
 
@@ -97,12 +76,12 @@ def from_distances(walk: Walk) -> Importance:
         for low, high in (region.x, region.v)
     )
     nodes = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
-    times = np.arange(_TIMES + 1) / _TIMES
+    times = np.arange(_TIMES) / _TIMES
     own = _distances(walk, walk.problem.attractor, nodes)
     others = [_distances(walk, a, nodes) for a in walk.problem.structure.attractors if a.label != walk.problem.source]
     to_others = np.min(others, axis=0) if others else np.full_like(own, own.max())
     values = own / (own + to_others)
-    return Importance(times, x, v, np.concatenate([values, values[:1]]), _DEPTH)
+    return Importance(times, x, v, values, _DEPTH)
 
 
 def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:

@@ -47,6 +47,8 @@ class Settings(Protocol):
     @property
     def from_orbit(self) -> bool: ...
     @property
+    def replicas(self) -> int: ...
+    @property
     def escapes(self) -> int: ...
 
 
@@ -95,7 +97,7 @@ class Measurement:
     stepper : Stepper
     covariances : mapping of int to array
     importance : callable
-        Returns the importance function for an intensity, or None.
+        Returns an importance function, or None.
     slot : Slot
         Its place in the checkpoint.
     """
@@ -107,7 +109,7 @@ class Measurement:
         settings: Settings,
         stepper: Stepper,
         covariances: Mapping[int, Array],
-        importance: Callable[[ExitProblem, float], Importance | None],
+        importance: Callable[[Walk], Importance | None],
         slot: Slot,
     ) -> None:
         self.problem, self.settings, self.importance, self.slot = problem, settings, importance, slot
@@ -123,8 +125,10 @@ class Measurement:
             limits = () if self.settings.splitting is False else self._limits(wanted)
             if self._direct.run(*limits):
                 return self._from_direct(self._direct, self._checked_steps(wanted))
-        importance = self.importance(self.problem, self.walk.intensity) or from_distances(self.walk)
-        self._splitting = SplittingRun(self.walk, importance, self.settings.target_error, self.slot.inner("splitting"))
+        importance = self.importance(self.walk) or from_distances(self.walk)
+        self._splitting = SplittingRun(
+            self.walk, importance, self.settings.target_error, self.settings.replicas, self.slot.inner("splitting")
+        )
         self._splitting.run()
         return self._from_splitting(self._splitting)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
 from functools import cached_property
@@ -143,7 +143,7 @@ class DensitySolver:
     max_memory_gib: float
     samples: int | None = None
 
-    def solve(self, intensities: Sequence[float]) -> Iterator[AtIntensity]:
+    def solve(self, intensities: Sequence[float]) -> Generator[AtIntensity, None, None]:
         """Yield the solutions at some intensities, which must descend.
 
         Raises StructureError if the nodes are too far apart for the narrowest density, or need too much memory.

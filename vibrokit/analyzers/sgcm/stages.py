@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import os
@@ -9,15 +10,20 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_flow import steps_for
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
 from vibrokit.errors import StructureError
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.symbolic.flow_kind import Flow
 
+_SAME = 1e-9  # of a section interval
 _MEMORY = 2.0  # GiB
+_NODES = (200, 200)  # enough for an importance function, if they resolve the density; otherwise as many as needed
 _BELOW = 20.0  # in ln: values so far below the least of the core are not computed
 
 Array = NDArray[np.float64]
@@ -29,19 +35,45 @@ class CommittorStages:
 
     Attributes
     ----------
-    grid : DensityGrid
+    flow : DensityFlow
     intensity : float
         D (m² s⁻³).
     times : array (stages,)
-        Since the section (s), ascending from 0.
+        Since the section (s), ascending from 0 to the next section.
     log_values : array (stages, nx, nv)
-        NaN where they are not known.
+        Where they are not known, the nearest known one.
     """
 
-    grid: DensityGrid
+    flow: DensityFlow
     intensity: float
     times: Array
     log_values: Array
+
+    @property
+    def grid(self) -> DensityGrid:
+        """The nodes."""
+        return self.flow.grid
+
+    def at(self, count: int) -> Array:
+        """Return ln of the committor at parts of a section interval, shape (count, nx, nv).
+
+        At the stages it is as solved; before each, noise is neglected until that stage. To interpolate in time would be
+        wrong, since in a stage the motion passes several nodes.
+        """
+        grid, interval = self.grid, self.flow.scene.section_interval
+        nodes = grid.nodes.reshape(-1, 2)
+        found = np.empty((count, *grid.shape))
+        for number, time in enumerate(np.arange(count) * interval / count):
+            stage = int(np.searchsorted(self.times, time - _SAME * interval))
+            rest = max(self.times[stage] - time, 0.0)
+            states = nodes
+            if rest > _SAME * interval:
+                states = run_ensemble(
+                    self.flow.scene, Flow.STATE, self.flow.stepper, nodes, start_time=float(time), interval=float(rest)
+                ).states
+            places = np.nan_to_num(grid.places(states)).T
+            found[number] = map_coordinates(self.log_values[stage], places, order=1, mode="nearest").reshape(grid.shape)
+        return found
 
 
 def committor_stages(problem: ExitProblem, intensity: float) -> CommittorStages:
@@ -50,15 +82,13 @@ def committor_stages(problem: ExitProblem, intensity: float) -> CommittorStages:
     Raises StructureError if there is none.
     """
     orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
-    solver = DensitySolver(problem, None, steps_for(problem.osc, np.concatenate(orbits)), _MEMORY)
-    try:
-        for one in solver.solve((intensity,)):
-            return _stages(one)
-    except StructureError:
-        with ThreadPoolExecutor(os.cpu_count()) as executor:
-            one, _ = solver.explored(intensity, executor)
-            return _stages(one)
-    raise AssertionError("one intensity has one solution")
+    steps = steps_for(problem.osc, np.concatenate(orbits))
+    for nodes in (_NODES, None):
+        solver = DensitySolver(problem, nodes, steps, _MEMORY)
+        with contextlib.suppress(StructureError), contextlib.closing(solver.solve((intensity,))) as solved:
+            return _stages(next(solved))
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        return _stages(solver.explored(intensity, executor)[0])
 
 
 def _stages(one: AtIntensity) -> CommittorStages:
@@ -68,6 +98,9 @@ def _stages(one: AtIntensity) -> CommittorStages:
     together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
     floor = float(together.min()) - _BELOW
     found = one.transition.stages(one.found, one.cores, together, floor)
-    known = found > floor + 0.5 * _BELOW
+    stages = np.concatenate([np.where(found > floor + 0.5 * _BELOW, found, np.nan), together[None]])
+    for stage in stages:
+        nearest = distance_transform_edt(np.isnan(stage), return_distances=False, return_indices=True)
+        stage[:] = stage[tuple(nearest)]
     flow = one.transition.flow
-    return CommittorStages(one.grid, one.intensity, flow.leg_times, np.where(known, found, np.nan))
+    return CommittorStages(flow, one.intensity, np.append(flow.leg_times, flow.scene.section_interval), stages)
