@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
     from vibrokit.comparison.stationary import StationaryDensity as StationaryDensity
+    from vibrokit.comparison.stationary import occupancies as occupancies
     from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
@@ -81,6 +82,7 @@ _MODULES = {
     "MFET": "vibrokit.analyzers.mean_exit_times",
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
+    "occupancies": "vibrokit.comparison.stationary",
     "StationaryDensity": "vibrokit.comparison.stationary",
     "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",

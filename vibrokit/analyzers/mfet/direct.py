@@ -170,9 +170,9 @@ class DirectRun:
         return Exits(tests[gone], self.state.targets[gone], int(tests.sum()), len(tests) - len(gone))
 
     def escapes(self, most: int) -> Escapes:
-        """Repeat the last part of the first walkers that have left, with states between the sections."""
-        walk, state = self.walk, self.state
-        gone = self._in_order()[:most]
+        """Repeat the last part of some walkers that have left, early and late, with states between sections."""
+        walk, state, gone = self.walk, self.state, self._in_order()
+        gone = gone[np.linspace(0, len(gone) - 1, min(most, len(gone))).astype(int)]
         sections = min(math.ceil(_KEPT * walk.relaxation) + _KEPT_AT_LEAST, _KEPT_AT_MOST)
         pieces = walk.pieces(_SAMPLES)
         left = state.tests[gone] - state.earlier_tests[0, gone]
@@ -187,8 +187,8 @@ class DirectRun:
         for number, (length, first) in enumerate(zip(tests, begun.states, strict=True)):
             paths[number, count - length] = first[:2]
             paths[number, count + 1 - length :] = ended.visits[number, :length, :2]
-        spacing = walk.interval / pieces
-        return Escapes(spacing * np.arange(-count, 1.0), paths, state.targets[gone])
+        spacing, first = walk.interval / pieces, count - int(tests.max())
+        return Escapes(spacing * np.arange(first - count, 1.0), paths[:, first:], state.targets[gone])
 
     def _in_order(self) -> Whole:
         """The walkers that have left, in the order of their exits."""
