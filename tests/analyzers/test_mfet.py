@@ -83,8 +83,10 @@ def test_exponential_times_pass_and_others_fail():
         exits = Exits(times[:100], np.zeros(100, int), int(np.minimum(times, times[99]).sum()), 25)
         values.append(exponential_p_value(exits, seed))
     assert abs(np.mean(np.array(values) < 0.1) - 0.1) < 3 * math.sqrt(0.09 / 300)
-    late = np.sort(np.ceil(1e4 + rng.exponential(1e4, 100))).astype(int)
-    assert exponential_p_value(Exits(late, np.zeros(100, int), int(late.sum()), 0), 0) < 1e-6
+    late = np.sort(np.ceil(1e4 + rng.exponential(1e4, 100))).astype(int)  # all need a while before they can leave
+    assert exponential_p_value(Exits(late, np.zeros(100, int), int(late.sum()), 0), 0) > 1e-3
+    even = np.sort(np.ceil(1e4 * rng.random(200))).astype(int)
+    assert exponential_p_value(Exits(even, np.zeros(200, int), int(even.sum()), 0), 0) < 1e-6
 
 
 def rates(log_times, errors, intensities):
@@ -242,14 +244,14 @@ def test_checkpoints_that_are_refused(structure, tmp_path):
         vk.MFET(intensities=(0.05,), seed=1, **QUICK), vk.MFET(intensities=(0.06,), **QUICK),
         vk.MFET(intensities=(0.05,), stepper=vk.RK4(512), **QUICK),
     ):  # fmt: skip
-        with pytest.raises(CheckpointError, match="settings"):
+        with pytest.raises(CheckpointError, match="the setting "):
             other.run(WELL, structure, checkpoint=place)
     content = place.read_bytes()
     for damaged in (content[:-7], content[:40], b"", b"x" * 1000):
         place.write_bytes(damaged)
         with pytest.raises(CheckpointError):
             vk.MFET(intensities=(0.05,), **QUICK).run(WELL, structure, checkpoint=place)
-    with pytest.raises(StructureError, match="keeps no checkpoints"):
+    with pytest.raises(StructureError, match="checkpoint"):
         vk.ActionGraph().run(WELL, structure, checkpoint=tmp_path / "other.ckpt")
     with pytest.raises(StructureError, match="folder"):
         vk.MFET(**QUICK).run(WELL, structure, checkpoint=tmp_path / "none" / "work.ckpt")

@@ -77,6 +77,14 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert energy.lower <= 4 * 0.05 * 0.25 <= energy.upper
         np.testing.assert_allclose(made["d"].occupancies, 0.5, rtol=1e-6)
         assert made["h"].times == pytest.approx(np.array([0.5, 1, 4]) * made["osc"].section_interval)
+    elif page.stem == "exit-times":
+        energy = made["r"].energy("left-rest", "right-rest")
+        assert energy.lower <= 4 * 0.2 * 0.25 <= energy.upper
+        np.testing.assert_allclose(vk.occupancies(made["r"]), 0.5, atol=0.08)  # 5 % of each rate, three errors
+        assert made["rare"].rates[0].method == "splitting"
+        assert made["rare"].rates[0].log_value == pytest.approx(-21.71, abs=3 * made["rare"].rates[0].log_error)
+        assert "commitment" in printed
+        assert "False True True" in printed
     elif page.stem == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)

@@ -212,7 +212,7 @@ class Analyzer(ABC):
         if path is None:
             return Checkpoint(None, {})
         if not self.keeps_checkpoints:
-            raise StructureError(f"{type(self).__name__} keeps no checkpoints; leave out checkpoint=.")
+            raise StructureError(f"{type(self).__name__} does not write checkpoints; leave out checkpoint=.")
         where = Path(path)
         if not where.parent.is_dir():
             raise StructureError(f"the folder {where.parent} of the checkpoint does not exist; make it first.")

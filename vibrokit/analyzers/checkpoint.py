@@ -93,7 +93,7 @@ class Checkpoint:
         found = arrays.pop(_ABOUT, np.empty(0, dtype=np.uint8)).tobytes().decode(errors="replace")
         if found != self._about:
             raise CheckpointError(
-                f"the checkpoint {path} belongs to other work: {_difference(found, self._about)} differs; choose "
+                f"the checkpoint {path} belongs to other work: {_difference(found, self._about)}; choose "
                 "another name, or delete it."
             )
         return arrays
@@ -128,7 +128,14 @@ def _difference(found: str, wanted: str) -> str:
     """Name what differs."""
     try:
         one, other = json.loads(found), json.loads(wanted)
-        differing = [str(key) for key in other if one.get(key) != other[key]]
-    except (ValueError, AttributeError):
-        differing = []
-    return ", ".join(differing) or "what it was made for"
+        for key in other:
+            if one.get(key) != other[key] and key == "settings":
+                names = [name for name in other[key] if one[key].get(name) != other[key][name]]
+                return (
+                    f"the settings {', '.join(names)} differ" if len(names) > 1 else f"the setting {names[0]} differs"
+                )
+            if one.get(key) != other[key]:
+                return f"it has another {key}" if key != "versions" else "it was written by other versions"
+    except (ValueError, AttributeError, KeyError, IndexError):
+        pass
+    return "what it was made for is not known"

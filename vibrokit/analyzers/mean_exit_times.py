@@ -71,8 +71,8 @@ class MFET(Analyzer):
     -----
     A rate is the inverse of the mean time, times the share of the target. Simulation ends when enough walkers have
     left. Those that remain count with their time, and as if they went on to leave at the rate of the later exits. A
-    quarter of the exits is simulated again with half the steps: ``data["step_change"]`` is the difference in ln of the
-    rate.
+    quarter of the exits is simulated again with steps twice as long: ``data["step_change"]`` is the difference in ln of
+    the rate.
 
     An activation energy is the slope of ln τ against 1/D. It is given only if the slope does not change with D by more
     than the errors of the rates allow.
@@ -136,7 +136,7 @@ class MFET(Analyzer):
                     measured.append(so_far)
                 elif not measured:
                     raise
-                findings.append(Finding.stopped("exit times", interrupt, problem.source))
+                findings.append(Finding.stopped("simulation of exit times", interrupt, problem.source))
                 complete = False
                 break
         if not measured:
@@ -178,7 +178,7 @@ def _energies(
                 problem.source, target, one.intensity, known.log_value, known.log_error, problem.exit.event, one.method
             )
             for one in measured
-            if (known := one.rates.get(target)) is not None and math.isfinite(known.log_value)
+            if one.metastable and (known := one.rates.get(target)) is not None and math.isfinite(known.log_value)
         ]
         if len(rates) < 2:
             continue
@@ -193,8 +193,8 @@ def _energies(
             continue
         if not fit.slope > 0:
             continue
-        # The prefactor depends on D, by a share D/ΔU as in Kramers' formula; that shifts the slope by about D²/ΔU.
-        error = _DEVIATIONS * fit.slope_error + float(fit.intensities[0] * fit.intensities[-1]) / fit.slope
+        # A prefactor proportional to a power of D, such as D at weak damping, shifts the slope by about D.
+        error = _DEVIATIONS * fit.slope_error + float(fit.intensities.mean())
         bounds = max(fit.slope - error, 0.0), fit.slope + error
         energies.append(
             ActivationEnergy(

@@ -174,6 +174,10 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
         raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
     if not result.rates:
         raise StructureError("the result has no rates; see its findings.")
+    left = {rate.source for rate in result.rates}
+    absent = [name for label, name in enumerate(result.names) if label not in left]
+    if absent:
+        raise StructureError(f"the result has no rate out of {', '.join(absent)}; run the analyzer without source=.")
     found = [log_stationary(one, result.names) for one in result.log_rates.values]
     return _by_attractor(np.array(found), np.array(result.intensities), result.names)
 

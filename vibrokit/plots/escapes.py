@@ -67,8 +67,10 @@ def escapes(
     samples = paths[np.isfinite(paths).all(axis=2)]
     counts, x, v = np.histogram2d(samples[:, 0], samples[:, 1], bins=_CELLS)
     shown = np.ma.masked_equal(counts.T, 0)
-    density = axes.pcolormesh(x, v, np.log10(shown), cmap="Blues", rasterized=True)
-    lines = LineCollection([one[np.isfinite(one).all(axis=1)] for one in paths], colors="0.35", linewidths=0.3)
+    density = axes.pcolormesh(x, v, np.ma.log10(shown), cmap="Blues", rasterized=True)
+    lines = LineCollection(
+        [one[np.isfinite(one).all(axis=1)] for one in paths], colors="0.35", linewidths=0.3, alpha=0.35
+    )
     axes.add_collection(lines)
     (ends,) = axes.plot(paths[:, -1, 0], paths[:, -1, 1], ".", color="0.2", markersize=4)
     drawn = None

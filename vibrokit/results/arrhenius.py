@@ -52,8 +52,8 @@ class ArrheniusFit:
         intensities = np.array([rate.intensity for rate in known])
         if len(np.unique(intensities)) < 2 or len(np.unique(intensities)) < len(known):
             raise StructureError(
-                f"a fit needs the rates of one exit at two noise intensities or more, got {len(known)} rates at "
-                f"{len(np.unique(intensities))} intensities."
+                "a fit needs the rates of one exit at two noise intensities or more, each once; the intensities are "
+                f"{', '.join(f'{one:g}' for one in intensities) or 'none'}."
             )
         log_times = np.array([-rate.log_value for rate in known])
         errors = np.maximum([rate.log_error for rate in known], 1e-12)

@@ -151,7 +151,7 @@ class Code(StrEnum):
         "noise-not-weak", WARNING,
         "ΔU/D = {ratio:.2g} from {state} to {goal} at D = {intensity:g}, below {least:g}: the noise is not weak, and "
         "exp(ΔU/D) does not describe the mean exit time.",
-        "Lower the noise intensity, or simulate exit times directly.",
+        "Lower the noise intensity, or look at the exit times of MFET.",
     )  # fmt: skip
     NO_EXIT_FOUND = (
         "no-exit-found", ERROR, "No exit path from {state} was found.",
@@ -196,8 +196,8 @@ class Code(StrEnum):
     )  # fmt: skip
     NOT_METASTABLE = (
         "not-metastable", WARNING,
-        "{state} is left after {ratio:.2g} relaxation times on average at D = {intensity:g}, below {least:g}: it is no "
-        "metastable state.", "Lower the noise intensity.",
+        "{state} is left after {ratio:.2g} relaxation times on average at D = {intensity:g}, below {least:g}: it "
+        "is not metastable.", "Lower the noise intensity.",
     )  # fmt: skip
     TARGET_NOT_METASTABLE = (
         "target-not-metastable", WARNING,
@@ -206,18 +206,18 @@ class Code(StrEnum):
     )  # fmt: skip
     NOT_EXPONENTIAL = (
         "not-exponential", WARNING,
-        "The exit times of {state} at D = {intensity:g} follow no exponential law (probability {p_value:.1e}): one "
-        "rate does not describe them.", "Look at their distribution with plot_exit_times.",
+        "The exit times of {state} at D = {intensity:g} are not exponential (p = {p_value:.1e}): one rate does not "
+        "describe them.", "Look at their distribution with plot_exit_times.",
     )  # fmt: skip
     STEPS_CHANGE_RATE = (
         "steps-change-rate", WARNING,
-        "Half the steps change ln of the exit rate of {state} at D = {intensity:g} by {change:.2g} ± {error:.1g}: the "
-        "steps are too long.", _FINER_STEPPER,
+        "Steps twice as long change ln of the exit rate of {state} at D = {intensity:g} by {change:.2g} ± {error:.1g}: "
+        "the steps are too long.", _FINER_STEPPER,
     )  # fmt: skip
     SPLITTING_NOT_CONVERGED = (
         "splitting-not-converged", WARNING,
         "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas} replicas; {wanted:.0%} "
-        "was wanted.", "Expect an error of that size, or raise target_error.",
+        "was wanted.", "Raise replicas, or expect an error of that size.",
     )  # fmt: skip
     ARRHENIUS_NOT_REACHED = (
         "arrhenius-not-reached", WARNING,

@@ -83,14 +83,15 @@ class MFETResult(RatedResult):
 
     def _at(self, source: int | str, intensity: float | None, needed: str) -> xarray.Dataset:
         """The data of one attractor at one intensity that has something; raises StructureError."""
+        absent = "no realization was kept" if needed.startswith("escape") else "nothing was simulated directly"
         labels = self.data["source"].values.tolist() if needed in self.data else []
         if not labels:
-            raise StructureError("nothing was simulated directly; see the result's findings.")
+            raise StructureError(f"{absent}; see the result's settings and findings.")
         own = self.data.isel(source=labels.index(source_among(labels, source, self.names, "exit", "of")))
         finite = np.isfinite(own[needed].transpose("intensity_index", ...).values)
         known = np.flatnonzero(finite.reshape(len(finite), -1).any(axis=1))
         if not len(known):
-            raise StructureError("nothing was simulated directly; see the result's findings.")
+            raise StructureError(f"{absent}; see the result's settings and findings.")
         intensities = own["rate_intensity"].values[known]
         wanted = intensities.min() if intensity is None else intensity
         return own.isel(intensity_index=known[np.argmin(np.abs(np.log(intensities / wanted)))])
@@ -106,8 +107,8 @@ class MFETResult(RatedResult):
         one = self._at(source, intensity, "exit_time")
         times = one["exit_time"].values
         times = times[np.isfinite(times)]
-        left_over = int(one["walkers_left_over"])
-        return survival(times, left_over, float(one["time_at_risk"]) / len(times), label=int(one["source"]), ax=ax)
+        rate = float(np.nansum(np.exp(one["log_rate"].values)))
+        return survival(times, int(one["walkers_left_over"]), 1.0 / rate, label=int(one["source"]), ax=ax)
 
     def plot_escapes(
         self,
@@ -116,6 +117,7 @@ class MFETResult(RatedResult):
         target: int | str | None = None,
         intensity: float | None = None,
         path: ArrayLike | None = None,
+        last: float | None = None,
     ) -> EscapeArtists:
         """Draw realizations on their way out and the density of their paths; see `vibrokit.plots.escapes.escapes`.
 
@@ -126,8 +128,12 @@ class MFETResult(RatedResult):
         intensity : float, optional
         path : array_like (count, 2), optional
             A path that is drawn over them, such as ``energy.path.q``.
+        last : float, optional
+            How much of each is drawn: the last so many seconds. By default all that was kept.
         """
         from vibrokit.plots.escapes import escapes
 
         found = self.escapes(source, target, intensity)
+        if last is not None:
+            found = found.sel(time=slice(-last, None))
         return escapes(found.values, path=path, saddles=self.section.saddles, points=self.section.points, ax=ax)

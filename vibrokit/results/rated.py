@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import xarray
 
+from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.energy import ActivationEnergy
@@ -86,10 +87,17 @@ class RatedResult(Result):
         StructureError
             There is no such exit, or there are not two intensities.
         """
+        if not self.rates:
+            raise StructureError("the result has no rates; see its findings.")
         label = source_among({rate.source for rate in self.rates}, source, self.names, "rate", "of")
         own = [rate for rate in self.rates if rate.source == label]
         reached = sorted({rate.target for rate in own})
         wanted = reached[0] if target is None else label_of(target, self.names) if target != -1 else -1
+        if wanted not in reached:
+            known = ", ".join(exit_between(self.names, label, one) for one in reached)
+            raise StructureError(
+                f"the result has no rate of {exit_between(self.names, label, wanted)}; it has {known}."
+            )
         return ArrheniusFit.of([rate for rate in own if rate.target == wanted])
 
     def plot_rates(self, ax: Any = None, source: int | str | None = None) -> ExitTimeArtists:

@@ -13,6 +13,7 @@ from vibrokit.analyzers.mfet.direct import Exits
 CONFIDENCE = 0.95
 """Of all intervals."""
 
+_EARLY = 10  # a part of the exits, which may be delayed
 _FEWEST = 20  # exits for which the law is tested
 
 
@@ -70,12 +71,13 @@ def exponential_p_value(exits: Exits, seed: int) -> float:
 
     The total times on test at the exits, over that at the last one, are those of independent uniform numbers in order
     (Epstein & Sobel, J. Am. Stat. Assoc. 48, 486, 1953), also if other walkers have not left. Kolmogorov's test
-    compares them. A time is known to one interval between tests, in which it is drawn. NaN with fewer than 20 exits.
+    compares them. The first tenth of the exits does not count, since no walker can leave at once. A time is known to
+    one interval between tests, in which it is drawn. NaN with fewer than 20 exits.
     """
     count = len(exits)
     if count < _FEWEST:
         return math.nan
     times = np.sort(exits.tests - np.random.default_rng(seed).random(count))
     remaining = count + exits.censored - np.arange(count)
-    on_test = np.cumsum(np.diff(times, prepend=0.0) * remaining)
+    on_test = np.cumsum((np.diff(times, prepend=0.0) * remaining)[count // _EARLY :])
     return float(stats.kstest(on_test[:-1] / on_test[-1], "uniform").pvalue)

@@ -27,6 +27,7 @@ from vibrokit.results.finding import Code, Finding
 _DIRECT = math.exp(7.0)
 _SEEN = 30.0  # exits at that limit after which the choice is made
 _METASTABLE = 10.0  # relaxations in a mean exit time: with fewer the state is left before it has formed
+_IDLE = 5.0  # relaxations in which no walker has time to leave
 _STEP_SHARE = 4  # a part of the exits is simulated with half the steps
 _LEAST_CHECKED = 25
 _SIGNIFICANT = 3.0  # standard errors
@@ -71,6 +72,8 @@ class AtIntensity:
     step_change, step_change_error : float
         What half the steps change in ln of the rate of all exits, and its standard error.
     escapes : Escapes or None
+    metastable : bool
+        Whether the state lasts much longer than its relaxation: otherwise the rate says nothing about ΔU.
     findings : tuple of Finding
     """
 
@@ -83,6 +86,7 @@ class AtIntensity:
     step_change: float = math.nan
     step_change_error: float = math.nan
     escapes: Escapes | None = None
+    metastable: bool = True
     findings: tuple[Finding, ...] = ()
 
 
@@ -175,10 +179,11 @@ class Measurement:
             other = coarser.exits()
             change = math.log(mean_tests(exits) / mean_tests(other))
             change_error = math.hypot(len(exits) ** -0.5, len(other) ** -0.5)
+        findings = tuple(self._found(exits, p_value, change, change_error))
         return AtIntensity(
             walk.intensity, "direct", rates, exits, walk.interval, p_value, change, change_error,
             run.escapes(self.settings.escapes) if self.settings.escapes and run.left else None,
-            tuple(self._found(exits, p_value, change, change_error)),
+            all(finding.code is not Code.NOT_METASTABLE for finding in findings), findings,
         )  # fmt: skip
 
     def _found(self, exits: Exits, p_value: float, change: float, change_error: float) -> list[Finding]:
@@ -186,7 +191,10 @@ class Measurement:
         source, intensity, walk = self.problem.source, self.walk.intensity, self.walk
         found = list[Finding]()
         if not len(exits):
-            bound = math.exp(-_in_seconds(rate_of(exits, 0), walk).log_upper)
+            # Nobody leaves at once: the first relaxations of each walker are no evidence.
+            idle = math.ceil(_IDLE * walk.relaxation) * walk.checks * exits.censored
+            seen = dataclasses.replace(exits, at_risk=max(exits.at_risk - idle, 1))
+            bound = math.exp(-_in_seconds(rate_of(seen, 0), walk).log_upper)
             found.append(Finding.of(Code.NO_EXIT_SEEN, source, intensity=intensity, time=bound))
             return found
         mean = mean_tests(exits) / walk.checks / walk.relaxation
