@@ -449,6 +449,7 @@ def test_the_scene_may_come_after_the_analyzers(place):
         (["run", "double-well", *PLOT, "--exit", "leave-basin:true,3"], "takes 1 argument"),
         (["run", "double-well", *PLOT, "--exit", "first-contact:top"], "'top'"),
         (["run", "double-well", *PLOT, "--time-limit", "-1"], "time_limit"),
+        (["run", "double-well", *PLOT, "--checkpoint", "work.ckpt"], "--checkpoint"),
         (["run", "double-well", "--analyzer", "actionplot"], "action-plot"),
         (["plot", "nothing.nc"], "nothing.nc"),
         (["report", "nothing.nc"], "nothing.nc"),

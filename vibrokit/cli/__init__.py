@@ -83,6 +83,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
     run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
     run.add_argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")
+    run.add_argument(
+        "--checkpoint", type=Path, metavar="FILE", help="keep what mfet has done in this file, and go on from it"
+    )
     run.add_argument("--json", action="store_true", help="print one JSON object and draw nothing")
     run.add_argument(
         "-o", "--output", type=Path, metavar="FILE",

@@ -121,6 +121,12 @@ def planned(options: argparse.Namespace) -> Plan:
     settings |= {} if options.exit is None else {"exit": named_exit(options.exit)}
     settings |= {} if options.source is None else {"source": source_of(options.source)}
     kinds = {name: load(Group.ANALYZERS, name, Analyzer) for name in options.analyzer}
+    if options.checkpoint is not None:
+        keeping = [name for name, kind in kinds.items() if kind.keeps_checkpoints]
+        if len(keeping) != 1:
+            raise VibrokitError(
+                f"--checkpoint is for one of the analyzers that write one, such as mfet; got {len(keeping)}."
+            )
     return Plan(osc, stepper, {name: configured(kind, settings) for name, kind in kinds.items()})
 
 
@@ -148,7 +154,8 @@ def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outco
                     not_run(name, "the work was stopped before.")
                     continue
                 try:
-                    outcome.results[name] = analyzer.run(plan.osc, outcome.structure)
+                    kept = options.checkpoint if analyzer.keeps_checkpoints else None
+                    outcome.results[name] = analyzer.run(plan.osc, outcome.structure, checkpoint=kept)
                 except VibrokitError as error:
                     not_run(name, str(error))
                 except Exception as error:  # of a plug-in, or a mistake of ours: what was found is kept
