@@ -3,11 +3,14 @@
 import concurrent.futures as futures
 import dataclasses
 import math
+import os
 import signal
 import subprocess
 import sys
 import textwrap
+import threading
 
+import distributed
 import numpy as np
 import pytest
 
@@ -180,6 +183,23 @@ def test_any_executor_gives_the_same_bits(pool, splitting, structure):
     alone = analyzer.run(WELL, structure)
     with pool(2) as executor:
         assert analyzer.run(WELL, structure, executor=executor).data.identical(alone.data)
+
+
+@pytest.mark.slow
+def test_workers_of_dask_one_of_which_is_killed(structure):
+    analyzer = vk.MFET(intensities=(0.02,), source=0, target_error=0.05, splitting=False, escapes=2)
+    alone = analyzer.run(WELL, structure)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        first, *_ = client.run(os.getpid).values()
+        killer = threading.Timer(2.0, os.kill, (first, signal.SIGKILL))
+        killer.start()
+        found = analyzer.run(WELL, structure, executor=client.get_executor())
+        killer.join()
+        assert first not in client.run(os.getpid).values()
+    assert found.data.identical(alone.data)
 
 
 def test_the_seed_decides(structure):
