@@ -179,6 +179,7 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.trade.basins import measure_basins
     from vibrokit.trade.densities import measure_densities
     from vibrokit.trade.energies import measure_energies
+    from vibrokit.trade.exit_times import measure_exit_times
     from vibrokit.trade.steppers import measure_steppers
 
     osc = load_scene(options.scene)
@@ -190,6 +191,7 @@ def _trade(options: argparse.Namespace) -> None:
             measure_basins,
             partial(measure_energies, source=source),
             partial(measure_densities, source=source),
+            partial(measure_exit_times, source=source),
         ):
             try:
                 print(f"\n{measure(osc)}", flush=True)

@@ -8,6 +8,7 @@ import time
 import tracemalloc
 from collections.abc import Sequence
 
+from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import LeaveBasin
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.errors import SceneError, StructureError
@@ -32,13 +33,13 @@ _HEADINGS = ("setting", "ln rate", "error", "estimated", "time (s)", "memory (Mi
 
 
 @dataclasses.dataclass(frozen=True)
-class DensityRow:
-    """One setting of SGCM; numbers that are not known are NaN."""
+class RateRow:
+    """One setting of a method that gives rates; numbers that are not known are NaN."""
 
     setting: str  # as it is typed
     log_rate: float  # of the likeliest exit, per second
     error: float  # distance from the reference, in ln rate
-    estimated: float  # the error that SGCM estimates
+    estimated: float  # the error that the method estimates
     seconds: float  # on all threads, without compilation
     memory: float  # largest, in MiB
     default: bool
@@ -46,19 +47,19 @@ class DensityRow:
 
 
 @dataclasses.dataclass(frozen=True)
-class DensityTrade:
-    """Work and precision of SGCM for one attractor at the intensity of the scene."""
+class RateTrade:
+    """Work and precision of rates of one attractor at the intensity of the scene."""
 
     exit: str  # from where to where it leads, by name
     intensity: float
-    reference: DensityRow  # that all are compared with
-    rows: tuple[DensityRow, ...]
+    reference: RateRow  # that all are compared with
+    rows: tuple[RateRow, ...]
 
     def __str__(self) -> str:
         heading = (
             f"Rate {self.exit} at D = {self.intensity:g}.\n"
             f"Error: distance of ln rate from {self.reference.log_rate:.5g}, by {self.reference.setting}, "
-            f"whose own error is about {self.reference.estimated:.1e}.\nEstimated: the error that SGCM estimates."
+            f"whose own error is about {self.reference.estimated:.1e}.\nEstimated: the error that the method estimates."
         )
         lines = [_HEADINGS]
         for row in (*self.rows, self.reference):
@@ -77,7 +78,7 @@ def measure_densities(
     steps: Sequence[float] = STEPS,
     samples: Sequence[int] = SAMPLES,
     progress: Progress = None,
-) -> DensityTrade:
+) -> RateTrade:
     """Measure error, time and memory of `SGCM` with finer and coarser settings, for the likeliest exit of an attractor.
 
     The attractor is `source`, by default the first one, and the noise intensity that of the scene. `nodes` and `steps`
@@ -114,16 +115,23 @@ def measure_densities(
             dataclasses.replace(plain, nodes=on(_FINEST)),
         ]
         with stage("densities", subject=found.names[label], unit="settings", total=len(settings)):
-            rows = [_measured(osc, found, setting, target, shape) for setting in settings]
+            rows = [measured(osc, found, one, target, *_described(one, shape)) for one in settings]
     compared = tuple(dataclasses.replace(row, error=abs(row.log_rate - rows[-1].log_rate)) for row in rows)
     where = exit_between(found.names, label, target)
-    return DensityTrade(where, intensities[0], dataclasses.replace(rows[-1], error=math.nan), compared[:-1])
+    return RateTrade(where, intensities[0], dataclasses.replace(rows[-1], error=math.nan), compared[:-1])
 
 
-def _measured(osc: Oscillator, structure: Structure, analyzer: SGCM, target: int, shape: tuple[int, int]) -> DensityRow:
+def _described(analyzer: SGCM, shape: tuple[int, int]) -> tuple[str, bool]:
+    """The setting as it is typed, and whether it is the default."""
     given = {"nodes": analyzer.nodes, "steps": analyzer.steps, "samples": analyzer.samples}
     text = ", ".join(f"{name}={value}" for name, value in given.items() if value is not None)
-    default = analyzer.nodes == shape and analyzer.steps is None and analyzer.samples is None
+    return f"SGCM({text})", analyzer.nodes == shape and analyzer.steps is None and analyzer.samples is None
+
+
+def measured(
+    osc: Oscillator, structure: Structure, analyzer: Analyzer, target: int, text: str, default: bool
+) -> RateRow:
+    """Run an analyzer, and return the rate of the exit to a target with what it took."""
     tracemalloc.start()
     began = time.perf_counter()
     found = analyzer.run(osc, structure)
@@ -131,12 +139,11 @@ def _measured(osc: Oscillator, structure: Structure, analyzer: SGCM, target: int
     memory = tracemalloc.get_traced_memory()[1] / _MIB
     tracemalloc.stop()
     advance()
-    rates = found.rates if isinstance(found, SGCMResult) else ()
-    rate = next((rate for rate in rates if rate.target == target), None)
+    rate = next((rate for rate in found.rates if rate.target == target), None)
     if rate is None:
         failure = next(
             (str(finding.values["reason"]) for finding in found.found(Code.SOURCE_FAILED)),
             "This exit was not resolved.",
         )
-        return DensityRow(f"SGCM({text})", math.nan, math.nan, math.nan, seconds, memory, default, failure)
-    return DensityRow(f"SGCM({text})", rate.log_value, math.nan, rate.log_error, seconds, memory, default)
+        return RateRow(text, math.nan, math.nan, math.nan, seconds, memory, default, failure)
+    return RateRow(text, rate.log_value, math.nan, rate.log_error, seconds, memory, default)
