@@ -18,7 +18,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.structure import Structure
 
 _CHECKS_WITHOUT_SECTION = 16  # exit tests per unit of time where no section sets them
-_CHECKS_BY_POSITION = 32  # per period: a mass that turns back between two tests has gone little further
+_CHECKS_BY_POSITION = 32  # per turn of the free mass: if it turns back between two tests it has gone little further
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -84,10 +84,15 @@ class Exit(ABC):
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """Return where a path of least action from the attractor `source` may end."""
 
+    def targets(self, structure: Structure, source: int) -> tuple[Attractor, ...]:
+        """Return the attractors that may be reached; by default all others. An exit by position has no use for them."""
+        return tuple(attractor for attractor in structure.attractors if attractor.label != source)
+
     def checks_per_period(self, osc: Oscillator) -> int:
         """Return how many times in a section interval the test is made."""
         if self.by_position:
-            return _CHECKS_BY_POSITION
+            turns = osc.section_interval * osc.natural_frequency / (2.0 * math.pi)
+            return _CHECKS_BY_POSITION * 2 ** max(0, math.floor(math.log2(max(turns, 1.0))))
         return _CHECKS_WITHOUT_SECTION if osc.autonomous else 1
 
     def holds_at(self, osc: Oscillator, attractor: Attractor) -> bool:
@@ -104,9 +109,14 @@ class LeaveBasin(Exit):
         Whether a state at finite noise has left only when it has settled around another attractor. Otherwise it has
         left at its first section point in another basin. Where that basin has thin arms, noise soon throws the state
         back, and the rate is several times as large. The activation energy is the same.
+    to : int or str, optional
+        Label or name of the attractor that must be reached; by default any other. Motion on a third attractor goes on.
+        It serves states that noise exchanges quickly: together they are metastable, and only leaving all of them
+        counts.
     """
 
     for_good: bool = True
+    to: int | str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.for_good, bool):
@@ -129,6 +139,17 @@ class LeaveBasin(Exit):
                 "the structure has only one attractor, so there is no other basin to leave for; widen the region, "
                 "change the scene, or ask for the first contact with a stop (exit=FirstContact())."
             )
+        if self.to is not None:
+            structure.attractor(self.to)
+
+    def targets(self, structure: Structure, source: int) -> tuple[Attractor, ...]:
+        """The one that must be reached, or all others; raises StructureError if that one is the source."""
+        if self.to is None:
+            return super().targets(structure, source)
+        wanted = structure.attractor(self.to)
+        if wanted.label == source:
+            raise StructureError(f"LeaveBasin: to={self.to!r} is the attractor that is left; give another one.")
+        return (wanted,)
 
     def is_out(self, osc: Oscillator, states: Array) -> Mask:
         """No state: only the attractor that it leads to decides."""
@@ -136,20 +157,22 @@ class LeaveBasin(Exit):
 
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the basin grid."""
-        basins = structure.basins
-        return Stop().with_cells(basins.region.bounds, basins.labels, home=source)
+        basins, reached = structure.basins, [attractor.label for attractor in self.targets(structure, source)]
+        labels = np.where((basins.labels < 0) | np.isin(basins.labels, reached), basins.labels, source)
+        return Stop().with_cells(basins.region.bounds, labels, home=source)
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """The saddles on basin boundaries, those of this basin first, and basins that none of these leads to."""
         own, others = [], []
+        wanted = [attractor.label for attractor in self.targets(structure, source)]
         for number, saddle in enumerate(structure.saddles):
-            targets = tuple(dict.fromkeys(label for label in saddle.leads_to if label != source))
+            targets = tuple(dict.fromkeys(label for label in saddle.leads_to if label in wanted))
             if source in saddle.leads_to and targets:
                 own.append(AtSaddle(targets, number))
             elif saddle.on_boundary:
                 others.append(AtSaddle(targets, number, on_own_boundary=False))
         reached = {source, *(label for end in own for label in end.targets)}
-        basins = [InBasin((a.label,)) for a in structure.attractors if a.label not in reached]
+        basins = [InBasin((label,)) for label in wanted if label not in reached]
         return (*own, *others, *basins)
 
 

@@ -59,6 +59,11 @@ class ExitProblem:
         return self.attractor.label
 
     @cached_property
+    def targets(self) -> tuple[Attractor, ...]:
+        """The attractors that may be reached."""
+        return self.exit.targets(self.structure, self.source)
+
+    @cached_property
     def scene(self) -> Oscillator:
         """The scene that paths move in until they leave."""
         return self.exit.scene(self.osc)

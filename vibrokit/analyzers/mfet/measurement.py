@@ -214,10 +214,12 @@ class Measurement:
 
     def _kept(self, target: int) -> float:
         """Share of walkers that stay at a target for a few relaxations of it."""
-        other = dataclasses.replace(self.problem, attractor=self.problem.structure.attractors[target])
+        attractors = self.problem.structure.attractors
+        other = dataclasses.replace(self.problem, attractor=attractors[target])
         walk = dataclasses.replace(self.walk, problem=other)
+        left = walk.around([attractor for attractor in attractors if attractor.label != target])
         begun = walk.from_orbit(other.attractor, 200, 13)
-        ended = walk.advance(begun, math.ceil(_METASTABLE / 2 * walk.relaxation))
+        ended = walk.advance(begun, math.ceil(_METASTABLE / 2 * walk.relaxation), left)
         return float((ended.status == COMPLETED).mean())
 
     def _from_splitting(self, run: SplittingRun) -> AtIntensity:

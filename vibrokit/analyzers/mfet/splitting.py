@@ -102,15 +102,15 @@ class SplittingRun:
 
     def run(self) -> None:
         """Go on until it is done."""
-        with stage("splitting", unit="batches"):
+        with stage("splitting", unit="replicas"):
             while self.batches < self._expected():
-                report(self.batches, self._expected())
+                report(self.batches * _REPLICAS, self._expected() * _REPLICAS)
                 more, known = self._batch(self.batches), self.estimates
                 self.estimates = Estimates(
                     np.concatenate([known.log_values, more.log_values]), np.concatenate([known.targets, more.targets])
                 )
                 self.slot.write(vars(self.estimates))
-            report(self.batches, self.batches)
+            report(self.batches * _REPLICAS, self.batches * _REPLICAS)
 
     def _expected(self) -> int:
         """Batches that are needed in all, by the error so far."""

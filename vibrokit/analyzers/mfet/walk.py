@@ -110,8 +110,8 @@ class Walk:
 
     @cached_property
     def arrival(self) -> Stop:
-        """The test for being in the core of another attractor, on the section."""
-        return self.around([a for a in self.problem.structure.attractors if a.label != self.problem.source])
+        """The test for being in the core of an attractor that may be reached, on the section."""
+        return self.around(self.problem.targets)
 
     @cached_property
     def own(self) -> Stop:

@@ -21,8 +21,15 @@ _EVALUATIONS = 200  # of the misfits; a path that converges at all needs 10 to 6
 _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _SHORTEST_STEP = 1e-4  # share of a Newton step
-_ACCEPTED = 1e-9  # misfit: the action is stationary, so that it is wrong by the square of this
+ACCEPTED = 1e-9
+"""Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this, or in
+proportion to it along a family of paths that all but solve the equations."""
 _LONGEST_LAST = 3.0  # pieces
+_SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
+_FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
+_INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
+_MATCHED = 1e-4  # of that step: length of what is left of Newton's step when all else is matched
+_LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
 
 Array = NDArray[np.float64]
 
@@ -44,6 +51,7 @@ class ExtremalPath:
     # ∇H. The jump is as small as the errors of the linearized ends.
     slack: float  # of that jump, relative to the path's size
     scale: Array  # (2n,): that size
+    flat: bool  # whether it is one of a family of paths, all of which solve the equations to the accepted misfit
 
     @property
     def action(self) -> float:
@@ -78,6 +86,7 @@ def extremal_path(
     last: float,  # duration of the last piece (s); a guess where it is free
     *,
     evaluations: int = _EVALUATIONS,  # of the misfits, at most
+    accepted: float = ACCEPTED,  # misfit
 ) -> ExtremalPath:
     """Solve for a path: continuity, n conditions at the source, the conditions of the ending.
 
@@ -87,11 +96,11 @@ def extremal_path(
 
     Raises StructureError if it does not converge.
     """
-    found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations)
-    if not found.residual <= _ACCEPTED:
+    found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations, accepted)
+    if not found.residual <= accepted:
         raise StructureError(
             f"Newton's method found no extremal path near the guess: the relative misfit stays at "
-            f"{found.residual:.1e}, above {_ACCEPTED:g}. The guess is too far off, or the path grazes a stop."
+            f"{found.residual:.1e}, above {accepted:g}. The guess is too far off, or the path grazes a stop."
         )
     return found
 
@@ -115,6 +124,46 @@ class _Pin:
         n, rate = len(scale) // 2, propagator.rate(points[self.node], 0.0)
         normal = np.concatenate([-rate[n:], rate[:n]]) * scale  # ∇H = (−p′, q′)
         self.rate, self.normal = (each / np.linalg.norm(each) for each in (rate / scale, normal))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Soft:
+    """The direction in which the misfits change least, of length 1, if it is nearly undetermined; else 0."""
+
+    direction: Array
+    value: float  # the singular value
+
+    @classmethod
+    def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> _Soft:
+        """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value."""
+        direction, value = guess, math.inf
+        if not np.any(guess):
+            return cls(guess, math.inf)
+        for _ in range(_INVERSE_ITERATIONS):
+            left = factors.solve(direction / np.linalg.norm(direction), trans="T")
+            direction = factors.solve(left / np.linalg.norm(left))
+            value = 1 / float(np.linalg.norm(direction))
+        return cls(direction * value if value < _SOFT else 0.0 * direction, value)
+
+    @property
+    def flat(self) -> bool:
+        """Whether a shift as long as the path itself makes no misfit, so that rounding decides on its length."""
+        return self.value < _FLAT
+
+    @property
+    def most(self) -> float:
+        """Length of the longest step in this direction."""
+        largest = float(np.abs(self.direction).max())
+        return _LONGEST_SHIFT / largest if largest else math.inf
+
+    def limited(self, step: Array) -> float:
+        """Return how far a step goes in this direction, or the longest way."""
+        return min(max(float(self.direction @ step), -self.most), self.most)
+
+    def without(self, step: Array) -> Array:
+        """Return a step less what it is in this direction."""
+        rest: Array = step - (self.direction @ step) * self.direction
+        return rest
 
 
 class _Matching:
@@ -181,10 +230,15 @@ class _Matching:
         side = size + len(number)
         return sparse_blocks(table, (side, side))
 
-    def solve(self, points: Array, evaluations: int) -> ExtremalPath:
-        """Newton's method, each step as long as the one after it would be shorter (Deuflhard's natural test)."""
+    def solve(self, points: Array, evaluations: int, accepted: float) -> ExtremalPath:
+        """Newton's method, each step as long as the one after it would be shorter (Deuflhard's natural test).
+
+        Where the motion is nearly autonomous, paths that leave at other phases nearly solve the equations too, and one
+        direction is nearly undetermined. A long step in that direction waits until all else is matched; then the misfit
+        may be small enough already. If not, the path moves along the family, a short step at a time.
+        """
         number = np.array([self.last] if self.ending.free_time else [0.0] if self.pin is not None else [])
-        current = self.evaluate(points, number)
+        current, flat = self.evaluate(points, number), False
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
             try:
@@ -192,13 +246,23 @@ class _Matching:
             except RuntimeError:  # singular: the guess is far from any path
                 break
             step = -factors.solve(current.misfits)
+            soft = _Soft.of(factors, step)
+            rest = soft.without(step)
+            if soft.flat or soft.most < np.abs(soft.direction @ step):
+                if np.linalg.norm(rest) > _MATCHED * soft.most:
+                    step = rest
+                elif current.largest <= accepted:
+                    flat = True
+                    break
+                else:
+                    step = rest + soft.limited(step) * soft.direction
             length, share = float(np.linalg.norm(step)), 1.0
             while share > _SHORTEST_STEP:
                 moved = self._moved(points, number, share * step)
                 tried = self.evaluate(*moved)
                 evaluations -= 1
                 if math.isfinite(tried.largest):
-                    ahead = float(np.linalg.norm(factors.solve(tried.misfits)))
+                    ahead = float(np.linalg.norm(soft.without(factors.solve(tried.misfits))))
                     if ahead <= (1 - share / 4) * length or tried.largest < _EXACT:
                         break
                 share /= 2
@@ -210,7 +274,7 @@ class _Matching:
         slack = 0.0 if self.pin is None else abs(float(number[0]))
         return ExtremalPath(
             self.source, self.first, self.ending, points, self._last(number),
-            current.carried.derivatives, current.carried.actions, current.largest, slack, self.scale,
+            current.carried.derivatives, current.carried.actions, current.largest, slack, self.scale, flat,
         )  # fmt: skip
 
     def _last(self, number: Array) -> float:

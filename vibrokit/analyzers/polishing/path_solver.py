@@ -26,6 +26,12 @@ _FAILURES = 3  # of these in turn, after which no longer one is tried
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
+_FIRST_ACCEPTED = 1e-6  # misfit of a path that is completed afterwards: on a short one it is larger
+_ONE_PATH, _ONE_FAMILY = (
+    1e-9,
+    1e-6,
+)  # relative differences of the actions of one path, and of a family before completion
+_FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
@@ -36,7 +42,7 @@ class PathSolver:
 
     def __init__(self, propagator: SegmentPropagator, source: LinearizedOrbit) -> None:
         self.propagator, self.source = propagator, source
-        self._known: dict[tuple[int, int, str], ExtremalPath | StructureError] = {}
+        self._known: list[tuple[ExtremalPath, ExtremalPath | StructureError]] = []
 
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
@@ -50,6 +56,9 @@ class PathSolver:
             first, states = _begun(propagator, self.source, cut.states)
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
         points, action, first, cut = min(fitted, key=lambda each: each[1])
+        for _, known in self._known:
+            if isinstance(known, ExtremalPath) and _in_family(known, first, points, action):
+                return known
 
         def from_orbit(failure: StructureError, known: float) -> ExtremalPath:
             if not known < worth:
@@ -60,23 +69,23 @@ class PathSolver:
             found = self._descended(self.source, first, cut, points)
         except StructureError as error:
             return from_orbit(error, action)
-        key = self.source.node(found.first), len(found.points), f"{found.action:.9e}"
-        if key not in self._known:
+        again = [result for before, result in self._known if _are_one(before, found)]
+        if not again:
             try:
-                self._known[key] = self._completed(found, from_orbit)
+                again = [self._completed(found, from_orbit)]
             except StructureError as error:
-                self._known[key] = error
-        known = self._known[key]
-        if isinstance(known, StructureError):
-            raise known
-        return known
+                again = [error]
+            self._known.append((found, again[0]))
+        if isinstance(again[0], StructureError):
+            raise again[0]
+        return again[0]
 
     def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
         ending = cut.ending
         points, _ = descend_action(
             self.propagator, first, points, last=cut.last, free=ending.free, closing=ending.closing
         )  # fmt: skip
-        return extremal_path(self.propagator, source, first, ending, points, cut.last)
+        return extremal_path(self.propagator, source, first, ending, points, cut.last, accepted=_FIRST_ACCEPTED)
 
     def _completed(self, found: ExtremalPath, from_orbit: Callable[..., ExtremalPath]) -> ExtremalPath:
         """The same path, started and ended so near to its orbits that the action no longer changes."""
@@ -116,6 +125,32 @@ class PathSolver:
         if best is None:
             raise failure
         return best
+
+
+def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
+    """Return whether two paths, each polished once, are one, or of one family."""
+    if one.flat and other.flat:
+        return abs(one.action - other.action) <= _ONE_FAMILY * one.action
+    alike = one.source.node(one.first) == other.source.node(other.first) and len(one.points) == len(other.points)
+    return alike and abs(one.action - other.action) <= _ONE_PATH * one.action
+
+
+def _in_family(known: ExtremalPath, first: int, points: Array, action: float) -> bool:
+    """Return whether a path of a known action, from the Gauss–Newton method, belongs to the family of a known path.
+
+    On the section, the states of all members lie on one line.
+    """
+    if not known.flat or abs(action - known.action) > _FITTED * known.action:
+        return False
+    pieces = known.ending.propagator.grain
+    line, own = (
+        nodes[-number % pieces :: pieces, : len(known.scale) // 2] / known.scale[: len(known.scale) // 2]
+        for nodes, number in ((known.points, known.first), (points, first))
+    )
+    starts, ways = line[:-1], np.diff(line, axis=0)
+    along = np.einsum("akj,kj->ak", own[:, None] - starts, ways) / np.maximum((ways**2).sum(axis=1), 1e-300)
+    nearest = starts + np.clip(along, 0, 1)[..., None] * ways
+    return bool(np.linalg.norm(own[:, None] - nearest, axis=2).min(axis=1).max() < _SAME)
 
 
 def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int) -> ExtremalPath:

@@ -65,7 +65,7 @@ class Cores:
             entry: Array = self.start(grid, intensity) + np.log(own)
         if self.problem.exit.by_position:
             return CoreSets(own, {}, entry)
-        others = [a for a in self.problem.structure.attractors if a.label != self.problem.source]
+        others = self.problem.targets
         if self.problem.exit.at_boundary:
             return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
         return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in others}, entry)
