@@ -446,7 +446,7 @@ def test_the_scene_may_come_after_the_analyzers(place):
         (["run", "double-well", *PLOT, "--stepper", "order8:7"], "tolerance"),
         (["run", "double-well", *PLOT, "--exit", "leave-basins"], "leave-basin"),
         (["run", "double-well", *PLOT, "--exit", "leave-basin:left"], "for_good must be true or false"),
-        (["run", "double-well", *PLOT, "--exit", "leave-basin:true,3"], "takes 1 argument"),
+        (["run", "double-well", *PLOT, "--exit", "leave-basin:true,3,4"], "takes 2 arguments"),
         (["run", "double-well", *PLOT, "--exit", "first-contact:top"], "'top'"),
         (["run", "double-well", *PLOT, "--time-limit", "-1"], "time_limit"),
         (["run", "double-well", *PLOT, "--checkpoint", "work.ckpt"], "--checkpoint"),

@@ -31,12 +31,12 @@ def stopped_at(structure, stage, done):
 @pytest.mark.parametrize(
     ("stage", "done", "methods", "branches"),
     [
-        ("graph", 0, [], 0),
-        ("action plot", 0, ["graph"], 0),
-        ("polishing", 0, ["graph"], 0),
+        ("action plot", 0, [], 0),
+        ("polishing", 0, [], 0),
         ("polishing", 1, ["least action"], 1),
-        ("certifying", 0, ["graph"], 0),
+        ("certifying", 0, [], 0),
         ("certifying", 1, ["least action"], 1),
+        ("graph", 0, ["least action"], 1),
     ],
 )
 def test_what_was_found_before_a_stop_is_kept(structure, stage, done, methods, branches):
@@ -78,6 +78,21 @@ def test_all_work_belongs_to_a_named_stage(structure):
         "exit targets", "graph", "starts of exit paths", "action plot", "ends of exit paths", "polishing", "certifying"
     }  # fmt: skip
     assert rest < 0.05 * sum(seconds.values())
+
+
+def test_the_graph_is_refined_as_far_as_the_accuracy_asks(structure):
+    graph = vk.GraphSearch(nodes=(200, 200), steps_per_period=8)
+
+    def nodes_used(accuracy):
+        result = vk.LeastAction(source=0, shooting=SMALL["shooting"], graph=graph, accuracy=accuracy).run(
+            OSC, structure
+        )
+        (used,), (energy,) = result.found(Code.GRAPH), result.energies
+        assert energy.bound is Bound.CERTIFIED
+        assert EXACT - energy.lower <= max(accuracy, 0.05) * EXACT
+        return used.values["nodes_x"]
+
+    assert [nodes_used(accuracy) for accuracy in (0.5, 1e-6)] == [67, 200]
 
 
 class LeaveLeft(LeaveRegion):

@@ -355,3 +355,28 @@ def test_each_event_is_counted_apart():
     (settled,), (crossed,) = found[True].rates, found[False].rates
     assert [settled.event, crossed.event] == ["commitment", "basin"]
     assert crossed.value > 1.2 * settled.value
+
+
+def test_motion_on_a_third_attractor_goes_on():
+    """Three wells: the time from side to side is that of the Markov chain with the rates between neighbours."""
+    spring = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/8")
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.3, spring=spring, noise=vk.WhiteNoise(intensity=0.05))
+    wells = vk.find_structure(osc, region=((-3, 3), (-3, 3)), cells=(60, 60), manifolds=False, rng=0)
+    left, middle, right = (a.name for a in sorted(wells.attractors, key=lambda each: each.points[0, 0]))
+
+    def rates(source, **to):
+        given = {"intensities": (0.05,), "escapes": 0, "splitting": False}
+        found = vk.MFET(source=source, exit=vk.LeaveBasin(**to), **given).run(osc, wells).rates
+        return {rate.target: rate for rate in found}
+
+    outer, inner = rates(left), rates(middle)
+    direct = rates(left, to=right)
+    assert list(direct) == [wells.attractor(right).label]
+    expected = 2 / sum(rate.value for rate in outer.values()) + 2 / sum(rate.value for rate in inner.values())
+    (rate,) = direct.values()
+    assert abs(math.log(rate.mean_time / expected)) < 0.25  # five standard errors of the three together
+    for refused in ({"exit": vk.LeaveBasin(to=right), "splitting": True}, {"exit": vk.LeaveBasin(to=left)}):
+        found = vk.MFET(source=left, **refused).run(osc, wells)
+        assert [finding.code for finding in found.findings] == [Code.SOURCE_FAILED]
+    with pytest.raises(StructureError, match="no attractor"):
+        vk.MFET(source=left, exit=vk.LeaveBasin(to="nowhere")).run(osc, wells)

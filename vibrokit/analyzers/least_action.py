@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, ClassVar
 
 import xarray
@@ -11,7 +13,7 @@ from vibrokit.analyzers.agreement import combined
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.polishing.polish import METHOD, polish
+from vibrokit.analyzers.polishing.polish import METHOD, Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError, shown
@@ -22,10 +24,11 @@ from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.result import Result
 from vibrokit.structure.attractors.orbits_inside import orbits_inside
 from vibrokit.structure.orbits import Orbit
-from vibrokit.structure.validation import whole
+from vibrokit.structure.validation import share, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000
+_AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH)
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -48,6 +51,9 @@ class LeastAction(Analyzer):
         One of the searches; None to do without.
     graph : GraphSearch, optional
         The other one; None to do without.
+    accuracy : float
+        The graph is refined, coarse to fine up to its `nodes`, until its error is at most this part of each energy.
+        The energies themselves are far more accurate; this is how far below them a cheaper path is not excluded.
     orbits : int
         Number of unstable orbits inside a chaotic attractor that paths are polished from.
     source : int or str, optional
@@ -62,6 +68,7 @@ class LeastAction(Analyzer):
 
     shooting: Shooting | None = dataclasses.field(default_factory=Shooting)
     graph: GraphSearch | None = dataclasses.field(default_factory=GraphSearch)
+    accuracy: float = 0.1
     orbits: int = 4
 
     def __post_init__(self) -> None:
@@ -69,6 +76,7 @@ class LeastAction(Analyzer):
         _check_part("graph", self.graph, GraphSearch)
         if self.shooting is None and self.graph is None:
             raise StructureError("LeastAction: shooting and graph are both None; at least one must search for paths.")
+        share("LeastAction: accuracy", self.accuracy)
         whole("LeastAction: orbits", self.orbits, 0, _MOST_ORBITS)
 
     def analyze(self, problem: ExitProblem) -> Analysis:
@@ -84,7 +92,7 @@ class LeastAction(Analyzer):
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
-        for doing, step in (("graph", work.search_graph), ("action plot", work.shoot), ("polishing", work.polish)):
+        for doing, step in (("action plot", work.shoot), ("graph", work.search_graph)):
             try:
                 step()
             except KeyboardInterrupt as error:
@@ -100,29 +108,14 @@ class _Work:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
-        self.candidates: list[Candidate] = []
-        self.branches: list[ActivationEnergy] = []
         self.findings: list[Finding] = []
 
     @property
     def stopped(self) -> bool:
-        return any(finding.code is Code.STOPPED for finding in self.findings)
-
-    def search_graph(self) -> None:
-        """Search the graph; each solution is better than the one before."""
-        if self.analyzer.graph is None:
-            return
-        try:
-            for solution in self.analyzer.graph.solutions(self.problem):
-                self.graph = solution
-        except (SceneError, StructureError, StepperError) as error:
-            self._failed("graph search", error, only=self.analyzer.shooting is None)
-        if self.graph is not None:
-            self.candidates += self.graph.candidates
-            self.findings += self.graph.findings
+        return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
 
     def shoot(self) -> None:
-        """Shoot from an orbit or an equilibrium."""
+        """Shoot from an orbit or an equilibrium, and polish what is found."""
         if self.analyzer.shooting is None or not self.problem.attractor.is_fixed:
             return
         try:
@@ -130,29 +123,68 @@ class _Work:
         except (StructureError, StepperError) as error:
             self._failed("action plot", error, only=self.analyzer.graph is None)
         else:
-            self.candidates += found.candidates
             self.findings += found.findings
+            self._polish(found.candidates)
 
-    def polish(self) -> None:
-        """Polish the candidates, from each of several orbits where the attractor is a set."""
+    def search_graph(self) -> None:
+        """Search the graph, coarse to fine, and polish its paths, until its error is as small as wanted."""
+        graph = self.analyzer.graph
+        if graph is None:
+            return
+        found: GraphSolution | None = None
+        for nodes in graph.refinements():
+            try:
+                for found in dataclasses.replace(graph, nodes=nodes).solutions(self.problem):
+                    self.graph = found
+            except (SceneError, StructureError, StepperError) as error:
+                if nodes == graph.nodes:
+                    self._failed("graph search", error, only=self.analyzer.shooting is None and found is None)
+                continue
+            if found is not None:
+                self._polish(found.candidates)
+                if self.stopped or self._settled(found):
+                    break
+
+    def _settled(self, graph: GraphSolution) -> bool:
+        """Whether the graph's error is small enough, and the paths agree with it."""
+        _, compared = combined(self.problem.attractor, self._polished()[0], graph.estimates)
+        exact = all(each.numerical_error <= self.analyzer.accuracy * each.value for each in graph.estimates)
+        return exact and all(finding.code in _AGREED for finding in compared)
+
+    @cached_property
+    def _polishings(self) -> list[Polishing]:
+        """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
+        found = list[Polishing]()
         for orbit in (None,) if self.problem.attractor.is_fixed else self._orbits_inside():
             try:
-                polished = polish(self.problem, self.candidates, orbit)
+                found.append(Polishing(self.problem, orbit))
             except (StructureError, StepperError) as error:
                 self._failed("polishing", error)
-            else:
-                self.branches += polished.branches
-                self.findings += polished.findings
+        return found
+
+    def _polish(self, candidates: Sequence[Candidate]) -> None:
+        for polishing in self._polishings:
+            polishing.add(candidates)
             if self.stopped:
                 break
 
+    def _polished(self) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+        """Branches and findings of all orbits."""
+        if "_polishings" not in vars(self):
+            return (), ()
+        found = [polishing.polished() for polishing in self._polishings]
+        branches = tuple(branch for each in found for branch in each.branches)
+        findings = tuple(finding for each in found for finding in each.findings)
+        return branches if self.problem.attractor.is_fixed else _once(branches), findings
+
     def analysis(self) -> Analysis:
         """Combine what was found."""
-        branches = tuple(self.branches) if self.problem.attractor.is_fixed else _once(self.branches)
+        branches, polished = self._polished()
         estimates = () if self.graph is None else self.graph.estimates
         energies, compared = combined(self.problem.attractor, branches, estimates)
-        own = (finding for finding in self.findings if finding.code is not Code.NO_EXIT_FOUND)  # of one search alone
-        findings = [*own, *compared]
+        every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
+        findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
+        findings += compared
         if not energies and not self.stopped:
             findings.append(Finding.of(Code.NO_EXIT_FOUND, self.problem.source))
         return Analysis(
@@ -185,7 +217,7 @@ class _Work:
         return found
 
 
-def _once(branches: list[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
+def _once(branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
     """The branches, the cheapest first; of those that differ only in the orbit that they start on, the cheapest."""
     kept: list[ActivationEnergy] = []
     for branch in sorted(branches, key=lambda branch: branch.value):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
 from typing import ClassVar
 
 import numpy as np
@@ -25,7 +24,7 @@ from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.result import Result
-from vibrokit.structure.validation import intensities, whole
+from vibrokit.structure.validation import intensities, share, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "Arrhenius fit"
@@ -54,7 +53,8 @@ class MFET(Analyzer):
     seed : int
         Chooses the random numbers; the same seed gives the same result to the last bit.
     splitting : bool, optional
-        Whether to use splitting; by default where it is faster.
+        Whether to use splitting; by default where it is faster. It is not used with `LeaveBasin(to=…)` where there are
+        other attractors: excursions that stay with these do not belong to the attractor that is left.
     replicas : int
         Independent estimates of splitting, at most; 16 at least.
     from_orbit : bool
@@ -90,9 +90,7 @@ class MFET(Analyzer):
     escapes: int = 50
 
     def __post_init__(self) -> None:
-        error = self.target_error
-        if isinstance(error, bool) or not isinstance(error, Real) or not _SMALLEST_ERROR <= error <= 1:
-            raise StructureError(f"MFET: target_error must be from {_SMALLEST_ERROR:g} to 1, got {shown(error)}.")
+        share("MFET: target_error", self.target_error, _SMALLEST_ERROR)
         whole("MFET: seed", self.seed, 0, 2**63 - 1)
         whole("MFET: escapes", self.escapes, 0, 100_000)
         whole("MFET: replicas", self.replicas, 16, 1_000_000)
@@ -110,6 +108,12 @@ class MFET(Analyzer):
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
         wanted = self._intensities(problem.osc)
+        bystanders = problem.has_bystanders
+        if self.splitting and bystanders:
+            raise StructureError(
+                "MFET: splitting=True follows excursions from one attractor, and the exit leaves others standing by; "
+                "use splitting=None, or an exit that counts each of them (exit=LeaveBasin())."
+            )
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
         attractors = problem.structure.attractors

@@ -63,6 +63,11 @@ class ExitProblem:
         """The attractors that may be reached."""
         return self.exit.targets(self.structure, self.source)
 
+    @property
+    def has_bystanders(self) -> bool:
+        """Whether there are attractors that are neither left nor may be reached."""
+        return len(self.targets) + 1 < len(self.structure.attractors)
+
     @cached_property
     def scene(self) -> Oscillator:
         """The scene that paths move in until they leave."""

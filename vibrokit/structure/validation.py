@@ -70,6 +70,9 @@ class Request:
         return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
 
 
+_TINY = 5e-324
+
+
 def plain(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return arguments as plain data, which the same call takes."""
     return {name: _plain(value) for name, value in arguments.items()}
@@ -99,6 +102,13 @@ def whole(name: str, number: Any, least: int, most: int) -> int:
     if isinstance(number, bool) or not isinstance(number, Integral) or not least <= int(number) <= most:
         raise StructureError(f"{name} must be a whole number from {least} to {most}, got {shown(number)}.")
     return int(number)
+
+
+def share(name: str, number: Any, least: float = 0.0) -> None:
+    """Refuse a number that is not a share: above 0, at most 1 and not below `least`."""
+    if isinstance(number, bool) or not isinstance(number, Real) or not max(least, _TINY) <= float(number) <= 1:
+        allowed = f"from {least:g} to 1" if least else "above 0 and at most 1"
+        raise StructureError(f"{name} must be {allowed}, got {shown(number)}.")
 
 
 def pair(name: str, counts: Any, most: int = _MOST_CELLS, least: int = 1) -> tuple[int, int]:

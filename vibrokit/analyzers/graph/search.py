@@ -30,6 +30,7 @@ _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predeces
 _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
 _ALL_GRIDS = 1.9  # memory of all grids together, in units of the finest
 _FEWEST_NODES = 32
+_PARTS, _FEWEST_REFINED = (3.0, 1.75), 60  # along a side: time grows with the nodes, the error falls with them
 _MOST_STEPS = 64
 _STEPS_PER_PERIOD = (8, 16, 32, 64)
 
@@ -124,6 +125,12 @@ class GraphSearch:
                     "twice as long."
                 )
         gibibytes(f"{name}: max_memory_gib", self.max_memory_gib)
+
+    def refinements(self) -> tuple[tuple[int, int], ...]:
+        """Return numbers of nodes from few to those that are set, each about twice as many as the ones before."""
+        nx, nv = self.nodes
+        coarser = ((round(nx / part), round(nv / part)) for part in _PARTS)
+        return (*(nodes for nodes in coarser if min(nodes) >= _FEWEST_REFINED), self.nodes)
 
     def search(self, problem: ExitProblem) -> GraphSolution:
         """Search the exits of one attractor.

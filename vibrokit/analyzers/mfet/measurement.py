@@ -126,7 +126,7 @@ class Measurement:
         wanted = math.ceil(self.settings.target_error**-2)
         if self.settings.splitting is not True:
             self._direct = self._begun(self.walk, wanted, "direct", 10)
-            limits = () if self.settings.splitting is False else self._limits(wanted)
+            limits = () if self.settings.splitting is False or self.problem.has_bystanders else self._limits(wanted)
             if self._direct.run(*limits):
                 return self._from_direct(self._direct, self._checked_steps(wanted))
         importance = self.importance(self.walk) or from_distances(self.walk)

@@ -33,42 +33,61 @@ class Polished:
 
 
 def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit | None = None) -> Polished:
-    """Polish candidates to certified exit paths.
+    """Polish candidates to certified exit paths; arguments and errors as of `Polishing`."""
+    work = Polishing(problem, orbit)
+    work.add(candidates)
+    return work.polished()
 
-    If it is stopped, by Ctrl-C or by the time limit, the paths found so far are certified and returned.
+
+class Polishing:
+    """Certified exit paths of one attractor, from candidates that may come one search after another.
+
+    If it is stopped, by Ctrl-C or by the time limit, the paths found so far are certified and kept.
 
     For an attractor that is not an orbit, `orbit` is an unstable one inside it; an exit from there costs at least as
     much as leaving the attractor. Raises StructureError if none is given, or if the orbit is not hyperbolic, and
     StepperError if the stepper cannot integrate Hamilton's equations of this scene.
     """
-    source = problem.source
-    with stage("ends of exit paths", subject=problem.attractor.name):
-        ends, findings = usable_ends(problem)
-        polisher = CandidatePolisher(problem, ends, *_start(problem, orbit))
-    ranked = sorted(candidates, key=lambda each: each.action)
-    branches: list[ActivationEnergy] = []
-    try:
-        with stage("polishing", unit="candidates", total=len(ranked)):
-            for candidate in ranked:
-                polisher.polish(candidate)
-                advance()
-            for end in ends:
-                polisher.reach(end, ranked)
-    except KeyboardInterrupt as error:
-        findings.append(Finding.stopped("polishing", error, source))
-    findings += polisher.findings
-    if polisher.skipped:
-        values = {"skipped": polisher.skipped, "total": len(ranked), "factor": WORTH}
-        findings.append(Finding(Code.CANDIDATES_SKIPPED, source, values=values))
-    try:
-        with stage("certifying", unit="paths", total=len(polisher.solved)):
-            for solved in polisher.solved:
-                branches += _certified(source, solved, findings)
-                advance()
-    except KeyboardInterrupt as error:
-        findings.append(Finding.stopped("certifying", error, source))
-    branches.sort(key=lambda branch: branch.value)
-    return Polished(tuple(branches), (*findings, *_valleys(branches)))
+
+    def __init__(self, problem: ExitProblem, orbit: Orbit | None = None) -> None:
+        self._source = problem.source
+        with stage("ends of exit paths", subject=problem.attractor.name):
+            self._ends, self._findings = usable_ends(problem)
+            self._polisher = CandidatePolisher(problem, self._ends, *_start(problem, orbit))
+        self._branches: list[ActivationEnergy] = []
+        self._certified = self._tried = 0
+
+    def add(self, candidates: Sequence[Candidate]) -> None:
+        """Polish candidates, the cheapest first, and certify the paths that they lead to."""
+        ranked = sorted(candidates, key=lambda each: each.action)
+        self._tried += len(ranked)
+        try:
+            with stage("polishing", unit="candidates", total=len(ranked)):
+                for candidate in ranked:
+                    self._polisher.polish(candidate)
+                    advance()
+                for end in self._ends:
+                    self._polisher.reach(end, ranked)
+        except KeyboardInterrupt as error:
+            self._findings.append(Finding.stopped("polishing", error, self._source))
+        found = self._polisher.solved[self._certified :]
+        try:
+            with stage("certifying", unit="paths", total=len(found)):
+                for solved in found:
+                    self._branches += _certified(self._source, solved, self._findings)
+                    self._certified += 1
+                    advance()
+        except KeyboardInterrupt as error:
+            self._findings.append(Finding.stopped("certifying", error, self._source))
+
+    def polished(self) -> Polished:
+        """Return what all candidates led to."""
+        findings, skipped = [*self._findings, *self._polisher.findings], self._polisher.skipped
+        if skipped:
+            values = {"skipped": skipped, "total": self._tried, "factor": WORTH}
+            findings.append(Finding(Code.CANDIDATES_SKIPPED, self._source, values=values))
+        branches = sorted(self._branches, key=lambda branch: branch.value)
+        return Polished(tuple(branches), (*findings, *_valleys(branches)))
 
 
 def _start(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int]:
