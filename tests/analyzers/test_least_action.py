@@ -31,12 +31,12 @@ def stopped_at(structure, stage, done):
 @pytest.mark.parametrize(
     ("stage", "done", "methods", "branches"),
     [
-        ("action plot", 0, [], 0),
-        ("polishing", 0, [], 0),
+        ("graph", 0, [], 0),
+        ("polishing", 0, ["graph"], 0),
         ("polishing", 1, ["least action"], 1),
-        ("certifying", 0, [], 0),
+        ("certifying", 0, ["graph"], 0),
         ("certifying", 1, ["least action"], 1),
-        ("graph", 0, ["least action"], 1),
+        ("action plot", 0, ["least action"], 1),
     ],
 )
 def test_what_was_found_before_a_stop_is_kept(structure, stage, done, methods, branches):

@@ -121,7 +121,7 @@ def test_least_action_names_each_method_that_fails(centres):
     result = vk.LeastAction(source=0, **SMALL).run(*centres)
     assert result.energies == ()
     failed = result.found(Code.METHOD_FAILED)
-    assert [finding.values["method"] for finding in failed] == ["action plot", "graph search"]
+    assert [finding.values["method"] for finding in failed] == ["graph search", "action plot"]
     assert all("multiplier" in finding.values["reason"] for finding in failed)
     assert [finding.source for finding in result.found(Code.NO_EXIT_FOUND)] == [0]
     alone = vk.LeastAction(source=0, graph=None, shooting=SMALL_SHOOTING).run(*centres)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, ClassVar
@@ -29,6 +30,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000
 _AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH)
+_FAR = 3.0  # times the wanted error: the next grid, with twice the nodes in each direction at most, does not get there
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -41,6 +43,10 @@ class LeastAction(Analyzer):
     equations. The least action is the energy; all others are listed in the result's `branches`. The certificate shows
     how well a path solves its equations. The graph search tests, within its error estimate, whether a cheaper path
     exists, and the lower bound of the energy rests on it.
+
+    The graph is solved on a third of its nodes along each side first, and shooting follows. Then it is solved on more
+    nodes, and on all, until it agrees with the paths within the `accuracy`. Paths are certified after each search. If
+    the work is stopped in between, they are returned with the bounds that are known.
 
     For a chaotic attractor, the graph bounds the energy from below, and paths from unstable orbits inside it bound it
     from above.
@@ -92,7 +98,7 @@ class LeastAction(Analyzer):
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
-        for doing, step in (("action plot", work.shoot), ("graph", work.search_graph)):
+        for doing, step in (("graph", work.search_graph), ("action plot", work.shoot), ("graph", work.refine_graph)):
             try:
                 step()
             except KeyboardInterrupt as error:
@@ -108,6 +114,7 @@ class _Work:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
+        self._refinements = [] if analyzer.graph is None else list(analyzer.graph.refinements())
         self.findings: list[Finding] = []
 
     @property
@@ -127,29 +134,39 @@ class _Work:
             self._polish(found.candidates)
 
     def search_graph(self) -> None:
-        """Search the graph, coarse to fine, and polish its paths, until its error is as small as wanted."""
-        graph = self.analyzer.graph
-        if graph is None:
-            return
-        found: GraphSolution | None = None
-        for nodes in graph.refinements():
-            try:
-                for found in dataclasses.replace(graph, nodes=nodes).solutions(self.problem):
-                    self.graph = found
-            except (SceneError, StructureError, StepperError) as error:
-                if nodes == graph.nodes:
-                    self._failed("graph search", error, only=self.analyzer.shooting is None and found is None)
-                continue
-            if found is not None:
-                self._polish(found.candidates)
-                if self.stopped or self._settled(found):
-                    break
+        """Search the graph on the fewest nodes, and polish its paths."""
+        if self._refinements:
+            self._search(self._refinements.pop(0))
 
-    def _settled(self, graph: GraphSolution) -> bool:
-        """Whether the graph's error is small enough, and the paths agree with it."""
+    def refine_graph(self) -> None:
+        """Search the graph on more nodes, and polish its paths, until its error is as small as wanted."""
+        while self._refinements and not self.stopped:
+            error = math.inf if self.graph is None else self._graph_error(self.graph)
+            if error <= self.analyzer.accuracy:
+                break
+            if error > _FAR * self.analyzer.accuracy:
+                del self._refinements[:-1]
+            self._search(self._refinements.pop(0))
+
+    def _search(self, nodes: tuple[int, int]) -> None:
+        graph = self.analyzer.graph
+        assert graph is not None  # there would be no refinements
+        try:
+            for found in dataclasses.replace(graph, nodes=nodes).solutions(self.problem):
+                self.graph = found
+        except (SceneError, StructureError, StepperError) as error:
+            if not self._refinements:
+                self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
+        else:
+            assert self.graph is not None
+            self._polish(self.graph.candidates)
+
+    def _graph_error(self, graph: GraphSolution) -> float:
+        """The largest relative error of the graph's estimates; infinite where they disagree with the paths."""
         _, compared = combined(self.problem.attractor, self._polished()[0], graph.estimates)
-        exact = all(each.numerical_error <= self.analyzer.accuracy * each.value for each in graph.estimates)
-        return exact and all(finding.code in _AGREED for finding in compared)
+        if any(finding.code not in _AGREED for finding in compared):
+            return math.inf
+        return max((each.numerical_error / each.value for each in graph.estimates if each.value), default=math.inf)
 
     @cached_property
     def _polishings(self) -> list[Polishing]:
