@@ -12,16 +12,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import vibrokit as vk
+from vibrokit.plots.escapes import escapes
 
 WANTED = 0.05  # relative error of 400 exits
+REALIZATIONS, SHOWN = 8, 8  # and periods of each before the exit
 # Exits of each state: scene, source, exit, intensities and the slope that the paper has from its simulations
 RUNS = {
-    "0.525, clear": ("hertz-0.525", "clear", vk.LeaveBasin(), (3e-5, 2.3e-5, 2e-5, 1.7e-5, 1.5e-5), 1.07e-4),
+    "0.525, clear": ("hertz-0.525", "clear", vk.LeaveBasin(), (3e-5, 2.3e-5, 2e-5, 1.7e-5), 1.07e-4),
     "0.525, impacting": (
-        "hertz-0.525", "hammering", vk.LeaveBasin(to="clear"), (3e-5, 2.6e-5, 2.3e-5, 2e-5, 1.8e-5), 1.14e-4,
+        "hertz-0.525", "hammering", vk.LeaveBasin(to="clear"), (3e-5, 2.6e-5, 2.3e-5, 2e-5), 1.14e-4,
     ),
-    "0.570, clear": ("hertz-0.570", "clear", vk.LeaveBasin(), (5e-5, 3e-5, 2e-5, 1.5e-5, 1.2e-5), 8.2e-5),
-    "0.570, impacting": ("hertz-0.570", "hammering", vk.LeaveBasin(), (3e-4, 2.4e-4, 2e-4, 1.5e-4), 1.147e-3),
+    "0.570, clear": ("hertz-0.570", "clear", vk.LeaveBasin(), (5e-5, 3e-5, 2e-5, 1.5e-5), 8.2e-5),
+    "0.570, impacting": ("hertz-0.570", "hammering", vk.LeaveBasin(), (3e-4, 2.4e-4, 2e-4), 1.147e-3),
 }  # fmt: skip
 
 
@@ -76,10 +78,10 @@ def main():
                 found[name] = analyzer.run(osc, structure)
         draw_times(ax, scene, found, osc.period)
         if scene == "hertz-0.525":
-            path = vk.LeastAction(source="hammering").run(osc, structure).energy("hammering", "clear").path
-            found["0.525, impacting"].plot_escapes(
-                source="hammering", intensity=1.8e-5, path=None if path is None else path.q[:, :2], ax=axes[2]
-            )
+            result = found["0.525, impacting"]
+            out = result.escapes("hammering", intensity=2e-5).sel(time=slice(-SHOWN * osc.period, None))[:REALIZATIONS]
+            escapes(out.values, points=result.section.points, saddles=result.section.saddles, ax=axes[2])
+            axes[2].set(title="hertz-0.525, D = 2e-5 m² s⁻³")
     figure.savefig(Path(__file__).with_suffix(".png"), dpi=80)
 
 

@@ -166,7 +166,10 @@ class LeaveBasin(Exit):
         own, others = [], []
         wanted = [attractor.label for attractor in self.targets(structure, source)]
         for number, saddle in enumerate(structure.saddles):
-            targets = tuple(dict.fromkeys(label for label in saddle.leads_to if label in wanted))
+            targets = tuple(
+                # Without a wanted one, motion that leaves the region counts too.
+                dict.fromkeys(a for a in saddle.leads_to if a != source and (self.to is None or a in wanted))
+            )
             if source in saddle.leads_to and targets:
                 own.append(AtSaddle(targets, number))
             elif saddle.on_boundary:

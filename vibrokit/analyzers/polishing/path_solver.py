@@ -147,6 +147,8 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
         nodes[-number % pieces :: pieces, : len(known.scale) // 2] / known.scale[: len(known.scale) // 2]
         for nodes, number in ((known.points, known.first), (points, first))
     )
+    if not len(own) or len(line) < _FEWEST:
+        return False
     starts, ways = line[:-1], np.diff(line, axis=0)
     along = np.einsum("akj,kj->ak", own[:, None] - starts, ways) / np.maximum((ways**2).sum(axis=1), 1e-300)
     nearest = starts + np.clip(along, 0, 1)[..., None] * ways
