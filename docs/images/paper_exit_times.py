@@ -39,7 +39,7 @@ def totals(result, period):
 
 
 def draw_times(ax, scene, found, period):
-    """Draw ln τ against 1/D with the slopes between neighbours, beside lines of the published slopes."""
+    """Draw ln τ against 1/D, with the slope of a straight line through it, beside lines of the published slopes."""
     for number, (name, result) in enumerate(found.items()):
         intensity, log_time, error = totals(result, period)
         (slope, _), spread = np.polyfit(1 / intensity, log_time, 1, w=1 / error, cov="unscaled")
@@ -58,7 +58,7 @@ def draw_times(ax, scene, found, period):
             ends, middle[1] + published * (ends - middle[0]), "--", color=f"C{number}",
             label=f"{state}, published: {published:.3g} m² s⁻³",
         )  # fmt: skip
-    ax.set(title=f"{scene}", xlabel="1/D (s³ m⁻²)", ylabel="ln of the mean time in periods")
+    ax.set(title=scene, xlabel="1/D (s³ m⁻²)", ylabel="ln of the mean time in periods")
     ax.legend(frameon=False, fontsize="small")
 
 

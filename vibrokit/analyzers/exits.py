@@ -168,7 +168,7 @@ class LeaveBasin(Exit):
         for number, saddle in enumerate(structure.saddles):
             targets = tuple(
                 # Without a wanted one, motion that leaves the region counts too.
-                dict.fromkeys(a for a in saddle.leads_to if a != source and (self.to is None or a in wanted))
+                dict.fromkeys(one for one in saddle.leads_to if one != source and (self.to is None or one in wanted))
             )
             if source in saddle.leads_to and targets:
                 own.append(AtSaddle(targets, number))

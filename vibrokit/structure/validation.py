@@ -70,9 +70,6 @@ class Request:
         return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
 
 
-_TINY = 5e-324
-
-
 def plain(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Return arguments as plain data, which the same call takes."""
     return {name: _plain(value) for name, value in arguments.items()}
@@ -106,7 +103,8 @@ def whole(name: str, number: Any, least: int, most: int) -> int:
 
 def share(name: str, number: Any, least: float = 0.0) -> None:
     """Refuse a number that is not a share: above 0, at most 1 and not below `least`."""
-    if isinstance(number, bool) or not isinstance(number, Real) or not max(least, _TINY) <= float(number) <= 1:
+    real = isinstance(number, Real) and not isinstance(number, bool)
+    if not (real and 0 < float(number) <= 1 and float(number) >= least):
         allowed = f"from {least:g} to 1" if least else "above 0 and at most 1"
         raise StructureError(f"{name} must be {allowed}, got {shown(number)}.")
 

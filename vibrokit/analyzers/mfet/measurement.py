@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.checkpoint import Slot
+from vibrokit.analyzers.exits import LeaveBasin
 from vibrokit.analyzers.mfet.direct import DirectRun, Escapes, Exits
 from vibrokit.analyzers.mfet.estimates import RateEstimate, exponential_p_value, mean_tests, rate_around, rate_of
 from vibrokit.analyzers.mfet.importance import Importance, from_distances
@@ -214,10 +215,10 @@ class Measurement:
 
     def _kept(self, target: int) -> float:
         """Share of walkers that stay at a target for a few relaxations of it."""
-        attractors = self.problem.structure.attractors
-        other = dataclasses.replace(self.problem, attractor=attractors[target])
+        structure = self.problem.structure
+        other = dataclasses.replace(self.problem, attractor=structure.attractors[target])
         walk = dataclasses.replace(self.walk, problem=other)
-        left = walk.around([attractor for attractor in attractors if attractor.label != target])
+        left = walk.around(LeaveBasin().targets(structure, target))
         begun = walk.from_orbit(other.attractor, 200, 13)
         ended = walk.advance(begun, math.ceil(_METASTABLE / 2 * walk.relaxation), left)
         return float((ended.status == COMPLETED).mean())

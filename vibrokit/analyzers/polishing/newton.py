@@ -28,8 +28,8 @@ _LONGEST_LAST = 3.0  # pieces
 _SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
 _FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
 _INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
-_MATCHED = 1e-4  # of that step: length of what is left of Newton's step when all else is matched
 _LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
+_MATCHED = 1e-4  # of that step: length of what is left of Newton's step when all else is matched
 
 Array = NDArray[np.float64]
 

@@ -27,10 +27,7 @@ MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
 _FIRST_ACCEPTED = 1e-6  # misfit of a path that is completed afterwards: on a short one it is larger
-_ONE_PATH, _ONE_FAMILY = (
-    1e-9,
-    1e-6,
-)  # relative differences of the actions of one path, and of a family before completion
+_ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
@@ -69,16 +66,16 @@ class PathSolver:
             found = self._descended(self.source, first, cut, points)
         except StructureError as error:
             return from_orbit(error, action)
-        again = [result for before, result in self._known if _are_one(before, found)]
-        if not again:
+        result = next((known for before, known in self._known if _are_one(before, found)), None)
+        if result is None:
             try:
-                again = [self._completed(found, from_orbit)]
+                result = self._completed(found, from_orbit)
             except StructureError as error:
-                again = [error]
-            self._known.append((found, again[0]))
-        if isinstance(again[0], StructureError):
-            raise again[0]
-        return again[0]
+                result = error
+            self._known.append((found, result))
+        if isinstance(result, StructureError):
+            raise result
+        return result
 
     def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
         ending = cut.ending
@@ -130,13 +127,14 @@ class PathSolver:
 def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
     """Return whether two paths, each polished once, are one, or of one family."""
     if one.flat and other.flat:
-        return abs(one.action - other.action) <= _ONE_FAMILY * one.action
+        alike = _in_family(one, other.first, other.points, other.action)
+        return alike and abs(one.action - other.action) <= _ONE_FAMILY * one.action
     alike = one.source.node(one.first) == other.source.node(other.first) and len(one.points) == len(other.points)
     return alike and abs(one.action - other.action) <= _ONE_PATH * one.action
 
 
 def _in_family(known: ExtremalPath, first: int, points: Array, action: float) -> bool:
-    """Return whether a path of a known action, from the Gauss–Newton method, belongs to the family of a known path.
+    """Return whether a path of a given action, as exact as of the Gauss–Newton method, is of the family of a known one.
 
     On the section, the states of all members lie on one line.
     """
