@@ -203,10 +203,14 @@ def potential() -> xarray.Dataset:
 def full_result() -> LeastActionResult:
     """A result with paths, brackets, branches, certificates and a quasi-potential."""
     energies = (
-        energy(0, 1, 9e-5, path=spiral(), saddle=0, certificate=CERTIFICATE),
+        energy(
+            0, 1, 9e-5, path=spiral(), saddle=0, certificate=CERTIFICATE,
+            sensitivity={"damping_ratio": 9e-3, "barriers.0.position": -0.0},
+            sensitivity_error={"damping_ratio": 1e-12, "barriers.0.position": 0.0},
+        ),
         energy(1, 0, 1e-3, lower=5e-4, upper=np.inf, certificate=UNSURE, saddle=1, method="«graph» and polish"),
         energy(2, -1, 3e-4, lower=np.nan, path=spiral(3), bound=Bound.BRACKET, numerical_error=np.nan),
-    )
+    )  # fmt: skip
     branches = (*energies, energy(0, 1, 1.1e-4, path=spiral(5), saddle=1, certificate=CERTIFICATE))
     made = LeastActionResult(energies=energies, branches=branches, section=section(), **PROVENANCE)
     joined = data.joined({2: potential()}, made.names)

@@ -441,7 +441,7 @@ def test_the_scene_may_come_after_the_analyzers(place):
         (["run", "double-well", "--set", "orbits.nodes=3"], "no part 'orbits'"),
         (["run", "double-well", "--set", "graph.nodes=3"], "nodes"),
         (["run", "double-well", *PLOT, "--cells", "1"], "--cells"),
-        (["run", "double-well", *PLOT, "--stepper", "rk5:3"], "rk4"),
+        (["run", "double-well", *PLOT, "--stepper", "rk5:3"], "no stepper 'rk5'"),
         (["run", "double-well", *PLOT, "--stepper", "rk4:few"], "rk4:few"),
         (["run", "double-well", *PLOT, "--stepper", "order8:7"], "tolerance"),
         (["run", "double-well", *PLOT, "--exit", "leave-basins"], "leave-basin"),

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.action_plot import ActionPlot as ActionPlot
     from vibrokit.analyzers.analyzer import Analysis as Analysis
     from vibrokit.analyzers.analyzer import Analyzer as Analyzer
+    from vibrokit.analyzers.energy_continuation import energy_continuation as energy_continuation
     from vibrokit.analyzers.evolution import evolve_density as evolve_density
     from vibrokit.analyzers.exits import Exit as Exit
     from vibrokit.analyzers.exits import FirstContact as FirstContact
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
     from vibrokit.kernels.rk4 import RK4 as RK4
+    from vibrokit.kernels.rk8 import RK8 as RK8
     from vibrokit.oscillator import Oscillator as Oscillator
     from vibrokit.parts.barrier import Barrier as Barrier
     from vibrokit.parts.contact.contact_law import ContactLaw as ContactLaw
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.spring import Spring as Spring
     from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
     from vibrokit.results.energy import Bound as Bound
+    from vibrokit.results.energy_continuation import EnergyContinuation as EnergyContinuation
     from vibrokit.results.exit_rate import ExitRate as ExitRate
     from vibrokit.results.files import load_result as load_result
     from vibrokit.results.finding import Code as Code
@@ -71,6 +74,7 @@ _MODULES = {
     "ActionPlot": "vibrokit.analyzers.action_plot",
     "Analysis": "vibrokit.analyzers.analyzer",
     "Analyzer": "vibrokit.analyzers.analyzer",
+    "energy_continuation": "vibrokit.analyzers.energy_continuation",
     "evolve_density": "vibrokit.analyzers.evolution",
     "Exit": "vibrokit.analyzers.exits",
     "FirstContact": "vibrokit.analyzers.exits",
@@ -88,6 +92,7 @@ _MODULES = {
     "FreeFlight": "vibrokit.kernels.free_flight",
     "Order8": "vibrokit.kernels.order8",
     "RK4": "vibrokit.kernels.rk4",
+    "RK8": "vibrokit.kernels.rk8",
     "Oscillator": "vibrokit.oscillator",
     "Barrier": "vibrokit.parts.barrier",
     "ContactLaw": "vibrokit.parts.contact.contact_law",
@@ -107,6 +112,7 @@ _MODULES = {
     "Spring": "vibrokit.parts.spring.spring",
     "ActivationEnergy": "vibrokit.results.energy",
     "Bound": "vibrokit.results.energy",
+    "EnergyContinuation": "vibrokit.results.energy_continuation",
     "ExitRate": "vibrokit.results.exit_rate",
     "load_result": "vibrokit.results.files",
     "Code": "vibrokit.results.finding",

@@ -41,7 +41,7 @@ def both(law, position):
 
 HARD, WELLS = vk.CubicSpring(1.0, 0.3), vk.CubicSpring(-1.0, 1.0)
 forced("duffing, hardening", 1.4, 0.4, spring=HARD)
-forced("duffing, softening", 0.85, 0.08, spring=vk.CubicSpring(1.0, -0.05))
+forced("duffing, softening", 0.9, 0.15, spring=vk.CubicSpring(1.0, -0.05), damping=0.03)
 forced("duffing, weak forcing", 1.2, 0.1, spring=HARD, damping=0.02)
 forced("duffing, weakly damped", 1.1, 0.05, spring=HARD, damping=0.005)
 forced("duffing, multiplicative noise", 1.4, 0.4, spring=HARD, noise=vk.StateDependentNoise(1e-4, "1 + c*x**2", c=0.3))
@@ -61,7 +61,7 @@ for frequency in (0.525, 0.570):
 forced("linear stops", 0.57, 0.18, damping=0.01, push=0.2, stops=both(vk.Linear(50.0), 0.5))
 forced("hunt-crossley", 0.57, 0.18, damping=0.01, push=0.2,
        stops=both(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=0.3), 0.5))  # fmt: skip
-forced("one stop, hard", 0.8, 0.2, damping=0.03, stops=(vk.Barrier(vk.Hertz(300.0), 0.4, "right"),))
+forced("one stop, hard", 1.3, 0.2, damping=0.03, stops=(vk.Barrier(vk.Hertz(100.0), 0.5, "right"),))
 forced("two tones", 0.6, 0.2, damping=0.03, stops=both(vk.Hertz(30.0), 0.6), more=(vk.Harmonic(0.05, 1.2),))
 forced("zero gap", 2.0, 0.3, damping=0.03, stops=(vk.Barrier(vk.Linear(3.0), 0.0, "right"),))
 forced("first contact", 0.57, 0.1, damping=0.05, stops=both(vk.Hertz(50.0), 0.5))

@@ -44,46 +44,66 @@ ORBITS = {
 
 
 @dataclasses.dataclass(frozen=True)
+class Stop:
+    """A push of k·depth^power·(1 + c·rate), away from the stop."""
+
+    position: float
+    side: int  # 1: the stop is on the right of the mass; −1: on its left
+    stiffness: float
+    power: float = 1.5
+    rate: float = 0.0  # c
+
+    def depth(self, x):
+        return self.side * (x - self.position)
+
+    def pull(self, x, v):
+        """Force, and its derivatives in x, v, x twice, x and v."""
+        inside, depth = self.depth(x) > 0, np.maximum(self.depth(x), 0.0)
+        rated, base = 1 + self.rate * self.side * v, self.stiffness * depth**self.power
+        slope = self.stiffness * self.power * inside * depth ** (self.power - 1)
+        curve = np.zeros_like(depth)
+        np.power(depth, self.power - 2, out=curve, where=inside)
+        curve *= self.stiffness * self.power * (self.power - 1)
+        return self.side * base * rated, slope * rated, self.rate * base, self.side * curve * rated, (
+            self.side * self.rate * slope
+        )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
 class Model:
-    """x″ + 2ζx′ + linear·x + cubic·x³ = amplitude·cos(Ωt) + push + stops + noise."""
+    """x″ + 2ζx′ + linear·x + cubic·x³ = Σ amplitude·cos(Ωt) + push + stops + noise, Ω the least of the tones."""
 
     damping: float
     linear: float = 1.0
     cubic: float = 0.0
-    stiffness: float = 0.0  # of both stops, Hertz
-    clearance: float = 0.5
-    amplitude: float = 0.0
-    frequency: float = 1.0
+    stops: tuple[Stop, ...] = ()
+    tones: tuple[tuple[float, float], ...] = ()  # amplitude and frequency of each
     push: float = 0.0
 
     @property
     def period(self):
-        return 2 * np.pi / self.frequency
+        return 2 * np.pi / min((frequency for _, frequency in self.tones), default=1.0)
 
-    def pull(self, x):
-        """Spring and stops, and their first and second derivatives."""
-        depth = np.maximum(np.abs(x) - self.clearance, 0.0)
-        side, root = np.sign(x), np.sqrt(depth)
-        curve = np.divide(1.0, root, out=np.zeros_like(root), where=depth > 0)
-        k = self.stiffness
-        return (
-            self.linear * x + self.cubic * x**3 + side * k * depth * root,
-            self.linear + 3 * self.cubic * x**2 + 1.5 * k * root,
-            6 * self.cubic * x + side * 0.75 * k * curve,
-        )
+    def pull(self, x, v):
+        """Damping, spring and stops, and their derivatives in x, v, x twice, x and v."""
+        none, twice = np.zeros_like(x), 2 * self.damping
+        spring = self.linear * x + self.cubic * x**3 + twice * v
+        parts = [(spring, self.linear + 3 * self.cubic * x**2, twice + none, 6 * self.cubic * x, none)]
+        parts += [stop.pull(x, v) for stop in self.stops]
+        return tuple(sum(each) for each in zip(*parts, strict=True))
 
     def forcing(self, t):
-        return self.amplitude * np.cos(self.frequency * t) + self.push
+        return sum(amplitude * np.cos(frequency * t) for amplitude, frequency in self.tones) + self.push
 
     def acceleration(self, t, x, v):
         """Of the motion without noise."""
-        return self.forcing(t) - 2 * self.damping * v - self.pull(x)[0]
+        return self.forcing(t) - self.pull(x, v)[0]
 
     def follow(self, state, times):
         """States at the times from one at the first of them, without noise."""
 
         def rates(t, z):
-            return z[1], self.acceleration(t, *z)
+            return z[1], float(self.acceleration(t, *z[:, None])[0])
 
         span, limit = (times[0], times[-1]), self.period / 60
         return solve_ivp(rates, span, state, "DOP853", times, rtol=1e-12, atol=1e-14, max_step=limit).y.T
@@ -113,7 +133,8 @@ class Model:
 
 def paper(frequency):
     """The paper's scene."""
-    return Model(0.01, stiffness=50.0, amplitude=0.18, frequency=frequency, push=0.2)
+    stops = Stop(0.5, 1, 50.0), Stop(-0.5, -1, 50.0)
+    return Model(0.01, stops=stops, tones=((0.18, frequency),), push=0.2)
 
 
 def known_orbit(frequency, name):
@@ -160,11 +181,11 @@ class ExitPath:
         return [self.local(nodes) @ shape.T / h**d for d, shape in enumerate(shapes)]
 
     def noise(self, nodes):
-        """u at every point of quadrature, and d/dx and d²/dx² of the pull there (elements, points)."""
+        """u at every point of quadrature, and the derivatives of the pull there, each (elements, points)."""
         x, v, a = self.at(nodes, _SHAPES)
-        pull, slope, curve = self.model.pull(x)
+        pull, *derivatives = self.model.pull(x, v)
         t = self.times[:-1, None] + np.diff(self.times)[:, None] * _NODES
-        return a + 2 * self.model.damping * v + pull - self.model.forcing(t), slope, curve
+        return a + pull - self.model.forcing(t), *derivatives
 
     def split(self, chosen):
         """The same path with the chosen elements halved."""
@@ -180,9 +201,10 @@ class ExitPath:
 
     def touching(self, shortest):
         """Elements in which the stop is met or left, and that are longer than the shortest."""
-        inside = np.array(self.at(self.nodes, _shapes(np.linspace(0, 1, 9)))[0])
-        deep = np.abs(inside) > self.model.clearance
-        return (deep.any(1) & ~deep.all(1)) & (np.diff(self.times) > shortest)
+        inside = self.at(self.nodes, _shapes(np.linspace(0, 1, 9)))[0]
+        deep = [stop.depth(inside) > 0 for stop in self.model.stops]
+        met = [each.any(1) & ~each.all(1) for each in deep]
+        return np.any(met, axis=0) & (np.diff(self.times) > shortest)
 
     def extended(self, start, before, end, after, elements):
         """With more periods on the orbits at either end (states and periods of the orbits; whole multiples before)."""
@@ -234,16 +256,18 @@ def _solve(hessian, gradient, damping):
 
 def _expand(path, nodes, weights, scale):
     """Action, gradient and banded Hessian (lower form) in the scaled degrees of freedom."""
-    u, slope, curve = path.noise(nodes)
+    u, in_x, in_v, in_xx, in_xv = path.noise(nodes)
     h, count = np.diff(path.times)[:, None, None], len(nodes)
     value, rate, bend = _SHAPES
     powers = np.diff(path.times)[:, None] ** np.arange(3)
     columns = np.hstack([powers / scale[:-1], powers / scale[1:]])[:, None, :]
-    jacobian = (bend / h**2 + 2 * path.model.damping * rate / h + slope[:, :, None] * value) * columns
-    value = value * columns
+    value, rate = value * columns, rate / h * columns
+    jacobian = bend / h**2 * columns + in_v[:, :, None] * rate + in_x[:, :, None] * value
     gradients = ((weights * u)[:, None, :] @ jacobian)[:, 0]
     blocks = (jacobian * weights[:, :, None]).transpose(0, 2, 1) @ jacobian
-    blocks += (value * (weights * u * curve)[:, :, None]).transpose(0, 2, 1) @ value
+    blocks += (value * (weights * u * in_xx)[:, :, None]).transpose(0, 2, 1) @ value
+    mixed = (value * (weights * u * in_xv)[:, :, None]).transpose(0, 2, 1) @ rate
+    blocks += mixed + mixed.transpose(0, 2, 1)
     gradient = np.zeros((count, 3))
     gradient[:-1] += gradients[:, :3]
     gradient[1:] += gradients[:, 3:]

@@ -38,7 +38,7 @@ def pieced(model, source, target, sections, elements, before, after):
     """
 
     def rates(t, z):
-        slope = model.pull(np.array(z[0]))[1]
+        slope = model.pull(np.array(z[0]), np.array(z[1]))[1]
         return z[1], model.acceleration(t, z[0], z[1]) + z[3], slope * z[3], -z[2] + 2 * model.damping * z[3]
 
     times = np.linspace(0, model.period, elements + 1)
@@ -57,3 +57,10 @@ def _rise(s):
     """From 0 to 1 with two continuous derivatives, as a column."""
     s = np.clip(s, 0, 1)
     return (s**3 * (10 - 15 * s + 6 * s**2))[:, None]
+
+
+def sampled(model, path, samples):
+    """A path of the toolkit on its own samples, to the last of them on the section; `samples` in a period."""
+    whole = (len(path.t) - 1) // samples * samples + 1
+    t, (x, v), noise = path.t[:whole], path.q[:whole].T, path.p[:whole, 1]
+    return ExitPath(model, t, np.column_stack([x, v, model.acceleration(t, x, v) + noise]))

@@ -8,6 +8,7 @@ import pytest
 
 import vibrokit as vk
 from tests.physics import reference_action as reference
+from tests.physics.reference_guesses import sampled
 from vibrokit.results.energy import Bound
 from vibrokit.results.finding import Code
 
@@ -245,9 +246,7 @@ def test_minimised_once_more_it_stays(polished, source):
     energy, model = polished.energies[source], reference.paper(0.570)
     path = energy.path
     np.testing.assert_allclose(path.t, model.period / SAMPLES * np.arange(len(path.t)), rtol=1e-9)
-    whole = (len(path.t) - 1) // SAMPLES * SAMPLES + 1  # to the last of its samples on the section
-    t, (x, v), noise = path.t[:whole], path.q[:whole].T, path.p[:whole, 1]
-    guess = reference.ExitPath(model, t, np.column_stack([x, v, model.acceleration(t, x, v) + noise]))
+    guess = sampled(model, path, SAMPLES)
     source_orbit, saddle = (reference.known_orbit(0.570, name) for name in (NAMES[source], "saddle"))
     found = reference.followed_in(
         guess.extended(source_orbit, 4, saddle, 4, SAMPLES), model.period / SAMPLES / 40

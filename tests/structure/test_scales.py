@@ -92,6 +92,26 @@ def test_any_excitation_counts_by_its_largest_force(scale):
     assert length_of(scene(Push(-0.7 * scale))) == 0.7 * scale
 
 
+@pytest.mark.parametrize(("damping", "frequency"), [(1e-3, 1.0), (0.02, 1.05), (0.02, 0.9)])
+def test_a_resonance_reaches_as_far_as_the_linear_response(damping, frequency):
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=damping, excitations=(vk.Harmonic(0.1, frequency),))
+    response = 0.1 / math.hypot(1 - frequency**2, 2 * damping * frequency)
+    assert length_of(osc) == pytest.approx(response, rel=0.04)  # amplitudes are tried 2.7 % apart
+
+
+def test_the_large_motion_of_a_bistable_resonance_is_found():
+    """At 1.2, far above the linear resonance, the hardening spring has a second motion of amplitude near 1.45."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.02, spring=vk.CubicSpring(1.0, 0.3), excitations=(vk.Harmonic(0.1, 1.2),)
+    )
+    found = vk.find_structure(osc, cells=(20, 20), saddles=False)
+    swings = sorted(np.ptp(attractor.orbit[:, 0]) / 2 for attractor in found.attractors)
+    squares = np.array(swings) ** 2
+    missing = np.sqrt((1 - 1.2**2 + 0.75 * 0.3 * squares) ** 2 + (2 * 0.02 * 1.2) ** 2) * swings
+    assert len(swings) == 2
+    assert missing == pytest.approx([0.1, 0.1], rel=0.1)  # harmonic balance, without the third harmonic
+
+
 def test_the_units_of_time_change_nothing():
     fast = length_of(scene(TwoTones(0.7 * 300.0**2, 900.0), frequency=300.0))
     assert fast == pytest.approx(length_of(scene(TwoTones(0.7, 3.0))), rel=1e-12)

@@ -14,6 +14,9 @@ from vibrokit.analyzers.agreement import combined
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
 from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.reversed_relaxation import FINDER, reversed_relaxations
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.candidate_polisher import PIECES
 from vibrokit.analyzers.polishing.polish import METHOD, Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
@@ -44,9 +47,11 @@ class LeastAction(Analyzer):
     how well a path solves its equations. The graph search tests, within its error estimate, whether a cheaper path
     exists, and the lower bound of the energy rests on it.
 
-    The graph is solved on a third of its nodes along each side first, and shooting follows. Then it is solved on more
-    nodes, and on all, until it agrees with the paths within the `accuracy`. Paths are certified after each search. If
-    the work is stopped in between, they are returned with the bounds that are known.
+    Without forcing, the motion from each end back to an equilibrium, run backwards, is the first candidate; where
+    detailed balance holds, it is the path of least action. The graph is solved on a third of its nodes along each side
+    first, and shooting follows. Then it is solved on more nodes, and on all, until it agrees with the paths within the
+    `accuracy`. Paths are certified after each search. If the work is stopped in between, they are returned with the
+    bounds that are known.
 
     For a chaotic attractor, the graph bounds the energy from below, and paths from unstable orbits inside it bound it
     from above.
@@ -98,7 +103,13 @@ class LeastAction(Analyzer):
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
-        for doing, step in (("graph", work.search_graph), ("action plot", work.shoot), ("graph", work.refine_graph)):
+        steps = (
+            (FINDER, work.reverse),
+            ("graph", work.search_graph),
+            ("action plot", work.shoot),
+            ("graph", work.refine_graph),
+        )
+        for doing, step in steps:
             try:
                 step()
             except KeyboardInterrupt as error:
@@ -120,6 +131,14 @@ class _Work:
     @property
     def stopped(self) -> bool:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
+
+    def reverse(self) -> None:
+        """Run the relaxation to an equilibrium backwards, and polish that."""
+        stepper = self.problem.single_stepper(Flow.STATE)
+        with stage(FINDER, subject=self.problem.attractor.name):
+            found = reversed_relaxations(self.problem, SegmentPropagator(self.problem.scene, stepper, max(PIECES)))
+        if found:
+            self._polish(found)
 
     def shoot(self) -> None:
         """Shoot from an orbit or an equilibrium, and polish what is found."""
@@ -163,10 +182,15 @@ class _Work:
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates; infinite where they disagree with the paths."""
-        _, compared = combined(self.problem.attractor, self._polished()[0], graph.estimates)
+        estimates = self._estimates(graph, branches := self._polished()[0])
+        _, compared = combined(self.problem.attractor, branches, estimates)
         if any(finding.code not in _AGREED for finding in compared):
             return math.inf
-        return max((each.numerical_error / each.value for each in graph.estimates if each.value), default=math.inf)
+        return max((each.numerical_error / each.value for each in estimates if each.value), default=math.inf)
+
+    def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
+        """What the graph estimates; paths from inside a set bound its actions only and do not calibrate them."""
+        return graph.calibrated(branches) if self.problem.attractor.is_fixed else graph.estimates
 
     @cached_property
     def _polishings(self) -> list[Polishing]:
@@ -197,7 +221,7 @@ class _Work:
     def analysis(self) -> Analysis:
         """Combine what was found."""
         branches, polished = self._polished()
-        estimates = () if self.graph is None else self.graph.estimates
+        estimates = () if self.graph is None else self._estimates(self.graph, branches)
         energies, compared = combined(self.problem.attractor, branches, estimates)
         every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone

@@ -10,6 +10,7 @@ from types import FrameType
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.contact_time import contact_times
+from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
@@ -31,7 +32,7 @@ _PACKAGE = str(Path(__file__).parents[1])
 
 
 class CoarseStepsWarning(UserWarning):
-    """RK4 has too few steps in a contact."""
+    """Fixed steps are too few in a contact."""
 
 
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
@@ -61,8 +62,8 @@ def single_stepper(scene: Scene, flow: Flow) -> Stepper:
 
 
 def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
-    """Warn, at the line that called into this package, if RK4 takes too few steps in a contact to follow it."""
-    if not isinstance(stepper, RK4):
+    """Warn, at the line that called into this package, if fixed steps are too few in a contact to follow it."""
+    if not isinstance(stepper, FixedSteps):
         return
     shortest = min((contact.duration for contact in contact_times(scene, flow)), default=math.inf)
     taken = stepper.steps * shortest / scene.time_unit
@@ -73,8 +74,8 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     if flow is not Flow.NOISY:
         advice += f", or {type(single_stepper(scene, flow)).__name__}, which locates contacts"
     warnings.warn(
-        f"RK4(steps={stepper.steps}) takes about {taken:.2g} steps in a contact with a stop, too few to follow it; "
-        f"{advice}.",
+        f"{type(stepper).__name__}(steps={stepper.steps}) takes about {taken:.2g} steps in a contact with a stop, too "
+        f"few to follow it; {advice}.",
         CoarseStepsWarning,
         stacklevel=_frames_inside(sys._getframe()),
     )

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels import store
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
@@ -169,10 +168,7 @@ def run_ensemble(
 
 
 def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
-    """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation.
-
-    What was compiled here is loaded from disk, as every other process does, so that all have the same bits.
-    """
+    """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation."""
     kernel = kernel_for(scene, flow, stepper)
     advance_kernel = kernel.module.advance
     if not advance_kernel.overloads:
@@ -181,9 +177,6 @@ def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
         none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)
         with first_call(advance_kernel):
             _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
-            if advance_kernel.stats.cache_misses:
-                store.reload(kernel.name, kernel.source)
-                _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
     return kernel
 
 

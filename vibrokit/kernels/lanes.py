@@ -1,9 +1,15 @@
-"""Writes the lane-packed Runge–Kutta step: many trajectories of one scene, side by side in vector registers."""
+"""Writes lane-packed Runge–Kutta steps: many trajectories of one scene, side by side in vector registers."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.tableau import NODES, RESULT, STAGES, WEIGHTS
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -19,19 +25,72 @@ _DRAWING = (
     "    for lane in range(LANES):", "        first[lane], second[lane] = normal_pair(streams, lane)",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
+_CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 
-def lane_count(text: SceneText) -> int:
-    """Lanes of one block: few enough that their numbers stay in the nearest cache."""
-    return 32 if len(text.variables) <= _FEW_EQUATIONS else 16
+def classical_step(text: SceneText) -> list[str]:
+    """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
+    # Few enough lanes that their numbers stay in the nearest cache.
+    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
+    head = _sizes(lanes, len(_CLASSICAL_NODES))
+    return [head, tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope, _unrolled(text)]
 
 
-def lane_step(text: SceneText) -> str:
-    """Function `step_lanes(z, f0, f1, f2, first, second, theta, h)`: one step of every lane.
+def staged_step(text: SceneText) -> list[str]:
+    """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
+    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
+    nodes = tuple(float(node) for node in NODES)
+    return [f"{_sizes(lanes, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
 
-    `z` has shape (EQUATIONS, LANES); f0, f1, f2 is the forcing at the step's start, middle and end, the same for
-    all lanes because they share the phase; first, second are two standard normals for each lane. A scene without
-    forcing and a flow without noise have no such arguments. `draw_lanes(streams, first, second)` draws the normals.
+
+def _sizes(lanes: int, nodes: int) -> str:
+    """Lanes of a block, and values of the forcing in a step."""
+    return f"{_REGISTERS}\n\nLANES = {lanes}\nNODES = {nodes}\n"
+
+
+def _staged(text: SceneText) -> str:
+    """Function `step_lanes(z, slopes, point, forces, theta, h)`: a step of order 8 of every lane.
+
+    `slopes` and `point` are workspaces. With few equations, a stage is one loop over the lanes. With many, that loop
+    would need more registers and a longer compilation than it gains: the point of a stage is computed in a loop over
+    all numbers of all lanes first, which halves both times.
+    """
+    names, few = text.variables, len(text.variables) <= _FEW_EQUATIONS
+    lines = ["@njit(**INLINED)", f"def step_lanes(z, slopes, point, {'forces, ' * text.forced}theta, h):"]
+    lines += ["    use_widest_registers()"]
+    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    flat_z, flat_point = z.reshape(EQUATIONS*LANES), point.reshape(EQUATIONS*LANES)"]
+    lines += ["    flat_slopes = slopes.reshape((STAGES, EQUATIONS*LANES))"]
+    for stage, weights in enumerate(WEIGHTS):
+        places = [f"{index}, lane]" for index, _ in enumerate(names)]
+        if few:
+            at = [f"z[{place}{_combined(weights, f'slopes[{{}}, {place}')}" for place in places]
+        else:
+            lines += ["    for number in range(EQUATIONS*LANES):"]
+            lines += [f"        flat_point[number] = flat_z[number]{_combined(weights, 'flat_slopes[{}, number]')}"]
+            at = [f"point[{place}" for place in places]
+        lines += [f"    force = forces[{stage}]"] * text.forced
+        force = ["force"] * text.forced
+        lines += ["    for lane in range(LANES):"]
+        lines += [f"        {', '.join(f'slopes[{stage}, {place}' for place in places)} = \\"]
+        lines += [f"            derivative({', '.join([*at, *force, *text.parameters])})"]
+    lines += ["    for number in range(EQUATIONS*LANES):"]
+    lines += [f"        flat_z[number] += {_combined(RESULT, 'flat_slopes[{}, number]').removeprefix(' + ')}"]
+    return "\n".join([*lines, ""])
+
+
+def _combined(weights: NDArray[np.float64], slope: str) -> str:
+    """Text that adds the weighted slopes of a step, if there are any; `slope` has braces for the stage."""
+    terms = [f"{float(weight)!r}*{slope.format(stage)}" for stage, weight in enumerate(weights) if weight]
+    return f" + h*({' + '.join(terms)})" if terms else ""
+
+
+def _unrolled(text: SceneText) -> str:
+    """Function `step_lanes(z, forces, first, second, theta, h)`: a classical step of every lane.
+
+    `z` has shape (EQUATIONS, LANES); `forces` has the forcing at the step's start, middle and end, the same for all
+    lanes because they share the phase; first, second are two standard normals for each lane. A scene without forcing
+    and a flow without noise have no such arguments. `draw_lanes(streams, first, second)` draws the normals.
 
     LLVM turns loops into vector code before it inlines, so each function here asks for wide registers itself, and knows
     the number of lanes.
@@ -42,11 +101,12 @@ def lane_step(text: SceneText) -> str:
     names = text.variables
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
-    arguments = ["z", *(_FORCES if text.forced else []), *(_NORMALS if noisy else []), "theta", "h"]
-    lines = [_REGISTERS, f"LANES = {lane_count(text)}", *(_DRAWING if noisy else []), "", ""]
+    arguments = ["z", *["forces"] * text.forced, *(_NORMALS if noisy else []), "theta", "h"]
+    lines = [*(_DRAWING if noisy else []), "", ""]
     lines += ["@njit(**INLINED)", f"def step_lanes({', '.join(arguments)}):"]
     lines += ["    use_widest_registers()"]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    f0, f1, f2 = forces[0], forces[1], forces[2]"] if text.forced else []
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
     lines += [f"        {name} = z[{index}, lane]" for index, name in enumerate(names)]
@@ -73,16 +133,13 @@ def _kicks(driven: str, text: SceneText) -> list[str]:
     ]
 
 
-def tabulation(text: SceneText) -> str:
-    """Function `tabulate(start, h, theta, table)`: the forcing at every half step; nothing without forcing."""
+def tabulation(text: SceneText, nodes: Sequence[float]) -> str:
+    """Function `tabulate(start, h, theta, table)`: the forcing at the nodes of every step; nothing without forcing."""
     if not text.forced:
         return ""
-    return "\n".join(
-        [
-            "@njit(**INLINED)",
-            "def tabulate(start, h, theta, table):",
-            "    for half in range(table.size):",
-            "        table[half] = forcing(start + 0.5*h*half, theta)",
-            "",
-        ]
-    )
+    lines = ["@njit(**INLINED)", "def tabulate(start, h, theta, table):", "    for step in range(table.shape[0]):"]
+    lines += [
+        f"        table[step, {place}] = forcing(start + h*(step + {node!r}), theta)"
+        for place, node in enumerate(nodes)
+    ]
+    return "\n".join([*lines, ""])

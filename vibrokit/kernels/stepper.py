@@ -25,6 +25,7 @@ class Emitter(ABC):
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
+    staged: ClassVar[bool] = False  # whether a step keeps the slopes of its stages
 
     @abstractmethod
     def scene_part(self, text: SceneText) -> list[str]:

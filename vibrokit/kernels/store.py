@@ -59,23 +59,16 @@ def store(name: str, text: str) -> None:
 def load(name: str, text: str) -> types.ModuleType:
     """Import a generated module, writing it first if this machine does not have it."""
     with _LOADING:  # otherwise threads that start together import it twice, and compile it twice
-        return _load(name, text)
-
-
-def reload(name: str, text: str) -> types.ModuleType:
-    """Import a generated module anew, so that its functions are those that were stored."""
-    with _LOADING:
-        _LOADED.pop((name, text), None)
-        return _load(name, text)
+        if (name, text) not in _LOADED:
+            _LOADED[name, text] = _imported(name, text)
+        return _LOADED[name, text]
 
 
 _LOADING = threading.Lock()
 _LOADED: dict[tuple[str, str], types.ModuleType] = {}
 
 
-def _load(name: str, text: str) -> types.ModuleType:
-    if (name, text) in _LOADED:
-        return _LOADED[name, text]
+def _imported(name: str, text: str) -> types.ModuleType:
     if stored(name) != text:
         store(name, text)
     specification = importlib.util.spec_from_file_location(name, cache_directory() / f"{name}.py")
@@ -84,5 +77,4 @@ def _load(name: str, text: str) -> types.ModuleType:
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
     specification.loader.exec_module(module)
-    _LOADED[name, text] = module
     return module

@@ -50,6 +50,8 @@ def _result_tables(result: Result) -> list[str]:
     if len(result.branches) > len(result.energies):
         ranked = sorted(result.branches, key=lambda branch: (branch.source, branch.target, branch.value))
         tables.append("All paths, the cheapest of each exit first:\n" + energy_table(result, ranked))
+    if any(energy.sensitivity for energy in result.energies):
+        tables.append("Change of ΔU per unit of each parameter:\n" + sensitivity_table(result))
     if result.rates:
         tables.append(rate_table(result))
     if any(energy.target >= 0 for energy in result.energies):
@@ -92,6 +94,17 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> str:
         value = f"{e.value:.{_digits(e)}g}"
         rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, e.method))
     return "\n".join(text_table(rows)) if len(rows) > 1 else "No activation energy was found."
+
+
+def sensitivity_table(result: Result) -> str:
+    """Return the derivative of each energy in each parameter, a line for each parameter that has an effect."""
+    known = [energy for energy in result.energies if energy.sensitivity]
+    names = dict.fromkeys(name for energy in known for name, value in energy.sensitivity.items() if value)
+    rows = [("parameter", *(energy.exit_between(result.names) for energy in known))]
+    rows += [
+        (name, *(number_text(energy.sensitivity.get(name, math.nan), ".5g") for energy in known)) for name in names
+    ]
+    return "\n".join(text_table(rows))
 
 
 def rate_table(result: Result) -> str:

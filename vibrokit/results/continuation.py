@@ -11,6 +11,7 @@ import xarray
 from numpy.typing import NDArray
 
 from vibrokit.errors import ResultFileError
+from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
 from vibrokit.results.basins import UNSETTLED, read_region, region_variables
@@ -18,7 +19,6 @@ from vibrokit.results.bifurcation import BIFURCATIONS, Bifurcation
 from vibrokit.results.fields import LARGEST, STATE, Field, Length, Number, Variable, Vectors, Whole, Word
 from vibrokit.results.labels import label_of
 from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
-from vibrokit.results.record import Record
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.summary import Summary, counted
@@ -26,11 +26,6 @@ from vibrokit.results.table import Table
 
 if TYPE_CHECKING:
     from vibrokit.plots.bifurcation import BifurcationArtists, FractionArtists
-
-_GREEK = (
-    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda",
-    "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
-)  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,17 +72,13 @@ _MARKS = Table(
 )
 
 
-class Continuation(Record):
+class Continuation(AlongParameter):
     """Steady states along values of a parameter, joined into branches, with the bifurcations between.
 
     Attributes
     ----------
-    parameter : str
-        Path of the parameter, as in ``osc.parameters``.
-    symbol : str
-        Its letter, as SymPy writes it.
-    unit : str or None
-        In SI base units.
+    parameter, symbol, unit : str
+        As of `AlongParameter`.
     region : Region or None
         What basin fractions are shares of, the same at all values; None if nothing was found.
     states : tuple of SteadyStates
@@ -100,9 +91,6 @@ class Continuation(Record):
 
     kind: ClassVar[str] = "continuation"
 
-    parameter: str
-    symbol: str
-    unit: str | None
     region: Region | None
     states: tuple[SteadyStates, ...]
     branch_names: tuple[str, ...]
@@ -172,14 +160,6 @@ class Continuation(Record):
             ),
         )
 
-    @property
-    def axis_label(self) -> str:
-        """Label of the parameter's axis, with symbol and unit in TeX."""
-        head, _, index = self.symbol.partition("_")
-        letter = f"\\{head}" if head in _GREEK else head
-        label = f"{self.parameter} ${letter}{f'_{{{index}}}' if index else ''}$"
-        return f"{label} ({_unit_in_tex(self.unit)})" if self.unit else label
-
     def plot(self, ax: Any = None) -> BifurcationArtists:
         """Draw the bifurcation diagram; see `vibrokit.plots.bifurcation.bifurcation_diagram`."""
         from vibrokit.plots.bifurcation import bifurcation_diagram
@@ -215,37 +195,23 @@ class Continuation(Record):
         }
         for name in ("value", "bifurcation_value", "bifurcation_error"):
             found[name][2]["units"] = self.unit or "1"
-        texts = {
-            "parameter": ((), self.parameter, {"long_name": "path of the parameter"}),
-            "symbol": ((), self.symbol, {"long_name": "symbol of the parameter"}),
-            "unit": ((), self.unit or "", {"long_name": "unit of the parameter"}),
-        }
-        return xarray.Dataset(found | texts | ({} if self.region is None else region_variables(self.region)))
+        return xarray.Dataset(
+            found | self.parameter_variables() | ({} if self.region is None else region_variables(self.region))
+        )
 
     @classmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
         """Make a continuation of its arrays; raises ResultFileError."""
         arrays = Arrays(dataset)
-        parameter, symbol, unit = (arrays.words(name, ())[0] for name in ("parameter", "symbol", "unit"))
         names = tuple(row["name"] for row in _BRANCHES.read(arrays))
         return cls(
-            parameter=parameter,
-            symbol=symbol,
-            unit=unit or None,
+            **cls.read_parameter(arrays),
             region=read_region(arrays) if "region_x" in arrays else None,
             branch_names=names,
             states=_states(arrays, len(names)),
             bifurcations=tuple(_bifurcations(arrays, len(names))),
             **provenance,
         )
-
-
-def _unit_in_tex(unit: str) -> str:
-    words = []
-    for word in unit.split():
-        base, _, power = word.partition("^")
-        words.append(f"{base}$^{{{power}}}$" if power else base)
-    return " ".join(words)
 
 
 def _bifurcations(arrays: Arrays, branches: int) -> Iterator[Bifurcation]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -15,6 +15,7 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.basins import NOT_FOLLOWED
 from vibrokit.results.fields import (
     STATE,
+    ByName,
     Column,
     Columns,
     Field,
@@ -140,6 +141,11 @@ class ActivationEnergy:
         Which of the structure's saddles the path ends on; −1 if it ends on no saddle.
     certificate : Certificate or None
         Evidence, where the path was polished.
+    sensitivity : dict of str to float
+        Derivative of the path's action in each parameter of the scene, by the names of ``osc.parameters``, in m² s⁻³
+        per unit of the parameter; empty for a path that was not polished.
+    sensitivity_error : dict of str to float
+        Error of each, from differences of two sizes.
     """
 
     source: int
@@ -154,6 +160,8 @@ class ActivationEnergy:
     path: ExitPath | None = dataclasses.field(default=None, repr=False)
     saddle: int = -1
     certificate: Certificate | None = None
+    sensitivity: Mapping[str, float] = dataclasses.field(default_factory=dict, repr=False)
+    sensitivity_error: Mapping[str, float] = dataclasses.field(default_factory=dict, repr=False)
 
     def exit_between(self, names: Sequence[str]) -> str:
         """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""
@@ -161,6 +169,7 @@ class ActivationEnergy:
 
 
 _ACTION = "m2 s-3"
+_PER_UNIT = f"{_ACTION} per unit of the parameter"
 
 _SAMPLES = Length("sample", "samples of the path")
 _MOMENTA = Columns(
@@ -200,6 +209,8 @@ _FIELDS: dict[str, Field] = {
     "saddle": Whole("place of the saddle that the path ends on; -1 for none", low=-1),
     "path": Whole("place of the path; -1 for none", low=-1),
     "certified": Flag("whether there is a certificate"),
+    "sensitivity": ByName("parameter", "derivative of the action in a parameter", _PER_UNIT),
+    "sensitivity_error": ByName("parameter", "error of the derivative of the action in a parameter", _PER_UNIT),
     **{f"certificate_{name}": field for name, field in _EVIDENCE.items()},
 }
 ENERGIES, BRANCHES = Table("energy", _FIELDS), Table("branch", _FIELDS)

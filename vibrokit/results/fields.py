@@ -121,6 +121,28 @@ class BySide(Scalar):
 
 
 @dataclasses.dataclass(frozen=True)
+class ByName(Field):
+    """A number by name for each record; NaN where a record has none. The names of all records are a coordinate."""
+
+    what: str  # is named
+    long_name: str
+    units: str
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        dimension = f"{record}_{self.what}"
+        names = list(dict.fromkeys(key for value in values for key in value))
+        rows = np.array([[value.get(key, np.nan) for key in names] for value in values], dtype=float)
+        yield dimension, ((dimension,), np.array(names, dtype=str), {"long_name": f"name of the {self.what}"})
+        yield name, ((record, dimension), rows.reshape(len(values), len(names)), _about(self.long_name, self.units))
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        dimension = f"{record}_{self.what}"
+        names = arrays.words(dimension, (arrays.size(dimension),))
+        rows = arrays.numbers(name, (arrays.size(record), len(names)), finite=False)
+        return [{key: float(n) for key, n in zip(names, row, strict=True) if not np.isnan(n)} for row in rows]
+
+
+@dataclasses.dataclass(frozen=True)
 class Length:
     """A length that differs from record to record; ragged arrays lie end to end and are not padded."""
 

@@ -143,6 +143,19 @@ class Code(StrEnum):
     FOUND_BY_NEIGHBOUR = (
         "found-by-neighbour", INFO, "{count} steady states were found from a neighbouring value and not by the search.",
     )  # fmt: skip
+    ENERGY_BRANCHES = (
+        "energy-branches",
+        INFO,
+        "{branches} exit paths were followed over {values} values of {parameter}.",
+    )
+    PATH_LOST = (
+        "path-lost", INFO, "The exit path {state} could not be followed from {parameter} = {value:.8g} to {next:.8g}: "
+        "{reason}", "It folds, grazes a stop or meets another one there; search at a value beyond.",
+    )  # fmt: skip
+    LEAST_PATH_CHANGES = (
+        "least-path-changes", INFO,
+        "Below {parameter} = {value:.8g} the path {state} has the least action, and above it the path {goal}.",
+    )  # fmt: skip
     NOTHING_AT = "nothing-at", WARNING, "At {value:g} no steady state was found: {reason}", _SEE_REASON
 
     # Energies
@@ -383,6 +396,11 @@ class Finding:
         """Make the finding that a stage was stopped, by the user or by a time limit."""
         word = TIME_LIMIT if isinstance(reason, OutOfTime) else INTERRUPT
         return cls.of(Code.STOPPED, source, stage=stage, reason=word)
+
+    @property
+    def interrupt(self) -> KeyboardInterrupt:
+        """The interrupt that `stopped` was made of, for the work around to stop too."""
+        return OutOfTime() if self.values.get("reason") == TIME_LIMIT else KeyboardInterrupt()
 
     @property
     def severity(self) -> Severity:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from typing import ClassVar
@@ -24,6 +25,7 @@ from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
+_PLACES = 1024  # at which the force at rest is compared with 0
 _AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
 _SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
 _RECURRENCE = 1e-2  # of the extent of the motion: distance between turning points from which Newton's method starts
@@ -75,6 +77,28 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
     balanced, units = scipy.linalg.matrix_balance(jacobian, permute=False)
     monodromy = units @ scipy.linalg.expm(balanced) @ np.linalg.inv(units)
     return Equilibrium(point, 1, 0.0, monodromy, float(residual))
+
+
+def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
+    """Return the equilibria between two places (m): the force at rest changes its sign there.
+
+    Two that are closer to each other than a thousandth of the range may be missed. A StructureError is raised for a
+    scene with periodic excitation.
+    """
+    refuse_forcing(osc)
+    field, rest = VectorField(osc), np.zeros(1 if osc.noise is None else 1 + len(osc.noise.extra_states))
+
+    def force(x: float) -> float:
+        return float(field.rate(np.concatenate([[x], rest]))[1])
+
+    places = np.linspace(low, high, _PLACES)
+    forces = np.array([force(x) for x in places])
+    found = []
+    for at in np.flatnonzero(forces[:-1] * forces[1:] <= 0):
+        guess = float(brentq(force, places[at], places[at + 1]))
+        with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
+            found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
+    return found
 
 
 def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex128]:

@@ -5,31 +5,30 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
-import math
 from collections.abc import Callable, Generator, Sequence
 from functools import cached_property
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import ParameterError, VibrokitError, shown
+from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
-from vibrokit.progress import OutOfTime, Progress, Work, advance, stage, working
+from vibrokit.progress import Progress, Work, advance, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.continuation import Continuation
-from vibrokit.results.finding import TIME_LIMIT, Code, Finding
+from vibrokit.results.finding import Code, Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
+from vibrokit.structure.parameter_values import followed_parameter, ordered_values
 from vibrokit.structure.scales import frame_of
 from vibrokit.structure.tracing.branches import (
     Tracing,
@@ -115,7 +114,7 @@ def continuation(
     """
     chosen = stepper_of(stepper)
     check_means(osc, chosen, executor)
-    entry, numbers = _entry(osc, parameter), _checked(values)
+    entry, numbers = followed_parameter("continuation", osc, parameter), ordered_values("continuation", values)
     request = Request(region, cells, 0, None, starts, 0.5, None, False, False, chosen, seed_of(rng))
     with working(progress, time_limit) as work:
         run = _Run(osc, entry, numbers.tolist(), request, executor)
@@ -202,7 +201,7 @@ class _Run:
             for found in all_:
                 self.found.append(found)
                 if found.stopped is not None:
-                    raise OutOfTime if found.stopped.values["reason"] == TIME_LIMIT else KeyboardInterrupt
+                    raise found.stopped.interrupt
                 advance()
 
     @cached_property
@@ -270,27 +269,3 @@ def _union(regions: list[Region]) -> Region | None:
     """Return the smallest region that contains some regions; None if there are none."""
     corners = [region.bounds.T for region in regions]
     return Region.around(np.concatenate(corners), margin=0.0) if corners else None
-
-
-def _entry(osc: Oscillator, parameter: str) -> Entry:
-    entry = osc.entry(parameter)
-    if entry.declared.structural:
-        raise ParameterError(
-            f"continuation: {entry.path} shapes the equations, so motion cannot be followed from value to value; "
-            "find the structure at each value."
-        )
-    return entry
-
-
-def _checked(values: Any) -> Array:
-    listed = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
-    if not listed:
-        raise ParameterError(f"continuation: values must be a sequence of numbers, one or more, got {shown(values)}.")
-    for value in listed:
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise ParameterError(f"continuation: values must be finite numbers, got {shown(value)}.")
-    numbers = np.sort(np.array(listed, dtype=float))
-    twice = numbers[:-1][np.diff(numbers) == 0]
-    if twice.size:
-        raise ParameterError(f"continuation: values must be distinct, got {twice[0]:g} more than once.")
-    return numbers

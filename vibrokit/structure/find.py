@@ -29,7 +29,7 @@ from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, cell_findings, with_fractions
 from vibrokit.structure.boundaries.saddles import SaddleSearch
-from vibrokit.structure.manifolds import BRANCHES, branch_count, grow_manifolds
+from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
 from vibrokit.structure.scales import frame_of, lies_in, search_region, states_at
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
@@ -231,13 +231,15 @@ class _Finder:
         """Grow the manifolds of each saddle that is an orbit."""
         assert self.saddle_search is not None
         saddles = {n: s for n, s in enumerate(self.saddle_search.saddles) if s.kind in ("saddle", "flip saddle")}
-        with stage("manifolds", unit=BRANCHES, total=sum(map(branch_count, saddles.values()))):
+        count = sum(map(branch_count, saddles.values()))
+        length = default_arc_length(self.frame, max(count, 1))
+        with stage("manifolds", unit=BRANCHES, total=count):
             for index, saddle in saddles.items():
                 known = self.manifolds
                 try:
                     for branch in grow_manifolds(
                         self.osc, index, saddle,
-                        region=self.frame, stepper=self.request.stepper, executor=self.executor,
+                        region=self.frame, arc_length=length, stepper=self.request.stepper, executor=self.executor,
                     ):  # fmt: skip
                         self.manifolds += (branch,)
                 except StructureError as error:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import carry, compiled_kernel, run_ensemble
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import FixedSteps
+from vibrokit.kernels.order8 import LocatedStepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.vector_field import VectorField
@@ -41,10 +42,11 @@ BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
 _START = 1e-6  # extent of the domain from the saddle, relative to the region
 _CLOSE = 1e-9  # largest error of the saddle, relative to the region
+_TOLERANCE = 1e-6  # of located contacts: a picture needs no more, and 1e-10 takes 2.6 times as long
 _MOST_STEPS = 1024  # of an ensemble in a free oscillation, above which located contacts are no slower
 _PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
 _NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
-_LENGTH = 10.0  # default arc length, in diagonals of the region
+_LENGTH, _TOTAL_LENGTH = 10.0, 160.0  # default arc length, of a branch and of all, in diagonals of the region
 _LEAST_GROWTH, _MOST_GROWTH = 2.0, 8.0  # ratio of the lengths of an image and the one before, if it can be chosen
 _WEAKEST = 1e-8  # smallest multiplier, relative to the other one, that rounding leaves different from zero
 
@@ -77,6 +79,11 @@ def branch_count(saddle: Saddle) -> int:
     return 4 * len(saddle.points)
 
 
+def default_arc_length(region: Any, branches: int = 1) -> float:
+    """Return 10 diagonals of a region for each of a few branches; many branches share 160 diagonals."""
+    return min(_LENGTH, _TOTAL_LENGTH / branches) * float(np.linalg.norm(np.diff(Region.of(region).bounds)))
+
+
 def grow_manifolds(
     osc: Oscillator,
     saddle_index: int,
@@ -98,10 +105,10 @@ def grow_manifolds(
     in units of the region's width and height; the angle between neighbouring chords longer than a hundredth of that is
     at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``.
 
-    The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is RK4 with
-    four times the steps of ensembles, or the stepper of single trajectories if that is no slower. On ``hertz-0.570``,
-    against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within 2e-4 of the curve and
-    all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
+    The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is that of
+    ensembles with four times the steps, or that of single trajectories at a tolerance of 1e-6 if that is no slower.
+    On ``hertz-0.570``, against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within
+    2e-4 of the curve and all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
 
     A StructureError is raised if the saddle does not have one stable and one unstable direction, or if there are more
     states than x and v.
@@ -110,7 +117,7 @@ def grow_manifolds(
     frame = Region.of(region)
     limits = Limits(
         low=frame.bounds[:, 0], width=np.diff(frame.bounds)[:, 0], spacing=spacing, bend=bend,
-        arc_length=arc_length or _LENGTH * float(np.linalg.norm(np.diff(frame.bounds))),
+        arc_length=arc_length or default_arc_length(frame),
     )  # fmt: skip
     tasks = [
         (osc, saddle_index, saddle, point, backwards, side, limits, stepper)
@@ -176,9 +183,10 @@ def _branch(
 def _default_stepper(osc: Oscillator, flow: Flow) -> Stepper:
     rough = ensemble_stepper(osc, flow)
     turns = max(1.0, osc.section_interval * osc.natural_frequency / (2 * math.pi))
-    if isinstance(rough, RK4) and rough.steps <= _MOST_STEPS * turns:
+    if isinstance(rough, FixedSteps) and rough.steps <= _MOST_STEPS * turns:
         return rough.refined().refined()
-    return single_stepper(osc, flow)
+    located = single_stepper(osc, flow)
+    return dataclasses.replace(located, tolerance=_TOLERANCE) if isinstance(located, LocatedStepper) else located
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

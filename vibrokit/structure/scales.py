@@ -19,7 +19,9 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 
-_RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit
+_RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
+_AMPLITUDES, _PHASES = 400, 128  # of the trial motions of harmonic balance
+_LEAST_SWING, _MOST_SWING = 1e-3, 1e3  # of the deflection: range of amplitudes, where the damping does not bound it
 _SAMPLES, _LEAST_SAMPLES = 64, 512  # of a force in 2π/ω_n, and in all; its maximum is refined from the largest
 _LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its period is longer
 _MARGIN = 0.25  # of the width, on each side
@@ -33,17 +35,22 @@ Array = NDArray[np.float64]
 def length_of(osc: Oscillator) -> float:
     """Return the distance that the mass may be expected to move (m).
 
-    It is the larger of twice the distance to the stops and the deflection of a spring ω_n² by the largest forces of
-    the excitations. Where two stops do not limit a resonance, it multiplies the deflection by periodic forces. With
-    neither stops nor forces it is the deflection at which the nonlinear part of the spring's force is as large as the
-    linear part. A linear spring has no length scale; the length is 1 then.
+    It is the largest of twice the distance to the stops, the deflection of a spring ω_n² by the largest forces of the
+    excitations, and the amplitude of the largest resonant motion. Where two stops do not limit a resonance, it
+    multiplies the deflection by periodic forces. Where x = 0 is unstable without forcing, or there are neither stops
+    nor forces, it includes the deflection at which the nonlinear part of the spring's force is as large as the linear
+    part. A linear spring has no length scale; the length is 1 then.
     """
-    field, push = VectorField(osc), 0.0
+    field, push, swing = VectorField(osc), 0.0, 0.0
     for index, part in enumerate(osc.excitations):
         resonant = len(osc.barriers) < 2 and part.period is not None
         largest = _largest_force(field, index, part.period, 2 * math.pi / osc.natural_frequency)
         push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
-    return max([push, *(2 * abs(barrier.position) for barrier in osc.barriers)]) or _bending(osc, field)
+        swing += largest / osc.natural_frequency**2 if part.period is None else _swing(osc, field, largest, part.period)
+    length = max([push, swing, *(2 * abs(barrier.position) for barrier in osc.barriers)])
+    if not length or _pushes_away(osc, field):
+        length = max(length, _bending(osc, field))
+    return length or 1.0
 
 
 def size_of(osc: Oscillator) -> float:
@@ -51,8 +58,34 @@ def size_of(osc: Oscillator) -> float:
     return length_of(osc) * math.hypot(1.0, osc.natural_frequency)
 
 
+def _swing(osc: Oscillator, field: VectorField, force: float, period: float) -> float:
+    """Largest amplitude A at which a force at most as large keeps up x = A cos(2πt/T), by harmonic balance; else 0.
+
+    A bistable resonance has several amplitudes; the largest one is limited by the damping (A. H. Nayfeh and D. T. Mook,
+    "Nonlinear Oscillations", 1979, section 4.1).
+    """
+    frequency, natural = 2 * math.pi / period, osc.natural_frequency
+    deflection, damping = force / natural**2, 2 * osc.damping_ratio * natural * frequency
+    most = min(_MOST_SWING * deflection, force / damping if damping else math.inf)
+    if not most > 0:
+        return 0.0
+    phases = 2 * math.pi / _PHASES * np.arange(_PHASES)
+    amplitudes = np.geomspace(min(most, deflection) * _LEAST_SWING, most, _AMPLITUDES)[:, None]
+    motion = np.stack([amplitudes * np.cos(phases), -amplitudes * frequency * np.sin(phases)], axis=-1)
+    steady = sum(field.excitation(index, 0.0) for index in range(len(osc.excitations)))
+    rates = field.rate(states_at(osc, motion.reshape(-1, 2)))[:, 1].reshape(motion.shape[:2]) - steady
+    missing = 2 * np.mean((amplitudes * frequency**2 * np.cos(phases) + rates) * np.exp(-1j * phases), axis=1)
+    balanced = amplitudes[np.abs(missing) <= force, 0]
+    return float(balanced.max()) if balanced.size else 0.0
+
+
+def _pushes_away(osc: Oscillator, field: VectorField) -> bool:
+    """Return whether the force on a mass near x = 0 grows in the direction of its displacement."""
+    return bool(field.jacobian(states_at(osc, np.zeros((1, 2))))[0, 1, 0] > 0)
+
+
 def _bending(osc: Oscillator, field: VectorField) -> float:
-    """Deflection at which the nonlinear part of the force of the spring is as large as the linear one; else 1."""
+    """Deflection at which the nonlinear part of the force of the spring is as large as the linear one; 0 for none."""
     rest = states_at(osc, np.zeros((1, 2)))
     slope = float(field.jacobian(rest)[0, 1, 0])
     offset = float(field.rate(rest)[0, 1])
@@ -63,13 +96,13 @@ def _bending(osc: Oscillator, field: VectorField) -> float:
         return float(np.abs(forces - slope * sides[:, 0]).max() / (abs(slope) * sides[0, 0])) - 1.0
 
     if slope == 0.0 or not math.isfinite(slope):
-        return 1.0
+        return 0.0
     places = np.linspace(-_DECADES, _DECADES, 8 * _DECADES + 1) * math.log(10)
     values = [excess(place) for place in places]
     for low, high, below, above in zip(places, places[1:], values, values[1:], strict=False):
         if below < 0 <= above < math.inf:
             return float(f"{math.exp(brentq(excess, low, high)):.9g}")
-    return 1.0
+    return 0.0
 
 
 def _largest_force(field: VectorField, index: int, period: float | None, turn: float) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
@@ -91,7 +91,7 @@ class Search:
     @property
     def _many(self) -> int:
         """Number of starts that are followed for a long time: fewer for steppers without lanes."""
-        return _WATCHED if isinstance(self.stepper, RK4) else _LEAST_WATCHED
+        return _WATCHED if isinstance(self.stepper, FixedSteps) else _LEAST_WATCHED
 
     def _follow(self, states: Array, periods: int, stepper: Stepper) -> tuple[Ensemble, NDArray[np.int64]]:
         """Follow states until they reach a known attractor, or for some periods."""

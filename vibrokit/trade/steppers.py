@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
+from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.rk8 import RK8
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -31,6 +33,7 @@ STEPS = tuple(2**k for k in range(5, 13))
 TOLERANCES = tuple(10.0**-k for k in range(4, 15, 2))
 LADDERS: tuple[tuple[Stepper, ...], ...] = (
     tuple(RK4(steps) for steps in STEPS),
+    tuple(RK8(steps // 4) for steps in STEPS),
     tuple(Order8(tolerance) for tolerance in TOLERANCES),
     tuple(FreeFlight(tolerance) for tolerance in TOLERANCES),
 )
@@ -60,6 +63,7 @@ class TradeRow:
     seconds: float  # per trajectory and period, in an ensemble, all threads at work
     seconds_alone: float  # per period of trajectories that are integrated one by one
     memory: float  # peak of the arrays that Python held, per trajectory (bytes); not a kernel's own few kilobytes
+    in_steps: bool  # whether `cost` is a number of steps
     default: bool = False  # whether this is what the scene is given, for ensembles or for single trajectories
 
 
@@ -79,7 +83,7 @@ class Trade:
     rows: tuple[TradeRow, ...]  # by stepper, coarse to fine
     first_calls: tuple[FirstCall, ...]
     references: Mapping[str, str]  # what the errors of each stepper are distances to
-    orders: Mapping[str, float]  # exponent of the error, in the step for RK4, in the tolerance for the others, or NaN
+    orders: Mapping[str, float]  # exponent of the error, in the step or in the tolerance, or NaN
     refused: Mapping[str, str]  # steppers that cannot integrate this scene, with the reason
     checked: float  # median distance of the finest stepper to DOP853, which shares only the right-hand side with it
     starts: int
@@ -115,7 +119,8 @@ class Trade:
         order = self.orders[name]
         if not np.isfinite(order):
             return "no range of settings shows an order"
-        return f"error ∝ step^{order:.1f}" if name == "RK4" else f"error ∝ tolerance^{order:.2f}"
+        in_steps = any(row.name == name and row.in_steps for row in self.rows)
+        return f"error ∝ step^{order:.1f}" if in_steps else f"error ∝ tolerance^{order:.2f}"
 
 
 def measure_steppers(
@@ -131,9 +136,9 @@ def measure_steppers(
     """Measure error, time and memory of every stepper that can integrate a scene, coarse to fine.
 
     The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to a finer reference
-    by another method: FreeFlight at 1e-14 for RK4 and Order8, Order8 at 1e-14 for FreeFlight. What these two share, the
+    by another method: FreeFlight at 1e-14 for all others, Order8 at 1e-14 for FreeFlight. What these two share, the
     steps in contact, is checked by SciPy's DOP853, restarted at every change of contact. Where FreeFlight cannot
-    integrate the scene, DOP853 is the reference of Order8.
+    integrate the scene, DOP853 is the reference of Order8 and RK8, and Order8 that of RK4.
 
     Each of `ladders` has the settings of one stepper, coarse to fine, each timed for some `seconds`. The `starts` lie
     at random between the stops. NoSectionError is raised if the excitations have no common period, IntegrationError if
@@ -173,8 +178,8 @@ def _references(osc: Oscillator, states: Array, periods: int) -> dict[str, tuple
         flown = f"FreeFlight at {_FINEST:g}", osc.section_map(states, periods, stepper=FreeFlight(_FINEST))
     except StepperError:
         own = f"DOP853 at {TIGHTEST:g}", reference_map(osc, states, periods, tolerance=TIGHTEST)
-        return {"RK4": order8, "Order8": own}
-    return {"RK4": flown, "Order8": flown, "FreeFlight": order8}
+        return {"RK4": order8, "RK8": own, "Order8": own}
+    return {"RK4": flown, "RK8": flown, "Order8": flown, "FreeFlight": order8}
 
 
 def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) -> Array:
@@ -224,7 +229,8 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
-        cost=float(stepper.steps if isinstance(stepper, RK4) else 1 / getattr(stepper, "tolerance", np.nan)),
+        cost=float(stepper.steps if isinstance(stepper, FixedSteps) else 1 / getattr(stepper, "tolerance", np.nan)),
+        in_steps=isinstance(stepper, FixedSteps),
         error_median=float(np.median(errors)),
         error_90=float(np.quantile(errors, 0.9)),
         seconds=together / len(many),

@@ -28,7 +28,8 @@ _ZOOMS, _WORTHWHILE = 4, 0.8  # closer grids, and the ratio of areas above which
 _STEP_TOLERANCE = (
     0.01  # relative change of a cost by linearization that is accepted: below the error of the default grid
 )
-_PATH_FACTOR = 2.0  # on the difference from a path's action, because the path's fixed ends make it an upper bound
+PATH_FACTOR = 2.0
+"""Factor on the difference from a path's action: the path's fixed ends make that an upper bound."""
 _STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at least with the square of the step
 _FEWEST_NODES = 16  # along a side of the coarse grids
 
@@ -41,6 +42,7 @@ class TargetEstimate:
 
     value: float
     error: float  # both are infinite if the target was not reached
+    by_nodes: float  # part of the error that the nodes alone show
     candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
 
 
@@ -59,18 +61,19 @@ class GridHierarchy:
         The error is the change by halving the nodes, the difference from a path's action by Hamilton's equations (if
         no path was traced, half the change by doubling the step), and that of the target's own place.
         """
-        arrival = self.fine.arrival(target)
+        arrival, by_nodes = self.fine.arrival(target), np.inf
         fine, coarse, long = (grid.arrival(target).value for grid in (self.fine, self.coarse, self.long))
         reached = (self.fine, self.coarse) if np.isfinite(fine) else (self.whole,)
         paths = distinct(path for grid in reached for path in grid.paths(target))
         if np.isfinite([fine, coarse, long]).all():
             by_step = (
-                _PATH_FACTOR * abs(paths[0].candidate.action - fine) if paths else _STEP_FACTOR * abs(coarse - long)
+                PATH_FACTOR * abs(paths[0].candidate.action - fine) if paths else _STEP_FACTOR * abs(coarse - long)
             )
-            value, error = fine, abs(fine - coarse) + by_step + arrival.error
+            by_nodes = abs(fine - coarse) + arrival.error
+            value, error = fine, by_nodes + by_step
         else:
             value = error = self.whole.arrival(target).value
-        return TargetEstimate(value, error, tuple(path.candidate for path in paths))
+        return TargetEstimate(value, error, by_nodes, tuple(path.candidate for path in paths))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -145,10 +148,16 @@ class HierarchySearch:
         )
 
     def _covering(self, steps: int) -> Grids:
-        """Grids that cover the region of the section, and in the other phases also its image."""
+        """Grids that cover the region of the section, and in the other phases also the image of its basins.
+
+        What is in no basin is left out: such motion may grow without bound.
+        """
         scene, region = self.problem.scene, self.problem.structure.basins.region
         step = scene.section_interval / steps
         states = region.cell_centres((_SAMPLES, _SAMPLES))
+        basins, after = self.problem.structure.basins, self.model.images(states, 0.0, scene.section_interval)
+        settled = (basins.at(states) >= 0) & (basins.at(after) >= 0)
+        states = states[settled] if settled.any() else states
         boxes = []
         for phase in range(1 if scene.autonomous else steps):
             low = np.minimum(states.min(axis=0), region.bounds[:, 0])
@@ -175,10 +184,5 @@ class HierarchySearch:
         if phase:
             rest = self.problem.scene.section_interval - grids.time(phase)
             states = self.model.images(states, grids.time(phase), rest)
-        basins = self.problem.structure.basins
-        low, high = basins.region.bounds.T
-        place = (states - low) / (high - low)
-        known = np.all((place >= 0) & (place < 1), axis=1)
-        cells = np.where(known[:, None], place * basins.labels.shape, 0).astype(np.int64)
-        mask: Mask = known & (basins.labels[tuple(cells.T)] == self.problem.source)
+        mask: Mask = self.problem.structure.basins.at(states) == self.problem.source
         return mask.reshape(grids.shape)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray
 
-from vibrokit.analyzers.graph.hierarchy import HierarchySearch, TargetEstimate
+from vibrokit.analyzers.graph.hierarchy import PATH_FACTOR, HierarchySearch, TargetEstimate
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.step_model import StepModel
@@ -43,6 +43,24 @@ class GraphSolution:
     candidates: tuple[Candidate, ...]  # distinct paths to these places, in the same order, that end beyond the exit
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
+    by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
+
+    def calibrated(self, polished: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
+        """Return the estimates, with errors from actions that are known.
+
+        What linearization over a step and interpolation change is estimated from the action of the graph's own path,
+        which is relaxed only roughly. The action of a polished path to the same target shows it better: of a cheaper
+        one always, of a costlier one where the error is smaller than the graph's own.
+        """
+        least: dict[int, float] = {}
+        for path in polished:
+            least[path.target] = min(path.value, least.get(path.target, np.inf))
+        found = []
+        for one in self.estimates:
+            action = least.get(one.target, np.inf)
+            error = self.by_nodes[one.target] + PATH_FACTOR * abs(action - one.value)
+            found.append(_with_error(one, error if action < one.value else min(error, one.numerical_error)))
+        return tuple(found)
 
     @property
     def estimates(self) -> tuple[ActivationEnergy, ...]:
@@ -73,6 +91,13 @@ class GraphSolution:
                 "quasi_potential_v": _array("node_v", nodes[0, :, 1], "m s-1", "velocity of the nodes"),
             },
         )
+
+
+def _with_error(energy: ActivationEnergy, error: float) -> ActivationEnergy:
+    """The same energy with another error."""
+    return dataclasses.replace(
+        energy, lower=max(0.0, energy.value - error), upper=energy.value + error, numerical_error=error
+    )
 
 
 def _array(dims: str | tuple[str, ...], values: object, units: str, long_name: str) -> xarray.Variable:
@@ -239,4 +264,5 @@ def _solution(
         tuple(candidate for _, estimate in reached for candidate in estimate.candidates),
         potential,
         (used, *lost),
+        {target.label: estimate.by_nodes for target, estimate in reversed(reached)},
     )

@@ -48,8 +48,9 @@ class StepModel:
     stepper: Stepper
 
     def images(self, states: Array, start: float, duration: float) -> Array:
-        """Return the images of states (count, 2) after some time without noise."""
-        return self._run(Flow.STATE, states, start, duration).states
+        """Return the images of states (count, 2) after some time without noise; NaN where the motion diverged."""
+        ended = self._run(Flow.STATE, states, start, duration)
+        return np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
 
     def linear(self, states: Array, start: float, duration: float) -> GaussianMap:
         """Return images, derivatives M and covariances C of the motion from states (count, 2) over some time."""

@@ -12,7 +12,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
 
-_ITERATIONS = 100  # damped paths need 5 to 30
+_ITERATIONS = 100  # generic paths need 5 to 30; those of a nearly degenerate family descend slowly
 _INNER = 8  # Newton's method on the momenta of the segments; it converges in 2 to 4
 _MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
 _CONVERGED = 1e-9  # of the action: the gain that the next step promises
@@ -41,6 +41,7 @@ def descend_action(
     last: float | None = None,  # duration of the last piece (s), if it differs from the others
     free: NDArray[np.bool_] | None = None,  # (n,): coordinates of the last state that may change; by default none
     closing: Closing | None = None,  # action after the last node, all of whose coordinates may change
+    iterations: int = _ITERATIONS,  # at most
 ) -> tuple[Array, float]:
     """Bring a path to a local minimum of the action, with extremal segments and its first state held.
 
@@ -56,7 +57,7 @@ def descend_action(
     current = path.evaluate(points[:, :n], points[:-1, n:])
     if current is None:
         return points, float("nan")
-    current = path.minimize(current)
+    current = path.minimize(current, iterations)
     return np.hstack([current.states, np.vstack([current.momenta, current.carried.images[-1:, n:]])]), current.action
 
 
@@ -90,10 +91,10 @@ class _Descent:
             momenta = momenta + np.linalg.solve(carried.derivatives[:, : self.n, self.n :], misses[..., None])[..., 0]
         return None
 
-    def minimize(self, current: _Evaluation) -> _Evaluation:
+    def minimize(self, current: _Evaluation, iterations: int) -> _Evaluation:
         """Descend until the next step promises no more."""
         damping = _FIRST_DAMPING
-        for _ in range(_ITERATIONS):
+        for _ in range(iterations):
             slope, (diagonal, below) = self._gradient(current), self._curvature(current)
             before = current.action
             count(newton_iterations=1)

@@ -17,4 +17,5 @@ class Candidate:
     times: NDArray[np.float64]  # (count,): times (s), the first on the section (a whole number of forcing periods)
     states: NDArray[np.float64]  # (count, n): states at these times, from near the source to just beyond the exit
     action: float  # action according to the method that found it (m² s⁻³)
-    finder: str  # that method: ``"action plot"`` or ``"graph"``
+    finder: str  # that method, in words
+    momenta: NDArray[np.float64] | None = None  # (count, n): at the states, where the method knows them

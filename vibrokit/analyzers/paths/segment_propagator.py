@@ -53,15 +53,21 @@ class SegmentPropagator:
 
         The phase of the first node is in pieces since the section; the last piece may have another duration (s).
         """
-        return self._by_phase(gaussian_map, states, first, last)
+        return self._by_phase(gaussian_map, states, first + np.arange(len(states)), last)
 
     def extremal(self, points: Array, first: int, last: float | None = None) -> HamiltonianMap:
         """Map consecutive (q, p) over one piece each by Hamilton's equations; arguments as for `linear`."""
-        return self._by_phase(hamiltonian_map, points, first, last)
+        return self.extremal_from(points, first + np.arange(len(points)), last)
 
-    def _by_phase(self, mapped: Callable[..., Map], points: Array, first: int, last: float | None) -> Map:
-        """Map consecutive nodes, those of one phase together."""
-        phases = (first + np.arange(len(points))) % self.pieces
+    def extremal_from(self, points: Array, phases: NDArray[np.int64], last: float | None = None) -> HamiltonianMap:
+        """Map (q, p) at any phases (count,) over one piece each; arguments otherwise as for `linear`."""
+        return self._by_phase(hamiltonian_map, points, phases, last)
+
+    def _by_phase(
+        self, mapped: Callable[..., Map], points: Array, phases: NDArray[np.int64], last: float | None
+    ) -> Map:
+        """Map nodes, those of one phase together."""
+        phases = phases % self.pieces
         kinds = np.zeros_like(phases) if self.osc.autonomous else phases.copy()
         if last is not None and last != self.piece:
             kinds[-1] = -1

@@ -26,7 +26,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 WORTH = 1.25
 """Times the least action known: costlier candidates are skipped. Searches price a path to a few percent."""
-_PIECES = (8, 16)  # in a section interval: the finer ones where the coarser ones do not converge
+PIECES = (8, 16)
+"""In a section interval: the finer ones where the coarser ones do not converge."""
 _NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
 _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
@@ -64,9 +65,9 @@ class CandidatePolisher:
 
     def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], point: np.ndarray, period: int) -> None:
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
-        propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in _PIECES}
+        propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in PIECES}
         source = functools.cache(lambda pieces: linearized_orbit(propagators[pieces], point, period))
-        source(_PIECES[0])
+        source(PIECES[0])
         self.problem, self.ends = problem, ends
         self.solved: list[Solved] = []
         self.skipped = 0  # candidates that cost too much
@@ -116,8 +117,8 @@ class CandidatePolisher:
 
     def _near(self, candidate: Candidate) -> list[PathEnd]:
         """The ends that a candidate comes near, the nearest first."""
-        nodes: ResampledCandidate = self._resampled(candidate, _PIECES[0])
-        distances = [self._ending(end, _PIECES[0]).distance(nodes) for end in self.ends]
+        nodes: ResampledCandidate = self._resampled(candidate, PIECES[0])
+        distances = [self._ending(end, PIECES[0]).distance(nodes) for end in self.ends]
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
         return [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
 
@@ -130,7 +131,7 @@ class CandidatePolisher:
     def _solve(self, end: PathEnd, candidate: Candidate, known: Sequence[Solved]) -> Solved:
         """Polish a candidate to an end, with finer pieces if necessary."""
         least = min((one.found.action for one in known if one.end is end), default=np.inf)
-        for pieces in _PIECES:
+        for pieces in PIECES:
             try:
                 return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least)
             except StructureError as error:

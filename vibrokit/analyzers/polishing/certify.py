@@ -54,7 +54,7 @@ def _tightened(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPa
     source = linearized_orbit(finer, orbit.states[0], len(orbit.states) // finer.pieces)
     if orbit.start_on_orbit:
         source = source.with_start_on_orbit()
-    return extremal_path(finer, source, found.first, found.ending.tightened(finer), found.points, found.last)
+    return extremal_path(finer, source, found.first, found.ending.carried_by(finer), found.points, found.last)
 
 
 def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:

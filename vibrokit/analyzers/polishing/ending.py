@@ -10,9 +10,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.action_descent import Closing
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.results.energy import ExitPath
@@ -31,11 +33,19 @@ class ResampledCandidate:
     candidate: Candidate
     states: Array  # (nodes, n): a piece apart, the first on the section
     after: Array  # (more, n): the noise-free motion from the last node on, that node included
+    momenta: Array | None = None  # (nodes, n), where they are known
 
     @cached_property
     def all_states(self) -> Array:
         """Nodes of the candidate and of the motion after it."""
         return np.concatenate([self.states, self.after[1:]])
+
+    def momenta_of(self, kept: int, count: int) -> Array | None:
+        """Return the momenta of the first nodes, 0 at those that follow, where they are known."""
+        if self.momenta is None:
+            return None
+        momenta = self.momenta[:kept]
+        return np.concatenate([momenta, np.zeros((count - len(momenta), self.states.shape[1]))])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,6 +55,7 @@ class Cut:
     states: Array  # (nodes, n): a piece apart, except the last
     ending: Ending
     last: float  # duration of the last piece (s)
+    momenta: Array | None = None  # (nodes, n), where they are known
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -73,8 +84,16 @@ class Ending(ABC):
         """Return the derivatives of the misfits in the last point over `scale`, and in the time if that is free."""
 
     @abstractmethod
-    def tightened(self, propagator: SegmentPropagator) -> Self:
-        """Return the same ending, prepared with a finer integration."""
+    def carried_by(self, propagator: SegmentPropagator) -> Self:
+        """Return the same ending, prepared with another propagator."""
+
+    def moved_to(self, end: PathEnd) -> Self:
+        """Return the ending for the same end of a scene with another parameter."""
+        return self
+
+    def displaced(self, point: Array, end: PathEnd) -> float:
+        """Return p·δq of a last point that follows the end to where it is with another parameter."""
+        return 0.0
 
     @property
     def free_time(self) -> bool:
@@ -90,6 +109,11 @@ class Ending(ABC):
     def period_nodes(self) -> int:
         """Nodes in a period of the orbit that the path approaches; 0 if it ends after a finite time."""
         return 0
+
+    @property
+    def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:
+        """The orbit that the path approaches, and its node at the last point; empty if it ends after a finite time."""
+        return ()
 
     @property
     def closing(self) -> Closing | None:
@@ -128,13 +152,15 @@ def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledC
     if len(times) < 2 or not times[-1] > 0:
         raise StructureError("it has only one state, so there is no path to polish.")
     nodes = int(np.ceil(times[-1] / propagator.piece - _ROUNDING))
-    states = []
-    for node in range(nodes + 1):
-        time = node * propagator.piece
-        last = int(np.searchsorted(times, time + _ROUNDING * propagator.piece, side="right")) - 1
-        states.append(_carried(propagator, given[last], times[last], time - times[last]))
+    at = propagator.piece * np.arange(nodes + 1)
+    before = np.searchsorted(times, at + _ROUNDING * propagator.piece, side="right") - 1
+    states = [
+        _carried(propagator, given[last], times[last], time - times[last])
+        for time, last in zip(at, before, strict=True)
+    ]
     after = propagator.onward(states[-1], nodes, _AFTER * propagator.pieces)
-    return ResampledCandidate(candidate, np.array(states), after)
+    momenta = None if candidate.momenta is None else candidate.momenta[before]
+    return ResampledCandidate(candidate, np.array(states), after, momenta)
 
 
 def _carried(propagator: SegmentPropagator, state: Array, start: float, duration: float) -> Array:

@@ -78,8 +78,15 @@ class FaceEnding(Ending):
             in_time = np.vstack([in_time, [[change / (2 * short) / self._energy(scale)]]])
         return in_point, in_time
 
-    def tightened(self, propagator: SegmentPropagator) -> Self:
+    def carried_by(self, propagator: SegmentPropagator) -> Self:
         return dataclasses.replace(self, propagator=propagator)
+
+    def moved_to(self, end: PathEnd) -> Self:
+        assert isinstance(end, AtFace)
+        return dataclasses.replace(self, face=end)
+
+    def displaced(self, point: Array, end: PathEnd) -> float:
+        return float(point[self.propagator.size + self.face.axis]) * (self.moved_to(end).face.level - self.face.level)
 
     @property
     def free_time(self) -> bool:
@@ -129,7 +136,8 @@ class FaceEnding(Ending):
             end[1] = 0.0
         shares = (1 + np.arange(max(shift, 0)))[:, None] / (1 + max(shift, 0))
         straight = states[-1] + shares * (end - states[-1])
-        return Cut(np.concatenate([states, straight, end[None]]), self, last)
+        momenta = candidate.momenta_of(len(states), len(states) + len(straight) + 1)
+        return Cut(np.concatenate([states, straight, end[None]]), self, last, momenta)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -149,7 +157,8 @@ class SaddleEnding(Ending):
         periods = math.ceil(_SETTLING / (self.orbit.slowest_rate * pieces))
         added = min(max(2, periods), _MOST_ADDED) * pieces
         states = np.concatenate([candidate.all_states[: node + 1], self.orbit.along(phase + 1, added)])
-        return [Cut(states, dataclasses.replace(self, phase=phase + added), self.propagator.piece)]
+        ending, momenta = dataclasses.replace(self, phase=phase + added), candidate.momenta_of(node + 1, len(states))
+        return [Cut(states, ending, self.propagator.piece, momenta)]
 
     def misfit(self, point: Array, time: float, scale: Array) -> Array:
         return self._normals(scale) @ ((point - self._point) / scale)
@@ -158,13 +167,17 @@ class SaddleEnding(Ending):
         normals = self._normals(scale)
         return normals, np.zeros((len(normals), 0))
 
-    def tightened(self, propagator: SegmentPropagator) -> Self:
+    def carried_by(self, propagator: SegmentPropagator) -> Self:
         again = linearized_orbit(propagator, self.orbit.states[0], self.period_nodes // propagator.pieces)
         return dataclasses.replace(self, propagator=propagator, orbit=again)
 
     @property
     def period_nodes(self) -> int:
         return len(self.orbit.states)
+
+    @property
+    def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:
+        return ((self.orbit, self.orbit.node(self.phase)),)
 
     @property
     def closing(self) -> Closing:

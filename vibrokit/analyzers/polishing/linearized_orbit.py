@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import scipy.linalg
@@ -13,6 +14,7 @@ from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap, gaussian_pieces
 from vibrokit.structure.orbits import refine_orbit
 
+_PATIENCE = 5.0  # times the time in which the slowest motion decays: transient growth and spirals take longer
 _NEUTRAL = 1e-6  # distance of a multiplier's size from 1 below which its rate is lost in the orbit's own error
 
 Array = NDArray[np.float64]
@@ -82,14 +84,22 @@ class LinearizedOrbit:
         """Return how many nodes to add for a path to start or end within a radius in (x, v); negative: to drop.
 
         The points (nodes, 2n) run from that end of the path, the start (sign −1) or the end (1); the phase is that of
-        the first of them. Nodes are added or dropped `grain` at once.
+        the first of them. Nodes are added or dropped `grain` at once. Raises StructureError if the linearized motion
+        does not come within the radius in several times the time that its slowest rate takes.
         """
         orbit = self.states[(phase - sign * np.arange(0, len(points), grain)) % len(self.states)]
         outside = np.linalg.norm(points[::grain, :2] - orbit[:, :2], axis=1) > radius
         if not outside[0]:
             return -grain * (int(np.argmax(outside)) - 1)
         added, point = 0, points[0]
+        distance = float(np.linalg.norm((point - self.point(phase))[:2]))
+        most = _PATIENCE * (math.log(distance / radius) / self.slowest_rate + len(self.states))
         while np.linalg.norm((point - self.point(phase + sign * added))[:2]) > radius:
+            if added > most:
+                raise StructureError(
+                    f"the path does not approach its orbit: after {added} nodes more it is still farther than "
+                    f"{radius:.1e} away."
+                )
             nodes = self.continued(point, phase + sign * added, sign * grain)
             point = nodes[-1] if sign > 0 else nodes[0]
             added += grain

@@ -20,10 +20,10 @@ from vibrokit.structure.linear_map import HamiltonianMap
 _EVALUATIONS = 200  # of the misfits; a path that converges at all needs 10 to 60
 _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
+_LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may grow without bound
 _SHORTEST_STEP = 1e-4  # share of a Newton step
 ACCEPTED = 1e-9
-"""Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this, or in
-proportion to it along a family of paths that all but solve the equations."""
+"""Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
 _LONGEST_LAST = 3.0  # pieces
 _SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
 _FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
@@ -45,6 +45,9 @@ class ExtremalPath:
     last: float  # duration of the last piece (s)
     slopes: Array  # (nodes − 1, 2n, 2n): derivatives of the pieces
     actions: Array  # (nodes − 1,): action of each piece
+    # Where a piece ends at q and the next one begins at q + δ, a path without the jump costs p·δ more. With this the
+    # action is stationary, so that misfits change it by their squares even along a family of paths.
+    over_jumps: float
     residual: float  # largest misfit, relative to the size of what is matched
     # Without forcing H is constant along the path, so that one condition follows from the others, and a path between
     # two equilibria may be shifted in time. The time is fixed, and the path may jump at one node in the direction of
@@ -56,7 +59,7 @@ class ExtremalPath:
     @property
     def action(self) -> float:
         """From the source on: the pieces, and the action of the linearized equations before and after them."""
-        return self.head + float(np.sum(self.actions)) + self.ending.tail(self.points[-1])
+        return self.head + float(np.sum(self.actions)) + self.over_jumps + self.ending.tail(self.points[-1])
 
     @property
     def head(self) -> float:
@@ -256,7 +259,8 @@ class _Matching:
                     break
                 else:
                     step = rest + soft.limited(step) * soft.direction
-            length, share = float(np.linalg.norm(step)), 1.0
+            length = float(np.linalg.norm(step))
+            share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), _SMALL))
             while share > _SHORTEST_STEP:
                 moved = self._moved(points, number, share * step)
                 tried = self.evaluate(*moved)
@@ -274,7 +278,8 @@ class _Matching:
         slack = 0.0 if self.pin is None else abs(float(number[0]))
         return ExtremalPath(
             self.source, self.first, self.ending, points, self._last(number),
-            current.carried.derivatives, current.carried.actions, current.largest, slack, self.scale, flat,
+            current.carried.derivatives, current.carried.actions, _over_jumps(points, current.carried.images),
+            current.largest, slack, self.scale, flat,
         )  # fmt: skip
 
     def _last(self, number: Array) -> float:
@@ -282,6 +287,11 @@ class _Matching:
 
     def _moved(self, points: Array, number: Array, step: Array) -> tuple[Array, Array]:
         return points + self.scale * step[: points.size].reshape(points.shape), number + step[points.size :]
+
+
+def _over_jumps(points: Array, images: Array) -> float:
+    n = points.shape[1] // 2
+    return float(np.sum(points[1:, n:] * (points[1:, :n] - images[:, :n])))
 
 
 def _sizes(points: Array, origin: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 
@@ -20,9 +21,11 @@ _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this nea
 _RADIUS = 1e-4  # of a path's extent: within this distance of its ends the linearized equations replace the path
 _CLOSER, _UNCHANGED = 4, 1e-8  # the radius is divided by 10 until the action changes by no more (relative), 4 times
 _LONG_ENOUGH = 1e-6  # the same for a path that starts on its orbit, made twice as long
-_FEW_EVALUATIONS = 24  # of the misfits, for a path that is known except near its ends
+FEW_EVALUATIONS = 24
+"""Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
+_MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
@@ -32,6 +35,7 @@ _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy o
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
+Fallback = Callable[[StructureError, float], ExtremalPath]
 
 
 class PathSolver:
@@ -44,13 +48,18 @@ class PathSolver:
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
 
-        Of several ways to cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be
-        joined to its source by the linearized equations is solved for as one that starts on the orbit itself, if its
-        action is below `worth`. Raises StructureError if no extremal path is found near the candidate.
+        A candidate with momenta goes to multiple shooting at once; the others follow if that fails. Of several ways to
+        cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be joined to its
+        source by the linearized equations is solved for as one that starts on the orbit itself, if its action is below
+        `worth`. Raises StructureError if no extremal path is found near the candidate.
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
-            first, states = _begun(propagator, self.source, cut.states)
+            first, points = _begun(propagator, self.source, cut)
+            if cut.momenta is not None:
+                with contextlib.suppress(StructureError):
+                    return self._once(self._shot(first, cut, points), _give_up)
+            states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
         points, action, first, cut = min(fitted, key=lambda each: each[1])
         for _, known in self._known:
@@ -66,6 +75,10 @@ class PathSolver:
             found = self._descended(self.source, first, cut, points)
         except StructureError as error:
             return from_orbit(error, action)
+        return self._once(found, from_orbit)
+
+    def _once(self, found: ExtremalPath, from_orbit: Fallback) -> ExtremalPath:
+        """Complete a path, unless that was done, or failed, before."""
         result = next((known for before, known in self._known if _are_one(before, found)), None)
         if result is None:
             try:
@@ -77,27 +90,22 @@ class PathSolver:
             raise result
         return result
 
+    def _completed(self, found: ExtremalPath, from_orbit: Fallback) -> ExtremalPath:
+        try:
+            return completed(self.propagator, found)
+        except StructureError as error:
+            return from_orbit(error, found.action)
+
     def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
         ending = cut.ending
         points, _ = descend_action(
             self.propagator, first, points, last=cut.last, free=ending.free, closing=ending.closing
         )  # fmt: skip
-        return extremal_path(self.propagator, source, first, ending, points, cut.last, accepted=_FIRST_ACCEPTED)
+        return self._shot(first, cut, points, source)
 
-    def _completed(self, found: ExtremalPath, from_orbit: Callable[..., ExtremalPath]) -> ExtremalPath:
-        """The same path, started and ended so near to its orbits that the action no longer changes."""
-        radius = _RADIUS * found.extent
-        try:
-            found = _within(self.propagator, found, radius)
-            for _ in range(_CLOSER):
-                radius /= 10
-                closer = _within(self.propagator, found, radius)
-                if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
-                    break
-                found = closer
-        except StructureError as error:
-            return from_orbit(error, found.action)
-        return found
+    def _shot(self, first: int, cut: Cut, points: Array, source: LinearizedOrbit | None = None) -> ExtremalPath:
+        source = source or self.source
+        return extremal_path(self.propagator, source, first, cut.ending, points, cut.last, accepted=_FIRST_ACCEPTED)
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
         """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""
@@ -122,6 +130,26 @@ class PathSolver:
         if best is None:
             raise failure
         return best
+
+
+def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
+    """Return the same path, started and ended so near to its orbits that the action no longer changes.
+
+    Raises StructureError if it cannot be joined to them by the linearized equations.
+    """
+    radius = _RADIUS * found.extent
+    found = _within(propagator, found, radius)
+    for _ in range(_CLOSER):
+        radius /= 10
+        closer = _within(propagator, found, radius)
+        if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
+            break
+        found = closer
+    return found
+
+
+def _give_up(failure: StructureError, action: float) -> ExtremalPath:
+    raise failure
 
 
 def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
@@ -167,39 +195,44 @@ def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int
     points = np.concatenate([more, points[max(-before, 0) :]])
     points, ending = found.ending.extended(points, after)
     return extremal_path(
-        propagator, found.source, first - before, ending, points, found.last, evaluations=_FEW_EVALUATIONS
+        propagator, found.source, first - before, ending, points, found.last, evaluations=FEW_EVALUATIONS
     )
 
 
 def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -> ExtremalPath:
     """The same path, started and ended within a radius of its orbits; in steps where all at once does not converge."""
-    grain, source, least = propagator.grain, found.source, 1
+    grain, source, share, failures = propagator.grain, found.source, 1, 0
     while True:
         before = 0 if source.start_on_orbit else source.missing(found.points, found.first, -1, radius, grain) // grain
-        after, share = found.ending.missing(found.points, radius) // grain, 1
-        while True:
-            try:
-                longer = solved_again(propagator, found, int(before / share) * grain, int(after / share) * grain)
-                break
-            except StructureError:
-                if max(before, after) < max(share, least):
-                    raise
-                share *= 2
+        after = found.ending.missing(found.points, radius) // grain
+        try:
+            longer = solved_again(propagator, found, int(before / share) * grain, int(after / share) * grain)
+        except StructureError:
+            failures += 1
+            if failures > _MOST_FAILURES or max(abs(before), abs(after)) < 2 * share:
+                raise
+            share *= 2
+            continue
         if share == 1:
             return longer
-        found, least = longer, 2
+        found, share = longer, share // 2
 
 
-def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, states: Array) -> tuple[int, Array]:
-    """Start a candidate on its source, at the section where it last is near, or long enough before its first state.
+def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[int, Array]:
+    """Points (q, p) of a candidate that starts on its source, where it last is near or long before its first state.
+
+    A candidate with momenta begins where it does.
 
     The start stays on the orbit until multiple shooting: the linearized equations do not hold for a start far from the
     orbit, and would give it much too small an action.
     """
+    states = cut.states
     nodes = np.arange(0, len(states) - 1, propagator.grain)
     phases = np.arange(0, len(source.states), propagator.pieces)
     distances = np.linalg.norm((states[nodes][:, None] - source.states[phases]) / propagator.units, axis=2)
     nearest, closest = phases[np.argmin(distances, axis=1)], distances.min(axis=1)
+    if cut.momenta is not None:
+        return int(nearest[0]), np.hstack([states, cut.momenta])
     wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
     near = np.flatnonzero(closest <= wanted)
     entered = int(near[-1]) if near.size else 0
@@ -209,4 +242,5 @@ def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, states: Array
         added = min(periods, _MOST_ADDED) * propagator.pieces
         first -= added
         states = np.concatenate([source.along(first, added), states])
-    return first, np.concatenate([source.along(first, 1), states[1:]])
+    states = np.concatenate([source.along(first, 1), states[1:]])
+    return first, np.hstack([states, np.zeros_like(states)])

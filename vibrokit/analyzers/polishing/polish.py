@@ -11,6 +11,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher, Solved
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.polishing.sensitivity import sensitivities
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.progress import advance, stage
@@ -50,7 +51,7 @@ class Polishing:
     """
 
     def __init__(self, problem: ExitProblem, orbit: Orbit | None = None) -> None:
-        self._source = problem.source
+        self._problem = problem
         with stage("ends of exit paths", subject=problem.attractor.name):
             self._ends, self._findings = usable_ends(problem)
             self._polisher = CandidatePolisher(problem, self._ends, *_start(problem, orbit))
@@ -69,23 +70,23 @@ class Polishing:
                 for end in self._ends:
                     self._polisher.reach(end, ranked)
         except KeyboardInterrupt as error:
-            self._findings.append(Finding.stopped("polishing", error, self._source))
+            self._findings.append(Finding.stopped("polishing", error, self._problem.source))
         found = self._polisher.solved[self._certified :]
         try:
             with stage("certifying", unit="paths", total=len(found)):
                 for solved in found:
-                    self._branches += _certified(self._source, solved, self._findings)
+                    self._branches += _certified(self._problem, solved, self._findings)
                     self._certified += 1
                     advance()
         except KeyboardInterrupt as error:
-            self._findings.append(Finding.stopped("certifying", error, self._source))
+            self._findings.append(Finding.stopped("certifying", error, self._problem.source))
 
     def polished(self) -> Polished:
         """Return what all candidates led to."""
         findings, skipped = [*self._findings, *self._polisher.findings], self._polisher.skipped
         if skipped:
             values = {"skipped": skipped, "total": self._tried, "factor": WORTH}
-            findings.append(Finding(Code.CANDIDATES_SKIPPED, self._source, values=values))
+            findings.append(Finding(Code.CANDIDATES_SKIPPED, self._problem.source, values=values))
         branches = sorted(self._branches, key=lambda branch: branch.value)
         return Polished(tuple(branches), (*findings, *_valleys(branches)))
 
@@ -102,9 +103,9 @@ def _start(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int]:
     return attractor.points[0], attractor.period
 
 
-def _certified(source: int, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:
+def _certified(problem: ExitProblem, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:
     """The path with its certificate, once for each attractor that it leads to."""
-    found = solved.found
+    found, source = solved.found, problem.source
     try:
         certificate = certify(solved.propagator, found)
     except StructureError as failure:
@@ -114,6 +115,7 @@ def _certified(source: int, solved: Solved, findings: list[Finding]) -> list[Act
         values = {"action": found.action, "periods": certificate.periods}
         findings.append(Finding(Code.STARTS_ON_ORBIT, source, values=values))
     error = certificate.error + _ROUNDING * found.action
+    derivatives = sensitivities(problem, solved.end, solved.propagator, found)
     return [
         ActivationEnergy(
             source=source,
@@ -128,6 +130,8 @@ def _certified(source: int, solved: Solved, findings: list[Finding]) -> list[Act
             path=solved.path,
             saddle=solved.end.saddle,
             certificate=certificate,
+            sensitivity={name: each.value for name, each in derivatives.items()},
+            sensitivity_error={name: each.error for name, each in derivatives.items()},
         )
         for target in solved.end.targets
     ]

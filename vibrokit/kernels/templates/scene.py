@@ -9,7 +9,8 @@ from math import cos, sin, sqrt
 
 from numba import njit
 
-OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
+CONTRACTED = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
 
 STATES = 2
 MOMENTA = 2

@@ -15,7 +15,7 @@ from vibrokit.progress import report, stage
 from vibrokit.results.basins import Basins
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.autonomous import refine_cycle
+from vibrokit.structure.autonomous import equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.edges import (
     PARTS_OF_A_TURN,
@@ -105,14 +105,25 @@ class SaddleSearch:
             self._findings.append(Finding.of(Code.BOUNDARIES_SKIPPED, skipped=skipped, total=len(meetings)))
         tracked = 0
         with stage("saddles", unit="motions"):
-            for classifier in (self.classifier, dataclasses.replace(self.classifier, core=None)):
-                unexplained = pairs - self._explained
+            if self.osc.autonomous:
+                self._add_equilibria()
+            for again, classifier in enumerate((self.classifier, dataclasses.replace(self.classifier, core=None))):
+                unexplained = pairs - self._explained if again else pairs
                 if unexplained:
                     each = max(2, min(self.trackers, most // len(unexplained)))
                     straddles = Straddles(classifier, self.basins, each, rng, only=unexplained)
                     self._follow(straddles, tracked)
                     tracked += len(straddles.origins)
         self._lost = tuple(sorted(pairs - self._explained))
+
+    def _add_equilibria(self) -> None:
+        """Add those that one direction leaves, on both sides to different attractors."""
+        for orbit in equilibria(self.osc, *self.classifier.region.bounds[0]):
+            if np.sum(np.abs(np.linalg.eigvals(orbit.monodromy)) > 1) == 1:
+                limits = branch_limits(self.classifier, orbit)
+                if len(set(limits)) > 1:
+                    self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
+                    self._explained.add((min(limits), max(limits)))
 
     def _follow(self, straddles: Straddles, tracked: int) -> None:
         """Follow motions until each has converged to a saddle, or for the largest number of sections."""

@@ -1,4 +1,4 @@
-"""Classical Runge–Kutta with fixed steps, trajectories packed in lanes.
+"""Runge–Kutta steps of one length, trajectories packed in lanes.
 
 All lanes of a block share the phase of the forcing, so it is tabulated once, for all intervals after which it repeats.
 A lane whose trajectory has ended is given the next one as soon as the phase is that of its start.
@@ -9,7 +9,8 @@ increments. For additive noise that is weak order 2 in the noise and order 4 in 
 Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the amplitude depends on the state that
 it drives, Milstein's term makes it strong order 1.
 
-Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows.
+Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows, those marked "staged" only for
+steps that keep the slopes of their stages.
 """
 
 import numpy as np
@@ -17,11 +18,12 @@ from numba import njit
 
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
 from vibrokit.kernels.templates.scene import (
+    CONTRACTED,
     EQUATIONS,
     LANES,
-    OPTIONS,
+    NODES,
+    STAGES,
     draw_lanes,
-    forcing,
     step_lanes,
     tabulate,
 )
@@ -29,7 +31,7 @@ from vibrokit.kernels.templates.scene import (
 # --- scene above, stepper below ---
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def advance(
     states,
     theta,
@@ -60,8 +62,10 @@ def advance(
     cycle = int(settings[1])  # forced
     h = interval / steps
     count = states.shape[0]
-    table = np.zeros((max(cycle, 1), 2 * steps + 1))  # forced
+    table = np.zeros((max(cycle, 1), steps, NODES))  # forced
     z = np.zeros((EQUATIONS, LANES))
+    slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
+    point = np.zeros((EQUATIONS, LANES))  # staged
     before = np.zeros((EQUATIONS, LANES))
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
@@ -108,9 +112,9 @@ def advance(
             draw_lanes(stream, first, second)  # noisy
             step_lanes(
                 z,
-                table[row, 2 * step],  # forced
-                table[row, 2 * step + 1],  # forced
-                table[row, 2 * step + 2],  # forced
+                slopes,  # staged
+                point,  # staged
+                table[row, step],  # forced
                 first,  # noisy
                 second,  # noisy
                 theta,
@@ -156,7 +160,7 @@ def advance(
             active -= 1
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def record(
     state,
     theta,
@@ -171,6 +175,9 @@ def record(
     steps = max(1, int(np.ceil(spacing / settings[2] - 1e-9)))
     h = spacing / steps
     z = np.zeros((EQUATIONS, LANES))
+    slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
+    point = np.zeros((EQUATIONS, LANES))  # staged
+    table = np.zeros((steps, NODES))  # forced
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
     second = np.zeros(LANES)  # noisy
@@ -180,17 +187,17 @@ def record(
         z[e, 0] = state[e]
     out[0] = state
     for sample in range(1, out.shape[0]):
+        tabulate(start_time + (sample - 1) * spacing, h, theta, table)  # forced
         for step in range(steps):
-            t = start_time + (sample - 1) * spacing + step * h  # forced
             draw_lanes(stream, first, second)  # noisy
             if given.shape[0] > 0:  # noisy
                 first[0] = given[(sample - 1) * steps + step, 0]  # noisy
                 second[0] = given[(sample - 1) * steps + step, 1]  # noisy
             step_lanes(
                 z,
-                forcing(t, theta),  # forced
-                forcing(t + 0.5 * h, theta),  # forced
-                forcing(t + h, theta),  # forced
+                slopes,  # staged
+                point,  # staged
+                table[step],  # forced
                 first,  # noisy
                 second,  # noisy
                 theta,

@@ -1,0 +1,94 @@
+"""RK8: order 8 where forces are smooth, the orders of RK4 across contacts, and nothing with noise."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import vibrokit as vk
+from vibrokit.errors import StepperError
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.kernel import kernel_for
+from vibrokit.kernels.single import record
+from vibrokit.symbolic.flow_kind import Flow
+
+DUFFING = vk.Oscillator(
+    natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(1.0, 0.3),
+    excitations=(vk.Harmonic(0.4, 1.4),), noise=vk.WhiteNoise(intensity=1e-4),
+)  # fmt: skip
+PERIOD = 2 * np.pi / 1.4
+STARTS = np.random.default_rng(3).uniform(-1.5, 1.5, (40, 2))
+
+
+def rates(t, z):
+    x, v, p1, p2 = z[:4]
+    force = 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3 + p2
+    return v, force, (1 + 0.9 * x**2) * p2, 0.1 * p2 - p1, 0.5 * p2**2
+
+
+def reference(starts, end):
+    """SciPy's DOP853 on equations typed by hand."""
+    ends = [solve_ivp(rates, (0, end), start, "DOP853", rtol=3e-14, atol=1e-16).y[:, -1] for start in starts]
+    return np.array(ends)
+
+
+@pytest.fixture(scope="module")
+def extremals():
+    """Starts (x, v, p, action) and where Hamilton's equations lead in three periods."""
+    momenta = np.random.default_rng(4).normal(0.0, 1e-2, STARTS.shape)
+    starts = np.hstack([STARTS, momenta, np.zeros((len(STARTS), 1))])
+    return starts, reference(starts, 3 * PERIOD)
+
+
+def test_order_8_in_hamiltons_equations(extremals):
+    starts, ends = extremals
+    errors = [
+        np.median(
+            np.linalg.norm(run_ensemble(DUFFING, Flow.HAMILTONIAN, vk.RK8(steps), starts, 3).states - ends, axis=1)
+        )
+        for steps in (12, 24, 48)
+    ]
+    assert errors[-1] < 1e-11
+    orders = -np.diff(np.log2(errors))
+    assert np.all(orders > 7.5)
+    assert np.all(orders < 9.5)
+
+
+def test_derivatives_are_those_of_the_flow():
+    """Of many equations, whose stages are computed in another way."""
+    module = kernel_for(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.RK8(64)).module
+    start = np.zeros((1, module.EQUATIONS))
+    start[0, :4] = 0.4, -0.2, 1e-2, -2e-2
+    one = run_ensemble(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.RK8(64), start, 1).states
+    other = run_ensemble(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.Order8(1e-13), start, 1).states
+    np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-12)
+
+
+def test_recorded_states_are_those_of_the_ensemble():
+    recorded = record(DUFFING, Flow.STATE, vk.RK8(40), STARTS[0], 0.0, PERIOD, 3)
+    ends = np.array([DUFFING.section_map(STARTS[:1], periods, stepper=vk.RK8(40))[0] for periods in (1, 2, 3)])
+    np.testing.assert_allclose(recorded[1:], ends, rtol=1e-12)  # the forcing of later periods is rounded differently
+
+
+@pytest.mark.parametrize(("law", "order"), [(vk.Hertz(50.0), 2.5), (vk.Linear(50.0), 2.0)], ids=["hertz", "linear"])
+def test_contacts_that_are_crossed_cost_order(law, order):
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.01, barriers=(vk.Barrier(law, 0.3, "right"),),
+        excitations=(vk.Harmonic(0.2, 1.0),),
+    )  # fmt: skip
+    fine = osc.section_map(STARTS, stepper=vk.Order8(1e-13))
+    errors = [
+        np.median(np.linalg.norm(osc.section_map(STARTS, stepper=vk.RK8(steps)) - fine, axis=1))
+        for steps in (256, 512, 1024, 2048, 4096)
+    ]
+    assert -np.polyfit(np.arange(5), np.log2(errors), 1)[0] == pytest.approx(order, abs=0.5)
+
+
+def test_noise_is_refused():
+    with pytest.raises(StepperError, match="RK4"):
+        DUFFING.section_map(STARTS, stepper=vk.RK8(32), rng=0)
+
+
+@pytest.mark.parametrize("steps", [0, -3, 1.5, True, 10**8])
+def test_numbers_of_steps_that_are_refused(steps):
+    with pytest.raises(StepperError, match="RK8: steps"):
+        vk.RK8(steps)

@@ -1,0 +1,80 @@
+"""A trajectory has the same bits serially, on threads and in processes, whoever compiled its kernel."""
+
+import concurrent.futures
+import json
+import multiprocessing
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+
+pytestmark = pytest.mark.slow
+
+DIGESTS = """
+import hashlib, json
+import numpy as np
+import vibrokit as vk
+from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.kernel import kernel_for
+from vibrokit.symbolic.flow_kind import Flow
+
+
+def scene(left):
+    return vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.01,
+        barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(left, -0.5, "left")),
+        excitations=(vk.Harmonic(0.18, 0.57), vk.Harmonic(0.02, 1.14), vk.Constant(0.2)),
+        noise=vk.WhiteNoise(intensity=1e-4),
+    )
+
+
+smooth, jumping = scene(vk.Hertz(50.0)), scene(vk.CustomLaw("k*depth + c*rate", k=80.0, c=0.3))
+cases = [(smooth, vk.RK4(128)), (smooth, vk.RK8(64)), (jumping, vk.Order8(1e-8)), (jumping, vk.FreeFlight(1e-8))]
+flows = [Flow.STATE, Flow.STATE_VARIATIONAL, Flow.COVARIANCE_REVERSED, Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL]
+digests = {}
+for osc, stepper in cases:
+    for flow in flows + [Flow.NOISY] * (stepper.name == "rk4"):
+        generator = np.random.default_rng(0)
+        starts = np.zeros((40, kernel_for(osc, flow, stepper).module.EQUATIONS))
+        starts[:, :2] = generator.uniform(-0.6, 0.6, (40, 2))
+        starts[:, 2:4] = generator.normal(0.0, 1e-3, starts[:, 2:4].shape)
+        streams = generator.integers(1, 2**60, (40, 4)).astype(np.uint64) if flow is Flow.NOISY else None
+        ended = run_ensemble(osc, flow, stepper, starts, 3, streams=streams)
+        digests[f"{stepper.name} {flow.value}"] = hashlib.sha256(ended.states.tobytes()).hexdigest()
+print(json.dumps(digests))
+"""
+
+
+def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
+    environment = {**os.environ, "VIBROKIT_CACHE": str(tmp_path)}
+    compiled, loaded = (
+        json.loads(
+            subprocess.run([sys.executable, "-c", DIGESTS], env=environment, capture_output=True, check=True).stdout
+        )
+        for _ in range(2)
+    )
+    assert len(compiled) == 21
+    assert compiled == loaded
+
+
+@pytest.mark.parametrize("stepper", [vk.FreeFlight(tolerance=1e-10), vk.Order8(tolerance=1e-10)], ids=lambda s: s.name)
+def test_threads_and_processes_give_the_same_bits(stepper):
+    # A kernel that no other test has, so that this process compiles what the others load.
+    osc = vk.Oscillator(
+        natural_frequency=1.0,
+        damping_ratio=0.01,
+        barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.5, "left")),
+        excitations=(vk.Harmonic(0.18, 0.57), vk.Harmonic(0.02, 1.14), vk.Constant(0.2)),
+    )
+    states = np.random.default_rng(0).uniform(-0.6, 0.6, (200, 2))
+    context = multiprocessing.get_context("spawn")
+    alone = np.concatenate([osc.section_map(states[k : k + 10], 3, stepper=stepper) for k in range(0, 200, 10)])
+    with concurrent.futures.ThreadPoolExecutor(3) as threads:
+        np.testing.assert_array_equal(osc.section_map(states, 3, stepper=stepper, executor=threads), alone)
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
+        np.testing.assert_array_equal(osc.section_map(states, 3, stepper=stepper, executor=processes), alone)

@@ -1,0 +1,105 @@
+"""FollowedPath: a polished exit path, solved for again in a scene with another value of a parameter."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
+from vibrokit.analyzers.polishing.certify import certify
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, linearized_orbit
+from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.path_solver import FEW_EVALUATIONS, completed
+from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.energy import ActivationEnergy
+
+_SAME = 1e-6  # relative difference of two actions, and of two orbits over the extent of the path, that are one
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FollowedPath:
+    """An exit path in one scene. The structure of `problem` is that of the scene where the path was found."""
+
+    problem: ExitProblem
+    place: int  # of its end among those of the problem
+    propagator: SegmentPropagator
+    found: ExtremalPath
+
+    @classmethod
+    def of(cls, problem: ExitProblem, energy: ActivationEnergy) -> FollowedPath:
+        """Polish the path of an energy once more; raises StructureError if it has none or that fails."""
+        path, attractor = energy.path, problem.attractor
+        if path is None or not attractor.is_fixed:
+            raise StructureError(f"there is no polished path from {attractor.name}, an attractor that is an orbit.")
+        ends = [
+            end for end in problem.path_ends if end.saddle == energy.saddle and energy.target in end.targets
+        ]  # fmt: skip
+        polisher = CandidatePolisher(problem, ends, attractor.points[0], attractor.period)
+        polisher.polish(Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method))
+        if not polisher.solved:
+            raise StructureError(str(polisher.findings[0].values["reason"]))
+        solved = polisher.solved[0]
+        return cls(problem, problem.path_ends.index(solved.end), solved.propagator, solved.found)
+
+    @property
+    def end(self) -> PathEnd:
+        """Where it ends."""
+        return self.problem.path_ends[self.place]
+
+    def is_same(self, other: FollowedPath) -> bool:
+        """Return whether two paths in one scene have one action and connect the same orbits."""
+        one, two = self.found, other.found
+        orbits = [(one.source, two.source)]
+        orbits += [(own, its) for (own, _), (its, _) in zip(one.ending.approached, two.ending.approached, strict=False)]
+        return abs(one.action - two.action) <= _SAME * one.action and all(
+            np.linalg.norm(own.states - its.states[0], axis=1).min() <= _SAME * one.extent for own, its in orbits
+        )
+
+    def at(self, osc: Oscillator) -> FollowedPath:
+        """Solve for the path in a scene with slightly other parameters, from this one as the guess.
+
+        Raises StructureError if there is none nearby, or if one of the orbits has lost or changed its stability.
+        """
+        problem, before = dataclasses.replace(self.problem, osc=osc), self.found
+        propagator = dataclasses.replace(self.propagator, osc=problem.scene)
+        moved = dataclasses.replace(self, problem=problem, propagator=propagator)
+        source = linearized_orbit(propagator, before.source.states[0], len(before.source.states) // propagator.pieces)
+        ending = before.ending.carried_by(propagator).moved_to(moved.end)
+        pairs = [(before.source, source)]
+        pairs += [(old, new) for (old, _), (new, _) in zip(before.ending.approached, ending.approached, strict=True)]
+        if any(_unstable(old) != _unstable(new) for old, new in pairs):
+            raise StructureError("the orbit that it leaves or the saddle that it reaches has changed its stability.")
+        if before.source.start_on_orbit:
+            source = source.with_start_on_orbit()
+        last = before.last * propagator.piece / self.propagator.piece
+        found = extremal_path(
+            propagator, source, before.first, ending, before.points, last, evaluations=FEW_EVALUATIONS
+        )
+        return dataclasses.replace(moved, found=found)
+
+    def completed(self) -> FollowedPath:
+        """Start and end it as near to its orbits as a polished path; raises StructureError if that fails."""
+        if self.found.source.start_on_orbit:
+            return self
+        return dataclasses.replace(self, found=completed(self.propagator, self.found))
+
+    def derivative(self, parameter: str) -> float:
+        """Return the derivative of the action in a parameter; NaN if it has none."""
+        unknown = Sensitivity(np.nan, np.nan)
+        known = sensitivities(self.problem, self.end, self.propagator, self.found, (parameter,))
+        return known.get(parameter, unknown).value
+
+    def error(self) -> float:
+        """Return the error of the action by its certificate; raises StructureError if it cannot be certified."""
+        return certify(self.propagator, self.found).error
+
+
+def _unstable(orbit: LinearizedOrbit) -> int:
+    return int(np.sum(np.abs(orbit.multipliers) > 1))

@@ -1,0 +1,153 @@
+"""Sensitivity: how the action of an extremal path changes with each parameter of the scene."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
+from vibrokit.analyzers.polishing.newton import ExtremalPath
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import ParameterError, SceneError
+from vibrokit.oscillator import Oscillator
+from vibrokit.parts.scene import Entry
+
+_PROBE = 1e-6  # of a parameter, or of 1 where it is 0: first change, from which the size of the others is chosen
+_MOVED = 3e-5  # of a path's size: change of the pieces; its square and the error of the integration over it are alike
+_LARGEST = 1e-2  # of a parameter: largest change
+_SAME_SECTION = 0.1  # relative change of the section interval above which two frequencies lost their common period
+
+Array = NDArray[np.float64]
+
+# Places, and the weights of the changes there in the derivative from the nearer and from the farther ones.
+_BOTH_SIDES = (-2, -1, 1, 2), np.array([0, -1, 1, 0]) / 2, np.array([-1, 0, 0, 1]) / 4
+_ABOVE = (0, 1, 2, 4), np.array([-3, 4, -1, 0]) / 2, np.array([-3, 0, 4, -1]) / 4
+_BELOW = (0, -1, -2, -4), -_ABOVE[1], -_ABOVE[2]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensitivity:
+    """Derivative of an action in one parameter, and its error."""
+
+    value: float
+    error: float
+
+
+def sensitivities(
+    problem: ExitProblem,
+    end: PathEnd,
+    propagator: SegmentPropagator,
+    found: ExtremalPath,
+    names: Collection[str] | None = None,
+) -> dict[str, Sensitivity]:
+    """Return dS/dθ by the name of each parameter that does not shape the equations, or of those in `names`.
+
+    The action is stationary on an extremal path, so that only the explicit dependence on the parameter counts,
+    dS/dθ = −∫ ∂H/∂θ dt along the path from the attractor to its end, at fixed phase of the forcing. (The first
+    variation with a parameter; see Goldstein, "Classical Mechanics", 8.6.) Over one piece, the integral is ∂S/∂θ −
+    p·∂q/∂θ at its end with the start fixed, which central differences of the flow give, located contacts included.
+    Before the first point and after the last one, where the equations are linear, it is p·dq/dθ of the orbit that is
+    left or approached. No search and no solution of the equations is repeated.
+
+    A frequency whose ratio to another one must stay the same has none.
+    """
+    change = _ActionChange(problem, end, propagator, found)
+    given = {}
+    for entry in problem.osc.entries():
+        if not entry.declared.structural and (names is None or entry.path in names):
+            derivative = _derivative(change, entry)
+            if derivative is not None:
+                given[entry.path] = derivative
+    return given
+
+
+class _ActionChange:
+    """Change of the action of a path, to first order, in a scene that differs from its own."""
+
+    def __init__(self, problem: ExitProblem, end: PathEnd, propagator: SegmentPropagator, found: ExtremalPath) -> None:
+        self.problem, self.propagator, self.found = problem, propagator, found
+        self.place = problem.path_ends.index(end)
+        n = propagator.size
+        left = [(found.source, found.source.node(found.first), -found.points[0, n:])]
+        approached = [(orbit, node, found.points[-1, n:]) for orbit, node in found.ending.approached]
+        orbits = [*left, *approached]
+        states = [np.empty((0, n)), *(orbit.states for orbit, _, _ in orbits)]
+        still = np.concatenate(states)
+        reached = np.concatenate([np.roll(each, -1, axis=0) for each in states])
+        # Of the orbits, which rest at p = 0, and of the path: starts, images, and derivatives of the action in these.
+        self.starts = np.concatenate([np.pad(still, ((0, 0), (0, n))), found.points[:-1]])
+        self.images = np.concatenate([reached, found.points[1:, :n]])
+        self.pulls = np.concatenate([*(_pull(*each) for each in orbits), -found.points[1:, n:]])
+        self.actions = np.append(np.zeros(len(still)), found.actions)
+        phases = [np.arange(len(each)) for each in states]
+        self.phases = np.concatenate([*phases, found.first + np.arange(len(found.points) - 1)])
+
+    def at(self, osc: Oscillator) -> tuple[float, float]:
+        """Return the change of the action, and the largest change of a piece relative to the path's size."""
+        found, n = self.found, self.propagator.size
+        moved = dataclasses.replace(self.propagator, osc=self.problem.exit.scene(osc))
+        shorter = None if found.last == self.propagator.piece else found.last * moved.piece / self.propagator.piece
+        carried = moved.extremal_from(self.starts, self.phases, shorter)
+        offsets = carried.images[:, :n] - self.images
+        change = float(np.sum(carried.actions - self.actions) + np.sum(self.pulls * offsets))
+        end = dataclasses.replace(self.problem, osc=osc).path_ends[self.place]
+        change += found.ending.displaced(found.points[-1], end)
+        return change, float(np.abs(offsets / found.scale[:n]).max())
+
+
+def _pull(orbit: LinearizedOrbit, node: int, momentum: Array) -> Array:
+    """Return the derivatives (nodes, n) of p·q, q the orbit at a node, in the images of its pieces.
+
+    The orbit moves by δ at each node, δ′ = M δ + g with the change g of the image, and closes after its period.
+    """
+    steps = orbit.linear.derivatives
+    count, whole = len(steps), np.eye(len(momentum))
+    for number in range(count):
+        whole = steps[(node + number) % count] @ whole
+    weight, weights = np.linalg.solve((np.eye(len(momentum)) - whole).T, momentum), np.empty((count, len(momentum)))
+    for number in range(count - 1, -1, -1):
+        place = (node + number) % count
+        weights[place] = weight
+        weight = steps[place].T @ weight
+    return weights
+
+
+def _derivative(change: _ActionChange, entry: Entry) -> Sensitivity | None:
+    """By differences on both sides, or on one where the other is not allowed; None if neither is."""
+    osc, value = change.problem.osc, float(entry.value)
+    interval = osc.section_interval
+
+    def at(offsets: Sequence[float]) -> list[tuple[float, float]] | None:
+        found = []
+        for offset in offsets:
+            try:
+                there = osc.replace({entry.path: value + offset})
+                if abs(there.section_interval / interval - 1) > _SAME_SECTION:
+                    return None
+            except (ParameterError, SceneError):
+                return None
+            found.append(change.at(there))
+        return found
+
+    step = _PROBE * (abs(value) or 1.0)
+    probe = at([step]) or at([-step])
+    if probe is None:
+        return None
+    (_, moved), *_ = probe
+    if not math.isfinite(moved):
+        return None
+    step *= _MOVED / moved if moved else 1.0
+    step = min(step, _LARGEST * abs(value)) if value else step
+    for places, nearer, farther in (_BOTH_SIDES, _ABOVE, _BELOW):
+        found = at([place * step for place in places])
+        if found is not None:
+            changes = np.array([each for each, _ in found])
+            near, far = float(nearer @ changes) / step, float(farther @ changes) / step
+            return Sensitivity((4 * near - far) / 3, abs(near - far))
+    return None
