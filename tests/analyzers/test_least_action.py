@@ -93,7 +93,7 @@ def test_the_graph_is_refined_as_far_as_the_accuracy_asks(structure):
         assert EXACT - energy.lower <= max(accuracy, 0.05) * EXACT
         return used.values["nodes_x"]
 
-    assert [nodes_used(accuracy) for accuracy in (0.5, 1e-6)] == [67, 200]
+    assert [nodes_used(accuracy) for accuracy in (0.5, 1e-6)] == [100, 200]
 
 
 class LeaveLeft(LeaveRegion):

@@ -33,7 +33,6 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000
 _AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH)
-_FAR = 3.0  # times the wanted error: the next grid, with twice the nodes in each direction at most, does not get there
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -48,10 +47,10 @@ class LeastAction(Analyzer):
     exists, and the lower bound of the energy rests on it.
 
     Without forcing, the motion from each end back to an equilibrium, run backwards, is the first candidate; where
-    detailed balance holds, it is the path of least action. The graph is solved on a third of its nodes along each side
-    first, and shooting follows. Then it is solved on more nodes, and on all, until it agrees with the paths within the
-    `accuracy`. Paths are certified after each search. If the work is stopped in between, they are returned with the
-    bounds that are known.
+    detailed balance holds, it is the path of least action. The graph is solved on a quarter of its nodes along each
+    side first, and shooting follows. Then it is solved on twice as many, and on all, until it agrees with the paths
+    within the `accuracy`. Paths are certified after each search. If the work is stopped in between, they are returned
+    with the bounds that are known.
 
     For a chaotic attractor, the graph bounds the energy from below, and paths from unstable orbits inside it bound it
     from above.
@@ -125,7 +124,8 @@ class _Work:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
-        self._refinements = [] if analyzer.graph is None else list(analyzer.graph.refinements())
+        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem)
+        self._searched = analyzer.graph is None  # whether there are no more solutions
         self.findings: list[Finding] = []
 
     @property
@@ -154,30 +154,30 @@ class _Work:
 
     def search_graph(self) -> None:
         """Search the graph on the fewest nodes, and polish its paths."""
-        if self._refinements:
-            self._search(self._refinements.pop(0))
+        if not self._searched:
+            self._search()
 
     def refine_graph(self) -> None:
         """Search the graph on more nodes, and polish its paths, until its error is as small as wanted."""
-        while self._refinements and not self.stopped:
-            error = math.inf if self.graph is None else self._graph_error(self.graph)
-            if error <= self.analyzer.accuracy:
+        while not self._searched and not self.stopped:
+            if self.graph is not None and self._graph_error(self.graph) <= self.analyzer.accuracy:
                 break
-            if error > _FAR * self.analyzer.accuracy:
-                del self._refinements[:-1]
-            self._search(self._refinements.pop(0))
+            self._search()
 
-    def _search(self, nodes: tuple[int, int]) -> None:
-        graph = self.analyzer.graph
-        assert graph is not None  # there would be no refinements
+    def _search(self) -> None:
+        """Search the graph on the next number of nodes."""
+        before = self.graph
         try:
-            for found in dataclasses.replace(graph, nodes=nodes).solutions(self.problem):
+            for found in self._solutions:
                 self.graph = found
+                if found.last:
+                    break
+            else:
+                self._searched = True
         except (SceneError, StructureError, StepperError) as error:
-            if not self._refinements:
-                self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
-        else:
-            assert self.graph is not None
+            self._searched = True
+            self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
+        if self.graph is not None and self.graph is not before:
             self._polish(self.graph.candidates)
 
     def _graph_error(self, graph: GraphSolution) -> float:

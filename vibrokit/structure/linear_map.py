@@ -59,8 +59,8 @@ Map = TypeVar("Map", GaussianMap, HamiltonianMap)
 def linear_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int = 1, **over: Any) -> LinearMap:
     """Linearize the flow from states (count, n) over some intervals, each from section to section by default.
 
-    `over` are `start_time`, `interval` and `executor` of `run_ensemble`. A StepperError is raised if the stepper cannot
-    integrate the variational equations of this scene.
+    `over` are `start_time`, `interval`, `phases` and `executor` of `run_ensemble`. A StepperError is raised if the
+    stepper cannot integrate the variational equations of this scene.
     """
     count, n = states.shape
     found = _ends(osc, Flow.STATE_VARIATIONAL, stepper, [states, _identities(count, n)], intervals, over)

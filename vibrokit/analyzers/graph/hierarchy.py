@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ _STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at lea
 _FEWEST_NODES = 16  # along a side of the coarse grids
 
 Mask = NDArray[np.bool_]
+Shape = tuple[int, int]  # nodes in x and in v
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,9 +53,14 @@ class GridHierarchy:
     """The potential on the nodes that were asked for, and on half as many along each side."""
 
     fine: SolvedGrid
-    whole: SolvedGrid  # half as many nodes on all that the region covers
     coarse: SolvedGrid  # half as many nodes on what can be reached for little more than the costliest exit
-    long: SolvedGrid  # the same with steps twice as long
+    whole: SolvedGrid  # as few on all that the region covers, or fewer
+    lengthened: Callable[[], SolvedGrid]  # solves the coarse grid with steps twice as long
+
+    @cached_property
+    def long(self) -> SolvedGrid:
+        """The coarse grid with steps twice as long."""
+        return self.lengthened()
 
     def estimate(self, target: ExitTarget) -> TargetEstimate:
         """Return what an exit target costs.
@@ -62,13 +69,17 @@ class GridHierarchy:
         no path was traced, half the change by doubling the step), and that of the target's own place.
         """
         arrival, by_nodes = self.fine.arrival(target), np.inf
-        fine, coarse, long = (grid.arrival(target).value for grid in (self.fine, self.coarse, self.long))
+        fine, coarse = arrival.value, self.coarse.arrival(target).value
         reached = (self.fine, self.coarse) if np.isfinite(fine) else (self.whole,)
         paths = distinct(path for grid in reached for path in grid.paths(target))
-        if np.isfinite([fine, coarse, long]).all():
+        by_step = np.inf
+        if np.isfinite([fine, coarse]).all():
             by_step = (
-                PATH_FACTOR * abs(paths[0].candidate.action - fine) if paths else _STEP_FACTOR * abs(coarse - long)
+                PATH_FACTOR * abs(paths[0].candidate.action - fine)
+                if paths
+                else _STEP_FACTOR * abs(coarse - self.long.arrival(target).value)
             )
+        if np.isfinite(by_step):
             by_nodes = abs(fine - coarse) + arrival.error
             value, error = fine, by_nodes + by_step
         else:
@@ -78,45 +89,61 @@ class GridHierarchy:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HierarchySearch:
-    """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs."""
+    """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs.
+
+    Hierarchies of the same targets are refined: one with twice the nodes along each side goes on from the fine grid of
+    the one before.
+    """
 
     problem: ExitProblem
     model: StepModel
-    shape: tuple[int, int]  # nodes in x and in v
     steps_per_period: tuple[int, ...]  # to be tried in turn
+    _solved_before: dict[tuple[ExitTarget, ...], GridHierarchy] = dataclasses.field(default_factory=dict)
 
-    def estimates(self, targets: Sequence[ExitTarget]) -> tuple[dict[ExitTarget, TargetEstimate], Potential]:
+    def estimates(
+        self, targets: Sequence[ExitTarget], shape: Shape
+    ) -> tuple[dict[ExitTarget, TargetEstimate], Potential]:
         """Return what some targets cost, and the potential on the finest grid that covers them.
 
         Raises StructureError if no target was reached, or if the attractor is not hyperbolic.
         """
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
-            hierarchy = self._hierarchy(targets)
+            before = self._solved_before.get(tuple(targets))
+            hierarchy = self._hierarchy(targets, shape, before)
+            self._solved_before[tuple(targets)] = hierarchy
             return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
 
-    def _hierarchy(self, targets: Sequence[ExitTarget]) -> GridHierarchy:
+    def _hierarchy(self, targets: Sequence[ExitTarget], shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
 
-        Steps are not shortened beyond where that takes V farther from the actions of its paths: each step adds an error
-        of interpolation.
+        Each step adds an error of interpolation. So steps are not shortened where a rougher grid changes a cost by more
+        than linearization does, nor beyond where that takes V farther from the actions of its paths.
         """
+        half = _halved(shape)
         first, *shorter = self.steps_per_period
-        whole, coarse = self._coarser(first, targets)
+        if before is not None and before.fine.potential.grids.shape == half:
+            whole, rougher, coarse = before.whole, before.coarse, self._closer(before.fine, targets, _WORTHWHILE)
+            shorter = [count for count in shorter if count > coarse.steps]
+        else:
+            whole, coarse = self._coarser(first, targets, half)
+            rougher = whole
         for count in shorter:
-            if coarse.linearization_error(targets) <= _STEP_TOLERANCE:
+            if coarse.linearization_error(targets) <= max(_STEP_TOLERANCE, coarse.change(rougher, targets)):
                 break
-            tried = self._coarser(count, targets)
+            tried = self._coarser(count, targets, half)
             if tried[1].excess(targets) > max(coarse.excess(targets), _STEP_TOLERANCE):
                 break
             whole, coarse = tried
+            rougher = whole
         grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
-        long = self._solved(grids.with_double_step(), ceiling, targets)
-        fine = self._solved(grids.with_shape(self.shape), ceiling, targets)
-        return GridHierarchy(fine, whole, coarse, long)
+        fine = self._solved(grids.with_shape(shape), ceiling, targets)
+        return GridHierarchy(
+            fine, coarse, whole, lambda: self._solved(grids.with_double_step(), ceiling, targets)
+        )  # fmt: skip
 
-    def _coarser(self, steps: int, targets: Sequence[ExitTarget]) -> tuple[SolvedGrid, SolvedGrid]:
+    def _coarser(self, steps: int, targets: Sequence[ExitTarget], shape: Shape) -> tuple[SolvedGrid, SolvedGrid]:
         """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit."""
-        grids = self._covering(steps)
+        grids = self._covering(steps, shape)
         whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
         for _ in range(_WIDENINGS):
             wider = grids.widened(self._before_exit(whole, whole.highest(targets)))
@@ -124,15 +151,19 @@ class HierarchySearch:
                 break
             grids = wider
             whole = self._solved(grids, 2 * whole.highest(targets), targets)
-        coarse = whole
-        for _ in range(_ZOOMS):
-            ceiling = _ROOM * coarse.highest(targets)
-            zoomed = grids.zoomed(self._before_exit(coarse, ceiling))
-            if coarse is not whole and zoomed.area > _WORTHWHILE * grids.area:
+        coarse = self._closer(whole, targets, np.inf)
+        for _ in range(_ZOOMS - 1):
+            closer = self._closer(coarse, targets, _WORTHWHILE)
+            if closer is coarse:
                 break
-            grids = zoomed
-            coarse = self._solved(grids, ceiling, targets)
+            coarse = closer
         return whole, coarse
+
+    def _closer(self, solved: SolvedGrid, targets: Sequence[ExitTarget], most: float) -> SolvedGrid:
+        """Solve on as many nodes around what lies below the costliest exit, if that is at most a part of the area."""
+        grids, ceiling = solved.potential.grids, _ROOM * solved.highest(targets)
+        zoomed = grids.zoomed(self._before_exit(solved, ceiling))
+        return solved if zoomed.area > most * grids.area else self._solved(zoomed, ceiling, targets)
 
     def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it."""
@@ -147,7 +178,7 @@ class HierarchySearch:
             "room for a path; widen the region or raise the number of nodes."
         )
 
-    def _covering(self, steps: int) -> Grids:
+    def _covering(self, steps: int, shape: Shape) -> Grids:
         """Grids that cover the region of the section, and in the other phases also the image of its basins.
 
         What is in no basin is left out: such motion may grow without bound.
@@ -166,8 +197,7 @@ class HierarchySearch:
             boxes.append(np.stack([low - margin, high + margin], axis=1))
             images = self.model.images(states, phase * step, step)
             states = images[np.isfinite(images).all(axis=1)]
-        nx, nv = self.shape
-        return Grids(np.array(boxes), (max(_FEWEST_NODES, nx // 2), max(_FEWEST_NODES, nv // 2)), step)
+        return Grids(np.array(boxes), shape, step)
 
     def _before_exit(self, solved: SolvedGrid, ceiling: float) -> list[Mask]:
         """By phase: which nodes lie before the exit, with V below a ceiling."""
@@ -186,3 +216,7 @@ class HierarchySearch:
             states = self.model.images(states, grids.time(phase), rest)
         mask: Mask = self.problem.structure.basins.at(states) == self.problem.source
         return mask.reshape(grids.shape)
+
+
+def _halved(shape: Shape) -> Shape:
+    return max(_FEWEST_NODES, shape[0] // 2), max(_FEWEST_NODES, shape[1] // 2)

@@ -30,7 +30,7 @@ _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predeces
 _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
 _ALL_GRIDS = 1.9  # memory of all grids together, in units of the finest
 _FEWEST_NODES = 32
-_PARTS, _FEWEST_REFINED = (3.0, 1.75), 60  # along a side: time grows with the nodes, the error falls with them
+_PARTS, _FEWEST_REFINED = (4, 2), 60  # of the nodes along a side: those of grids that come first, and their least
 _MOST_STEPS = 64
 _STEPS_PER_PERIOD = (8, 16, 32, 64)
 
@@ -44,6 +44,7 @@ class GraphSolution:
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
     by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
+    last: bool  # with so many nodes
 
     def calibrated(self, polished: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """Return the estimates, with errors from actions that are known.
@@ -151,12 +152,6 @@ class GraphSearch:
                 )
         gibibytes(f"{name}: max_memory_gib", self.max_memory_gib)
 
-    def refinements(self) -> tuple[tuple[int, int], ...]:
-        """Return numbers of nodes from few to those that are set, each about twice as many as the ones before."""
-        nx, nv = self.nodes
-        coarser = ((round(nx / part), round(nv / part)) for part in _PARTS)
-        return (*(nodes for nodes in coarser if min(nodes) >= _FEWEST_REFINED), self.nodes)
-
     def search(self, problem: ExitProblem) -> GraphSolution:
         """Search the exits of one attractor.
 
@@ -174,8 +169,8 @@ class GraphSearch:
     def solutions(self, problem: ExitProblem) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
-        A grid that holds the costliest exit has few nodes for one that costs far less. So those that do are solved
-        again without the others.
+        The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
+        exit has few nodes for one that costs far less. So those that do are solved again without the others.
         """
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
@@ -193,21 +188,21 @@ class GraphSearch:
         with stage("exit targets", subject=attractor.name):
             model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
             targets = exit_targets(problem, model)
-        search = HierarchySearch(problem, model, self.nodes, steps)
-        known, potential = search.estimates(targets)
-        yield _solution(problem, search, known, potential)
-        for _ in range(_CLOSER):
-            highest = max((known[target].value for target in targets if np.isfinite(known[target].value)), default=0.0)
-            targets = [target for target in targets if 0 < known[target].value < _FAR_LESS * highest]
-            if not targets:
-                return
+        search = HierarchySearch(problem, model, steps)
+        for nodes in self._refinements():
             try:
-                closer, _ = search.estimates(targets)
-            except StructureError:  # too close to the attractor for any grid
-                return
-            targets = [target for target in targets if closer[target].error < known[target].error]
-            known |= {target: closer[target] for target in targets}
-            yield _solution(problem, search, known, potential)
+                yield from _solutions(problem, search, targets, nodes)
+            except StructureError:  # on few nodes, no exit may be reached
+                if nodes == self.nodes:
+                    raise
+
+    def _refinements(self) -> Iterator[tuple[int, int]]:
+        """Numbers of nodes from few to those that are set, each twice the one before."""
+        nx, nv = self.nodes
+        for part in _PARTS:
+            if min(nx, nv) // part >= _FEWEST_REFINED:
+                yield nx // part, nv // part
+        yield self.nodes
 
     def _affordable_steps(self, scene: Oscillator) -> tuple[int, ...]:
         """Numbers of steps to try that there is memory for."""
@@ -227,8 +222,34 @@ class GraphSearch:
         return _ALL_GRIDS * self.nodes[0] * self.nodes[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
 
 
+def _solutions(
+    problem: ExitProblem, search: HierarchySearch, targets: Sequence[ExitTarget], nodes: tuple[int, int]
+) -> Iterator[GraphSolution]:
+    """Solve for all targets together, then for those that cost far less without the others."""
+    known, potential = search.estimates(targets, nodes)
+    for _ in range(_CLOSER):
+        highest = max((known[target].value for target in targets if np.isfinite(known[target].value)), default=0.0)
+        targets = [target for target in targets if 0 < known[target].value < _FAR_LESS * highest]
+        if not targets:
+            break
+        yield _solution(problem, search, known, potential, nodes, last=False)
+        try:
+            closer, _ = search.estimates(targets, nodes)
+        except StructureError:  # too close to the attractor for any grid
+            break
+        targets = [target for target in targets if closer[target].error < known[target].error]
+        known |= {target: closer[target] for target in targets}
+    yield _solution(problem, search, known, potential, nodes, last=True)
+
+
 def _solution(
-    problem: ExitProblem, search: HierarchySearch, known: Mapping[ExitTarget, TargetEstimate], potential: Potential
+    problem: ExitProblem,
+    search: HierarchySearch,
+    known: Mapping[ExitTarget, TargetEstimate],
+    potential: Potential,
+    nodes: tuple[int, int],
+    *,
+    last: bool,
 ) -> GraphSolution:
     """What is known of the targets, put together."""
     reached = [
@@ -236,7 +257,7 @@ def _solution(
         for target, estimate in sorted(known.items(), key=lambda entry: entry[1].value)
         if np.isfinite(estimate.value)
     ]
-    nx, nv = search.shape
+    nx, nv = nodes
     steps = round(problem.scene.section_interval / potential.grids.step)
     used = Finding.of(
         Code.GRAPH, problem.source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=repr(search.model.stepper)
@@ -265,4 +286,5 @@ def _solution(
         potential,
         (used, *lost),
         {target.label: estimate.by_nodes for target, estimate in reversed(reached)},
+        last,
     )

@@ -54,6 +54,11 @@ class SolvedGrid:
         self._arrivals: dict[ExitTarget, Arrival] = {}
         self._paths: dict[ExitTarget, list[TracedPath]] = {}
 
+    @property
+    def steps(self) -> int:
+        """Steps in a section interval."""
+        return round(self.problem.scene.section_interval / self.potential.grids.step)
+
     def arrival(self, target: ExitTarget) -> Arrival:
         """Return what reaching a target costs."""
         if target not in self._arrivals:
@@ -68,6 +73,11 @@ class SolvedGrid:
     def linearization_error(self, targets: Iterable[ExitTarget]) -> float:
         """Return the largest relative change of an exit's cost by linearization over a step."""
         return max((path.linearization_error for target in targets for path in self.paths(target)), default=0.0)
+
+    def change(self, rougher: SolvedGrid, targets: Iterable[ExitTarget]) -> float:
+        """Return the largest relative change of an exit's cost from another grid."""
+        found = [(self.arrival(target).value, rougher.arrival(target).value) for target in targets]
+        return max((abs(rough / value - 1) for value, rough in found if np.isfinite([value, rough]).all()), default=0.0)
 
     def excess(self, targets: Iterable[ExitTarget]) -> float:
         """Return the largest relative difference between V at a target and the action of the path to it."""
@@ -88,9 +98,8 @@ class SolvedGrid:
         if found is None or len(found[0]) < _FEWEST:
             return None
         states, before = found
-        pieces = round(problem.scene.section_interval / potential.grids.step)
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
-        propagator = SegmentPropagator(problem.scene, stepper, pieces)
+        propagator = SegmentPropagator(problem.scene, stepper, self.steps)
         try:
             points, quadratic = gauss_newton(propagator, 0, states)
         except StructureError:

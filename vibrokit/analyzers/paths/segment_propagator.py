@@ -66,19 +66,19 @@ class SegmentPropagator:
     def _by_phase(
         self, mapped: Callable[..., Map], points: Array, phases: NDArray[np.int64], last: float | None
     ) -> Map:
-        """Map nodes, those of one phase together."""
+        """Map nodes, those of one phase next to each other, and the last one apart if its piece has its own length."""
         phases = phases % self.pieces
-        kinds = np.zeros_like(phases) if self.osc.autonomous else phases.copy()
-        if last is not None and last != self.piece:
-            kinds[-1] = -1
-        groups = [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
+        whole = len(phases) if last is None or last == self.piece else len(phases) - 1
+        order = np.argsort(phases[:whole], kind="stable")
         parts = []
-        for some in groups:
-            length = self.piece if kinds[some[0]] >= 0 or last is None else last
-            start = float(phases[some[0]]) * self.piece
-            parts.append(mapped(self.osc, points[some], self.stepper, start_time=start, interval=length))
-        found, order = joined(parts), np.argsort(np.concatenate(groups))
-        return dataclasses.replace(found, **{name: values[order] for name, values in vars(found).items()})
+        if whole:
+            over = {"interval": self.piece, "phases": phases[order]}
+            parts.append(mapped(self.osc, points[order], self.stepper, **over))
+        if whole < len(phases):
+            begin = float(phases[-1]) * self.piece
+            parts.append(mapped(self.osc, points[-1:], self.stepper, start_time=begin, interval=last))
+        found, back = joined(parts), np.argsort(np.append(order, np.arange(whole, len(phases))))
+        return dataclasses.replace(found, **{name: values[back] for name, values in vars(found).items()})
 
     def rate(self, point: Array, start: float) -> Array:
         """Return (q′, p′) at a point (q, p)."""

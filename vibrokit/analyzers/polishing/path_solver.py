@@ -25,6 +25,7 @@ FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
+_MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
@@ -44,6 +45,7 @@ class PathSolver:
     def __init__(self, propagator: SegmentPropagator, source: LinearizedOrbit) -> None:
         self.propagator, self.source = propagator, source
         self._known: list[tuple[ExtremalPath, ExtremalPath | StructureError]] = []
+        self._lost = 0  # paths that were not found from the orbit either
 
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
@@ -67,9 +69,13 @@ class PathSolver:
                 return known
 
         def from_orbit(failure: StructureError, known: float) -> ExtremalPath:
-            if not known < worth:
+            if not known < worth or self._lost >= _MOST_LOST:
                 raise failure
-            return self._from_orbit(first, cut, points, failure)
+            try:
+                return self._from_orbit(first, cut, points, failure)
+            except StructureError:
+                self._lost += 1
+                raise
 
         try:
             found = self._descended(self.source, first, cut, points)
