@@ -23,6 +23,7 @@ from vibrokit.symbolic.flow_kind import Flow
 METHOD = "graph"
 _FEWEST = 3  # nodes of a path with anything between its ends to relax
 _RELAXATIONS = 30  # steps of the descent: enough for generic paths; polishing goes on from where the others stop
+_RELAXED = 1e-3  # of the action, that another step would gain: below the error of V on the default grid
 _SAME = 1e-4  # relative difference of the actions of paths that count as one
 _LONGEST = 250  # section intervals
 _STEP_WEIGHT = 1 / 1.1  # of a step's cost against V: below 1, so that no path lingers near an unstable orbit
@@ -104,7 +105,7 @@ class SolvedGrid:
             points, quadratic = gauss_newton(propagator, 0, states)
         except StructureError:
             return None
-        points, action = descend_action(propagator, 0, points, iterations=_RELAXATIONS)
+        points, action = descend_action(propagator, 0, points, iterations=_RELAXATIONS, converged=_RELAXED)
         if not np.isfinite(action):
             return None
         if len(start.beyond):

@@ -15,7 +15,7 @@ from vibrokit.structure.linear_map import HamiltonianMap
 _ITERATIONS = 100  # generic paths need 5 to 30; those of a nearly degenerate family descend slowly
 _INNER = 8  # Newton's method on the momenta of the segments; it converges in 2 to 4
 _MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
-_CONVERGED = 1e-9  # of the action: the gain that the next step promises
+_CONVERGED = 1e-9  # of the action
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-8, 1e6
 
 Array = NDArray[np.float64]
@@ -42,6 +42,7 @@ def descend_action(
     free: NDArray[np.bool_] | None = None,  # (n,): coordinates of the last state that may change; by default none
     closing: Closing | None = None,  # action after the last node, all of whose coordinates may change
     iterations: int = _ITERATIONS,  # at most
+    converged: float = _CONVERGED,  # gain that the next step promises, relative to the action
 ) -> tuple[Array, float]:
     """Bring a path to a local minimum of the action, with extremal segments and its first state held.
 
@@ -57,7 +58,7 @@ def descend_action(
     current = path.evaluate(points[:, :n], points[:-1, n:])
     if current is None:
         return points, float("nan")
-    current = path.minimize(current, iterations)
+    current = path.minimize(current, iterations, converged)
     return np.hstack([current.states, np.vstack([current.momenta, current.carried.images[-1:, n:]])]), current.action
 
 
@@ -91,7 +92,7 @@ class _Descent:
             momenta = momenta + np.linalg.solve(carried.derivatives[:, : self.n, self.n :], misses[..., None])[..., 0]
         return None
 
-    def minimize(self, current: _Evaluation, iterations: int) -> _Evaluation:
+    def minimize(self, current: _Evaluation, iterations: int, converged: float) -> _Evaluation:
         """Descend until the next step promises no more."""
         damping = _FIRST_DAMPING
         for _ in range(iterations):
@@ -103,7 +104,7 @@ class _Descent:
                 tried, promised = None, 0.0
                 if step is not None:
                     tried, promised = self._moved(current, step), -float(np.sum(slope * step)) / 2
-                    if promised < _CONVERGED * before:
+                    if promised < converged * before:
                         return current
                 gain = -1.0 if tried is None else (before - tried.action) / promised
                 if gain < 0.25:

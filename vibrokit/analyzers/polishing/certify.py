@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
-from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
-from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
+from vibrokit.analyzers.polishing.newton import ACCEPTED, ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, ROUGHLY_ACCEPTED, solved_again
 from vibrokit.results.energy import Certificate
 
 _FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows
@@ -24,7 +24,9 @@ def certify(propagator: SegmentPropagator, found: ExtremalPath) -> Certificate:
 
     Raises StructureError if one of these has no solution nearby.
     """
-    nearer = solved_again(propagator, found, -_dropped(found), 0)
+    # In a family, no shift makes up for the larger error of a linearized start from farther away.
+    accepted = ROUGHLY_ACCEPTED if found.flat else ACCEPTED
+    nearer = solved_again(propagator, found, -_dropped(found), 0, accepted)
     before, after = len(found.source.states), found.ending.period_nodes
     longer = solved_again(propagator, found, MORE_PERIODS * before, MORE_PERIODS * after)
     tighter = _tightened(propagator, found)
@@ -69,16 +71,18 @@ def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:
     leaving = [_orthonormal(found.source.unstable[found.source.node(found.first)] / scale[:, None])]
     for slope in slopes:
         leaving.append(_orthonormal(slope @ leaving[-1]))
-    reaching = _orthonormal(_tangents(propagator, found))
+    reaching = [_orthonormal(_tangents(propagator, found))]
+    for slope in slopes[::-1]:
+        reaching.append(_orthonormal(np.linalg.solve(slope, reaching[-1])))
     shared = int(propagator.osc.autonomous and found.ending.period_nodes > 0)
-    least = 1.0
-    for node in range(len(slopes), -1, -1):
-        angles = np.sort(scipy.linalg.subspace_angles(leaving[node], reaching))
-        if len(angles) > shared:
-            least = min(least, float(np.sin(angles[shared])))
-        if node:
-            reaching = _orthonormal(np.linalg.solve(slopes[node - 1], reaching))
-    return least if n > shared else 1.0
+    return float(_sines(np.array(leaving), np.array(reaching[::-1]))[:, shared].min()) if n > shared else 1.0
+
+
+def _sines(first: Array, second: Array) -> Array:
+    """Sines of the principal angles between pairs of spaces (count, 2n, n), ascending, from what is left of one."""
+    left = second - first @ (first.transpose(0, 2, 1) @ second)
+    sines: Array = np.minimum(np.linalg.svd(left, compute_uv=False)[:, ::-1], 1.0)
+    return sines
 
 
 def _tangents(propagator: SegmentPropagator, found: ExtremalPath) -> Array:

@@ -14,7 +14,7 @@ from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.newton import ACCEPTED, ExtremalPath, extremal_path
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
@@ -27,10 +27,11 @@ _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a 
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
+ROUGHLY_ACCEPTED = 1e-6
+"""Misfit of a path that starts farther from its source than the final one: linearization makes it larger."""
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
-_FIRST_ACCEPTED = 1e-6  # misfit of a path that is completed afterwards: on a short one it is larger
 _ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
@@ -111,7 +112,7 @@ class PathSolver:
 
     def _shot(self, first: int, cut: Cut, points: Array, source: LinearizedOrbit | None = None) -> ExtremalPath:
         source = source or self.source
-        return extremal_path(self.propagator, source, first, cut.ending, points, cut.last, accepted=_FIRST_ACCEPTED)
+        return extremal_path(self.propagator, source, first, cut.ending, points, cut.last, accepted=ROUGHLY_ACCEPTED)
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
         """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""
@@ -187,7 +188,9 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
     return bool(np.linalg.norm(own[:, None] - nearest, axis=2).min(axis=1).max() < _SAME)
 
 
-def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int) -> ExtremalPath:
+def solved_again(
+    propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int, accepted: float = ACCEPTED
+) -> ExtremalPath:
     """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
 
     Raises StructureError if it does not converge, or if hardly anything of the path would be left.
@@ -201,8 +204,9 @@ def solved_again(propagator: SegmentPropagator, found: ExtremalPath, before: int
     points = np.concatenate([more, points[max(-before, 0) :]])
     points, ending = found.ending.extended(points, after)
     return extremal_path(
-        propagator, found.source, first - before, ending, points, found.last, evaluations=FEW_EVALUATIONS
-    )
+        propagator, found.source, first - before, ending, points, found.last,
+        evaluations=FEW_EVALUATIONS, accepted=accepted,
+    )  # fmt: skip
 
 
 def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -> ExtremalPath:
