@@ -32,7 +32,7 @@ from vibrokit.structure.validation import share, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000
-_AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH)
+_AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)  # more nodes change no other one
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 

@@ -78,7 +78,8 @@ class SolvedGrid:
     def change(self, rougher: SolvedGrid, targets: Iterable[ExitTarget]) -> float:
         """Return the largest relative change of an exit's cost from another grid."""
         found = [(self.arrival(target).value, rougher.arrival(target).value) for target in targets]
-        return max((abs(rough / value - 1) for value, rough in found if np.isfinite([value, rough]).all()), default=0.0)
+        known = [both for both in found if np.isfinite(both).all() and both[0] > 0]
+        return max((abs(rough / value - 1) for value, rough in known), default=0.0)
 
     def excess(self, targets: Iterable[ExitTarget]) -> float:
         """Return the largest relative difference between V at a target and the action of the path to it."""

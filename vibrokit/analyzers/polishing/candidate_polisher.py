@@ -129,13 +129,15 @@ class CandidatePolisher:
             return False
 
     def _solve(self, end: PathEnd, candidate: Candidate, known: Sequence[Solved]) -> Solved:
-        """Polish a candidate to an end, with finer pieces if necessary."""
+        """Polish a candidate to an end, with finer pieces if necessary and if it is cheaper than all known paths."""
         least = min((one.found.action for one in known if one.end is end), default=np.inf)
         for pieces in PIECES:
             try:
                 return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least)
             except StructureError as error:
                 failure = error
+                if candidate.action >= least:
+                    break
         raise failure
 
     def _solve_with(self, pieces: int, end: PathEnd, candidate: Candidate, worth: float) -> Solved:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.paths.action_descent import descend_action
+from vibrokit.analyzers.paths.action_descent import FEW_ITERATIONS, MANY_ITERATIONS, descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
@@ -54,7 +54,8 @@ class PathSolver:
         A candidate with momenta goes to multiple shooting at once; the others follow if that fails. Of several ways to
         cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be joined to its
         source by the linearized equations is solved for as one that starts on the orbit itself, if its action is below
-        `worth`. Raises StructureError if no extremal path is found near the candidate.
+        `worth`; one that costs more descends in few iterations only. Raises StructureError if no extremal path is found
+        near the candidate.
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
@@ -79,7 +80,8 @@ class PathSolver:
                 raise
 
         try:
-            found = self._descended(self.source, first, cut, points)
+            iterations = MANY_ITERATIONS if action < worth else FEW_ITERATIONS
+            found = self._descended(self.source, first, cut, points, iterations)
         except StructureError as error:
             return from_orbit(error, action)
         return self._once(found, from_orbit)
@@ -103,10 +105,12 @@ class PathSolver:
         except StructureError as error:
             return from_orbit(error, found.action)
 
-    def _descended(self, source: LinearizedOrbit, first: int, cut: Cut, points: Array) -> ExtremalPath:
-        ending = cut.ending
+    def _descended(
+        self, source: LinearizedOrbit, first: int, cut: Cut, points: Array, iterations: int = MANY_ITERATIONS
+    ) -> ExtremalPath:
         points, _ = descend_action(
-            self.propagator, first, points, last=cut.last, free=ending.free, closing=ending.closing
+            self.propagator, first, points,
+            last=cut.last, free=cut.ending.free, closing=cut.ending.closing, iterations=iterations,
         )  # fmt: skip
         return self._shot(first, cut, points, source)
 
