@@ -29,24 +29,24 @@ def stopped_at(structure, stage, done):
 
 
 @pytest.mark.parametrize(
-    ("stage", "done", "methods", "branches"),
+    ("stage", "done", "methods", "certified"),
     [
-        ("graph", 0, ["least action"], 1),
-        ("polishing", 0, [], 0),
-        ("polishing", 1, ["least action"], 1),
-        ("certifying", 0, [], 0),
-        ("certifying", 1, ["least action"], 1),
-        ("action plot", 0, ["least action"], 1),
+        ("graph", 0, ["least action"], [True]),
+        ("polishing", 0, [], []),
+        ("polishing", 1, ["least action"], [True]),
+        ("certifying", 0, ["least action"], [False]),
+        ("certifying", 1, ["least action"], [True]),
+        ("action plot", 0, ["least action"], [True]),
     ],
 )
-def test_what_was_found_before_a_stop_is_kept(structure, stage, done, methods, branches):
+def test_what_was_found_before_a_stop_is_kept(structure, stage, done, methods, certified):
     result = stopped_at(structure, stage, done)
     assert not result.complete
     (finding,) = result.found(Code.STOPPED)
     assert finding.source == 0
     assert finding.values == {"stage": stage, "reason": "interrupt"}
     assert [energy.method for energy in result.energies] == methods
-    assert len(result.branches) == branches
+    assert [branch.certificate is not None for branch in result.branches] == certified
     for energy in result.energies:
         assert energy.lower <= EXACT <= energy.upper
     assert not result.found(Code.NO_EXIT_FOUND)

@@ -156,17 +156,34 @@ def test_candidates_and_newton_iterations_are_counted(problem):
     assert work.stats.newton_iterations > 10
 
 
-@pytest.mark.parametrize(("doing", "kept"), [("polishing", 1), ("certifying", 0)])
-def test_what_was_found_before_a_stop_is_kept(problem, doing, kept):
+@pytest.mark.parametrize(("doing", "certified"), [("polishing", 1), ("certifying", 0)])
+def test_what_was_found_before_a_stop_is_kept(problem, doing, certified):
     def interrupt(update):
-        if update.stage == doing and update.done == 0 + kept and not update.finished:
+        if update.stage == doing and update.done == certified and not update.finished:
             raise KeyboardInterrupt
 
     with working(interrupt):
         found = polish(problem, (guess(straight()), guess(spiral(), 0.5)))
-    assert len(found.branches) == kept
+    assert [branch.certificate is not None for branch in found.branches] == [bool(certified)]
     (finding,) = (finding for finding in found.findings if finding.code is Code.STOPPED)
     assert finding.values == {"stage": doing, "reason": "interrupt"}
+
+
+def test_a_path_whose_certificate_fails_is_an_upper_bound(problem, monkeypatch):
+    """With the action and the error that it was accepted with."""
+
+    def failing(propagator, found):
+        raise StructureError("no solution nearby.")
+
+    exact = polish(problem, (guess(straight()),)).branches[0]
+    monkeypatch.setattr("vibrokit.analyzers.polishing.polish.certify", failing)
+    found = polish(problem, (guess(straight()),))
+    (branch,) = found.branches
+    assert branch.value == exact.value
+    assert branch.certificate is None
+    assert branch.bound is Bound.UPPER
+    assert branch.numerical_error == pytest.approx(1e-6 * branch.value)
+    assert Code.NO_CERTIFICATE in [finding.code for finding in found.findings]
 
 
 # --- ends that cannot be used

@@ -62,7 +62,7 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
     else:
         code = Code.GRAPH_TOO_COARSE if graph.numerical_error > _VAGUE * path.value else Code.AGREEMENT
         lower = min(path.value - path.numerical_error, graph.value - graph.numerical_error)
-    bound = Bound.CERTIFIED if code is Code.AGREEMENT else Bound.UPPER
+    bound = Bound.CERTIFIED if code is Code.AGREEMENT and path.certificate is not None else Bound.UPPER
     return code, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
 
 

@@ -292,7 +292,8 @@ class Code(StrEnum):
     )  # fmt: skip
     NO_CERTIFICATE = (
         "no-certificate", WARNING,
-        "A path from {state} with action {action:.6g} converged but could not be certified: {reason}", _FINER_STEPPER,
+        "A path from {state} converged but could not be certified: {reason} Its action {action:.6g} is an upper bound.",
+        _FINER_STEPPER,
     )  # fmt: skip
     STARTS_ON_ORBIT = (
         "starts-on-orbit", WARNING,

@@ -20,7 +20,8 @@ from vibrokit.errors import StructureError
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
 _RADIUS = 1e-4  # of a path's extent: within this distance of its ends the linearized equations replace the path
 _CLOSER, _UNCHANGED = 4, 1e-8  # the radius is divided by 10 until the action changes by no more (relative), 4 times
-_LONG_ENOUGH = 1e-6  # the same for a path that starts on its orbit, made twice as long
+LONG_ENOUGH = 1e-6
+"""Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
@@ -135,7 +136,7 @@ class PathSolver:
                 if best is not None or failures == _FAILURES:
                     break
                 continue
-            if best is not None and abs(found.action - best.action) <= _LONG_ENOUGH * best.action:
+            if best is not None and abs(found.action - best.action) <= LONG_ENOUGH * best.action:
                 break
             best = found
         if best is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher, Solved
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.polishing.path_solver import LONG_ENOUGH
 from vibrokit.analyzers.polishing.sensitivity import sensitivities
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
@@ -41,9 +43,10 @@ def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit |
 
 
 class Polishing:
-    """Certified exit paths of one attractor, from candidates that may come one search after another.
+    """Exit paths of one attractor with their certificates, from candidates that may come one search after another.
 
-    If it is stopped, by Ctrl-C or by the time limit, the paths found so far are certified and kept.
+    If it is stopped, by Ctrl-C or by the time limit, the paths found so far are kept, with the certificates that were
+    finished. A path whose certificate fails is kept without.
 
     For an attractor that is not an orbit, `orbit` is an unstable one inside it; an exit from there costs at least as
     much as leaving the attractor. Raises StructureError if none is given, or if the orbit is not hyperbolic, and
@@ -80,6 +83,9 @@ class Polishing:
                     advance()
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("certifying", error, self._problem.source))
+            for solved in self._polisher.solved[self._certified :]:
+                self._branches += _energies(self._problem, solved)
+            self._certified = len(self._polisher.solved)
 
     def polished(self) -> Polished:
         """Return what all candidates led to."""
@@ -104,21 +110,41 @@ def _start(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int]:
 
 
 def _certified(problem: ExitProblem, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:
-    """The path with its certificate, once for each attractor that it leads to."""
+    """The energies of a path with its certificate, or without if that fails."""
     found, source = solved.found, problem.source
     try:
         certificate = certify(solved.propagator, found)
     except StructureError as failure:
         findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=found.action, reason=str(failure)))
-        return []
+        return _energies(problem, solved)
     if found.source.start_on_orbit:
         values = {"action": found.action, "periods": certificate.periods}
         findings.append(Finding(Code.STARTS_ON_ORBIT, source, values=values))
-    error = certificate.error + _ROUNDING * found.action
     derivatives = sensitivities(problem, solved.end, solved.propagator, found)
+    return _energies(
+        problem,
+        solved,
+        error=certificate.error + _ROUNDING * found.action,
+        residual=certificate.residual,
+        certificate=certificate,
+        sensitivity={name: each.value for name, each in derivatives.items()},
+        sensitivity_error={name: each.error for name, each in derivatives.items()},
+    )
+
+
+def _energies(
+    problem: ExitProblem, solved: Solved, *, error: float | None = None, **evidence: Any
+) -> list[ActivationEnergy]:
+    """The energy of a path, once for each attractor that it leads to.
+
+    Without a certificate, the error is the change by which the path was accepted as long enough.
+    """
+    found = solved.found
+    error = LONG_ENOUGH * found.action if error is None else error
+    known = {"residual": max(found.residual, found.slack)} | evidence
     return [
         ActivationEnergy(
-            source=source,
+            source=problem.source,
             target=target,
             value=found.action,
             lower=0.0,
@@ -126,12 +152,9 @@ def _certified(problem: ExitProblem, solved: Solved, findings: list[Finding]) ->
             method=METHOD,
             bound=Bound.UPPER,
             numerical_error=error,
-            residual=certificate.residual,
             path=solved.path,
             saddle=solved.end.saddle,
-            certificate=certificate,
-            sensitivity={name: each.value for name, each in derivatives.items()},
-            sensitivity_error={name: each.error for name, each in derivatives.items()},
+            **known,
         )
         for target in solved.end.targets
     ]
