@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from vibrokit.analyzers.agreement import combined
-from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
 from vibrokit.results.finding import Code
 
 ORBIT = SimpleNamespace(label=0, is_fixed=True)
@@ -14,8 +14,14 @@ CHAOS = SimpleNamespace(label=0, is_fixed=False)
 ERROR = 1e-9
 
 
-def path(value, target=1):
-    return ActivationEnergy(0, target, value, 0.0, value + ERROR, "least action", Bound.UPPER, ERROR, residual=1e-12)
+CERTIFICATE = Certificate(1e-12, 1e-4, 1e-4, 20.0, 1e-10, 1e-10, 1e-10, 0.1)
+
+
+def path(value, target=1, certificate=CERTIFICATE):
+    return ActivationEnergy(
+        0, target, value, 0.0, value + ERROR, "least action", Bound.UPPER, ERROR,
+        residual=1e-12, certificate=certificate,
+    )  # fmt: skip
 
 
 def graph(value, error, target=1):
@@ -61,6 +67,18 @@ def test_the_cheapest_path_of_each_target_counts():
     )  # fmt: skip
     assert [(energy.target, energy.value) for energy in energies] == [(1, 1.0), (-1, 2.0)]
     assert [finding.target for finding in findings] == [1, -1]
+
+
+def test_a_path_without_a_certificate_certifies_nothing():
+    energy, finding = only(ORBIT, (path(1.0, certificate=None),), (graph(1.01, 0.02),))
+    assert finding.code is Code.AGREEMENT
+    assert (energy.bound, energy.lower) == (Bound.UPPER, pytest.approx(0.99))
+
+
+def test_a_vague_graph_is_not_the_energy_of_a_set():
+    """Its lower bound holds, but its value says nothing."""
+    energy, _ = only(CHAOS, (path(1.0),), (graph(0.1, 3.9),))
+    assert (energy.value, energy.lower, energy.bound) == (1.0, 0.0, Bound.BRACKET)
 
 
 def test_the_energy_of_a_set_is_a_bracket():

@@ -67,6 +67,11 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
 
 
 def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnergy:
-    """Between the graph and a path from an orbit inside a set: only a few of its orbits were tried."""
-    value, lower = min(path.value, graph.value), min(path.value - path.numerical_error, graph.lower)
+    """Between the graph and a path from an orbit inside a set: only a few of its orbits were tried.
+
+    The value is the smaller one of both, and that of the path where the graph's error is as large.
+    """
+    vague = graph.numerical_error > _VAGUE * path.value
+    value = path.value if vague else min(path.value, graph.value)
+    lower = min(path.value - path.numerical_error, graph.lower)
     return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=Bound.BRACKET)

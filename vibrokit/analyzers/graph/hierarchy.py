@@ -33,6 +33,9 @@ PATH_FACTOR = 2.0
 """Factor on the difference from a path's action: the path's fixed ends make that an upper bound."""
 _STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at least with the square of the step
 _FEWEST_NODES = 16  # along a side of the coarse grids
+# Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
+# linearized steps made V ten times too small.
+_FEWEST_RELIABLE = 64
 
 Mask = NDArray[np.bool_]
 Shape = tuple[int, int]  # nodes in x and in v
@@ -56,6 +59,11 @@ class GridHierarchy:
     coarse: SolvedGrid  # half as many nodes on what can be reached for little more than the costliest exit
     whole: SolvedGrid  # as few on all that the region covers, or fewer
     lengthened: Callable[[], SolvedGrid]  # solves the coarse grid with steps twice as long
+
+    def refined_by(self, shape: Shape) -> bool:
+        """Whether one with so many nodes can go on from the fine grid: twice as many, on boxes that are reliable."""
+        grids = self.coarse.potential.grids
+        return self.fine.potential.grids.shape == _halved(shape) and min(grids.shape) >= _FEWEST_RELIABLE
 
     @cached_property
     def long(self) -> SolvedGrid:
@@ -92,7 +100,7 @@ class HierarchySearch:
     """Estimates what exit targets cost, each time on a grid hierarchy that covers no more than it needs.
 
     Hierarchies of the same targets are refined: one with twice the nodes along each side goes on from the fine grid of
-    the one before.
+    the one before, unless that had very few.
     """
 
     problem: ExitProblem
@@ -121,7 +129,7 @@ class HierarchySearch:
         """
         half = _halved(shape)
         first, *shorter = self.steps_per_period
-        if before is not None and before.fine.potential.grids.shape == half:
+        if before is not None and before.refined_by(shape):
             whole, rougher, coarse = before.whole, before.coarse, self._closer(before.fine, targets, _WORTHWHILE)
             shorter = [count for count in shorter if count > coarse.steps]
         else:
