@@ -26,9 +26,7 @@ _NEAR_CEILING = 0.95  # of the ceiling: a value above it may be that of the ceil
 _RAISE, _RAISES = 3.0, 6  # factor and number of trials for a higher ceiling
 _WIDENINGS = 6  # of the first grid, each by 30 % at a side: 5 times the region
 _ZOOMS, _WORTHWHILE = 4, 0.8  # closer grids, and the ratio of areas above which another one does not pay
-_STEP_TOLERANCE = (
-    0.01  # relative change of a cost by linearization that is accepted: below the error of the default grid
-)
+_STEP_TOLERANCE = 0.01  # relative change of a cost by linearization that is accepted
 PATH_FACTOR = 2.0
 """Factor on the difference from a path's action: the path's fixed ends make that an upper bound."""
 _STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at least with the square of the step
@@ -106,6 +104,7 @@ class HierarchySearch:
     problem: ExitProblem
     model: StepModel
     steps_per_period: tuple[int, ...]  # to be tried in turn
+    finest: Shape  # the last one, whose hierarchies are not kept
     _solved_before: dict[tuple[ExitTarget, ...], GridHierarchy] = dataclasses.field(default_factory=dict)
 
     def estimates(
@@ -118,7 +117,8 @@ class HierarchySearch:
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
             before = self._solved_before.get(tuple(targets))
             hierarchy = self._hierarchy(targets, shape, before)
-            self._solved_before[tuple(targets)] = hierarchy
+            if shape != self.finest:
+                self._solved_before[tuple(targets)] = hierarchy
             return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
 
     def _hierarchy(self, targets: Sequence[ExitTarget], shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
@@ -145,9 +145,7 @@ class HierarchySearch:
             rougher = whole
         grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
         fine = self._solved(grids.with_shape(shape), ceiling, targets)
-        return GridHierarchy(
-            fine, coarse, whole, lambda: self._solved(grids.with_double_step(), ceiling, targets)
-        )  # fmt: skip
+        return GridHierarchy(fine, coarse, whole, lambda: self._solved(grids.with_double_step(), ceiling, targets))
 
     def _coarser(self, steps: int, targets: Sequence[ExitTarget], shape: Shape) -> tuple[SolvedGrid, SolvedGrid]:
         """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit."""

@@ -188,7 +188,7 @@ class GraphSearch:
         with stage("exit targets", subject=attractor.name):
             model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
             targets = exit_targets(problem, model)
-        search = HierarchySearch(problem, model, steps)
+        search = HierarchySearch(problem, model, steps, self.nodes)
         for nodes in self._refinements():
             try:
                 yield from _solutions(problem, search, targets, nodes)
