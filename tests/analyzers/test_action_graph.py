@@ -47,6 +47,15 @@ def solved(damping, nodes=320, steps=None):
     return GraphSearch(nodes=(nodes, nodes), steps_per_period=steps).search(problem(*well(damping)))
 
 
+def test_each_solution_has_twice_the_nodes_and_comes_closer():
+    solutions = list(GraphSearch(nodes=(280, 260)).solutions(problem(*well(0.1))))
+    assert [found.potential.grids.shape for found in solutions] == [(70, 65), (140, 130), (280, 260)]
+    assert all(found.last for found in solutions)
+    errors = [abs(best(found, 1).value - 0.4 * BARRIER) for found in solutions]
+    assert errors == sorted(errors, reverse=True)
+    assert all(error <= best(found, 1).numerical_error for error, found in zip(errors, solutions, strict=True))
+
+
 def misses(found, damping):
     """|V − 4ζE| over the whole well of x = −1, relative to the barrier; infinite where V is not known."""
     potential = found.potential

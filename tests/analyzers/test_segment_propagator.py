@@ -1,0 +1,37 @@
+"""Nodes of a path carried over one piece each, whatever their phases."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.structure.linear_map import hamiltonian_map, joined
+
+OSC = vk.load_scene("hertz-0.570")
+POINTS = np.random.default_rng(3).normal(size=(150, 4)) * [0.3, 0.2, 1e-3, 1e-3]  # more than a block of an ensemble
+PHASES = np.random.default_rng(4).integers(0, 40, size=150)
+
+
+def one_by_one(propagator, lengths):
+    """Each node on its own, from the time of its phase."""
+    starts = PHASES % propagator.pieces * propagator.piece
+    return joined(
+        [
+            hamiltonian_map(OSC, point[None], propagator.stepper, start_time=start, interval=length)
+            for point, start, length in zip(POINTS, starts, lengths, strict=True)
+        ]
+    )
+
+
+@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-10), vk.RK4(256), vk.RK8(128)], ids=repr)
+@pytest.mark.parametrize("last", [None, 0.3])
+def test_nodes_of_all_phases_are_carried_together(stepper, last):
+    propagator = SegmentPropagator(OSC, stepper)
+    found = propagator.extremal_from(POINTS, PHASES, last)
+    lengths = np.full(len(POINTS), propagator.piece)
+    lengths[-1] = propagator.piece if last is None else last
+    for field in dataclasses.fields(found):
+        each = getattr(one_by_one(propagator, lengths), field.name)
+        np.testing.assert_allclose(getattr(found, field.name), each, rtol=1e-7, atol=1e-9 * np.abs(each).max())
