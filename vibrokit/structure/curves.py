@@ -47,8 +47,7 @@ class Limits:
 
     def coarse(self, states: Array) -> NDArray[np.bool_]:
         """Which chords must be divided."""
-        with np.errstate(invalid="ignore"):
-            chords, angles = self.shape(states)
+        chords, angles = self.shape(states)
         longer = np.maximum(chords[:-1], chords[1:])
         sharp = (angles > self.bend) | (longer * angles > 0.5 * self.spacing * self.bend)
         turning = np.zeros(len(chords), dtype=bool)
@@ -133,6 +132,7 @@ class Domain:
         return float(8.0 * np.finfo(float).eps * np.abs(self.point).max() / step) + 1e-12
 
 
+@np.errstate(invalid="ignore", over="ignore")  # motion that has left the region may be anywhere
 def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, ManifoldEnd]:
     """Join the images of a domain to a curve (count, 2) until it is long enough, leaves the region, or converges."""
     fractions = np.linspace(0.0, 1.0, _SEEDS)
