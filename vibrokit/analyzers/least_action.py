@@ -125,7 +125,7 @@ class _Work:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem)
-        self._searched = analyzer.graph is None  # whether there are no more solutions
+        self._searched = False  # whether there are no more solutions
         self.findings: list[Finding] = []
 
     @property
@@ -153,19 +153,7 @@ class _Work:
             self._polish(found.candidates)
 
     def search_graph(self) -> None:
-        """Search the graph on the fewest nodes, and polish its paths."""
-        if not self._searched:
-            self._search()
-
-    def refine_graph(self) -> None:
-        """Search the graph on more nodes, and polish its paths, until its error is as small as wanted."""
-        while not self._searched and not self.stopped:
-            if self.graph is not None and self._graph_error(self.graph) <= self.analyzer.accuracy:
-                break
-            self._search()
-
-    def _search(self) -> None:
-        """Search the graph on the next number of nodes."""
+        """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
         before = self.graph
         try:
             for found in self._solutions:
@@ -179,6 +167,13 @@ class _Work:
             self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
         if self.graph is not None and self.graph is not before:
             self._polish(self.graph.candidates)
+
+    def refine_graph(self) -> None:
+        """Search the graph again until its error is as small as wanted."""
+        while not self._searched and not self.stopped:
+            if self.graph is not None and self._graph_error(self.graph) <= self.analyzer.accuracy:
+                break
+            self.search_graph()
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates; infinite where they disagree with the paths."""

@@ -20,10 +20,7 @@ _LARGEST = 10**7
 class FixedSteps(Stepper):
     """A stepper whose steps are all of one length, trajectories packed in vector lanes. Abstract.
 
-    Steps go across contacts, which costs order: 2.5 is left for Hertz, 2 for linear stops, 1 where the force jumps at
-    first touch. Derivatives of momenta jump where those of a contact force do: at linear stops, and where a law that
-    would pull is cut. Steps across such a contact miss it, by a term proportional to p₂. So they are right along the
-    motion without noise, where p = 0, and wrong along any other path.
+    Steps go across contacts; `RK4` says what that costs.
 
     Parameters
     ----------

@@ -107,14 +107,15 @@ class SaddleSearch:
         with stage("saddles", unit="motions"):
             if self.osc.autonomous:
                 self._add_equilibria()
-            for again, classifier in enumerate((self.classifier, dataclasses.replace(self.classifier, core=None))):
-                unexplained = pairs - self._explained if again else pairs
+            unexplained = pairs  # edge tracking may find other saddles where there is one at rest
+            for classifier in (self.classifier, dataclasses.replace(self.classifier, core=None)):
                 if unexplained:
                     each = max(2, min(self.trackers, most // len(unexplained)))
                     straddles = Straddles(classifier, self.basins, each, rng, only=unexplained)
                     self._follow(straddles, tracked)
                     tracked += len(straddles.origins)
-        self._lost = tuple(sorted(pairs - self._explained))
+                unexplained = pairs - self._explained
+        self._lost = tuple(sorted(unexplained))
 
     def _add_equilibria(self) -> None:
         """Add those that one direction leaves, on both sides to different attractors."""
