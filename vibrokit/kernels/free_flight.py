@@ -26,8 +26,8 @@ class FreeFlight(LocatedStepper):
     """
 
     name: ClassVar[str] = "free_flight"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "located", "free_flight", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "free_flight", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, and the series of the flight."""
-        return [text.constants, text.forcing, text.rhs, text.stops, text.flight]
+        return [*self.located_part(text), text.flight]

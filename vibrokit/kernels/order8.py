@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
+from vibrokit.kernels.attempts import AttemptWriter
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
@@ -54,8 +55,12 @@ class LocatedStepper(Stepper):
         """The templates, with those for jumps at events before those that locate events."""
         if not text.breaks:
             return self.templates
-        place = self.templates.index("located")
+        place = self.templates.index("landing")
         return (*self.templates[:place], *_CROSSING[text.flow], *self.templates[place:])
+
+    def located_part(self, text: SceneText) -> list[str]:
+        """The right-hand side with switched stops, the stops, and attempts of all lanes."""
+        return [text.constants, text.forcing, text.rhs, text.stops, *AttemptWriter(text).text()]
 
     def refined(self) -> Self:
         """A hundredth of the tolerance."""
@@ -87,8 +92,8 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "located", "order8", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "order8", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops."""
-        return [text.constants, text.forcing, text.rhs, text.stops]
+        return [*self.located_part(text), "TERMS = 0\n"]  # of a series of the flight

@@ -41,21 +41,21 @@ class ContactWriter:
             symbols.add(self.model.symbols[f"barriers.{stop}.position"])
         return symbols
 
-    def guarded(self) -> tuple[list[str], set[sympy.Symbol]]:
-        """Branch-free lines for lanes, and the contact terms that are zero because another term holds their sum."""
+    def lines(self, switched: bool) -> tuple[list[str], set[sympy.Symbol]]:
+        """Branch-free lines, and the contact terms that are zero because another term holds their sum.
+
+        A stop pushes where it is touched, or, if ``switched``, where the caller says so by ``on0``, ``on1`` …
+        """
         if self.merged:
             second = {symbol for symbol, (stop, _, _) in self.needed.items() if stop == self.stops[1]}
-            return self._merged_lines(), second
+            return self._merged_lines(switched), second
         lines = []
         for stop in self.stops:
             depth, rate = self._depth_and_rate(stop)
             side = sympy.Integer(self.model.scene.barriers[stop].sign)
-            lines += [f"    depth = {depth}", *self._guarded_terms(stop, side, rate, f"d{stop}_")]
+            touching = f"on{stop}" if switched else ""
+            lines += [f"    depth = {depth}", *self._guarded_terms(stop, side, rate, f"d{stop}_", touching)]
         return lines, set()
-
-    def switched(self) -> list[str]:
-        """Lines in which the caller switches each stop on or off by ``pushing``."""
-        return [line for stop in self.stops for line in self._switched_lines(stop)]
 
     def _partners(self) -> list[tuple[sympy.Symbol, sympy.Symbol]]:
         """Parameters of the first law, each with the same parameter of the second."""
@@ -80,34 +80,33 @@ class ContactWriter:
             return f"x - {position}", "v"
         return f"{position} - x", "-v"
 
-    def _guarded_terms(self, stop: int, side: sympy.Expr, rate: str, temporary: str) -> list[str]:
-        """Lines that compute the terms of a stop at ``depth``, and set them to zero where it does not push."""
+    def _guarded_terms(self, stop: int, side: sympy.Expr, rate: str, temporary: str, touching: str) -> list[str]:
+        """Lines that compute the terms of a stop at ``depth``, and set them to zero where it does not push.
+
+        It pushes if ``touching``; where that text is empty, depth and law decide.
+        """
         terms, contact = self._terms(stop, side), self.model.contacts[stop]
-        guard = ["    touching = depth > 0.0", "    depth = depth if touching else 1.0"]
-        if contact.clamped or _uses_rate(terms):
+        guard = [f"    touching = {touching or 'depth > 0.0'}"]
+        guard += [f"    depth = depth if depth > {_TINY} else {_TINY}"] if touching else []
+        guard += ["    depth = depth if touching else 1.0"]
+        clamped = contact.clamped and not touching
+        if clamped or _uses_rate(terms):
             guard.append(f"    rate = {rate}")
-        if contact.clamped:
+        if clamped:
             guard.append(f"    touching = touching and {SourcePrinter().doprint(printable(contact.law))} > 0.0")
         lines, texts = assignments(terms, temporary)
         return [*guard, *lines, *(f"    {name} = {text} if touching else 0.0" for name, text in texts.items())]
 
-    def _merged_lines(self) -> list[str]:
+    def _merged_lines(self, switched: bool) -> list[str]:
         first, second = self.stops
         (near, _), (far, _) = self._depth_and_rate(first), self._depth_and_rate(second)
         sign = float(self.model.scene.barriers[first].sign)
-        head = [f"    depth = {near}", f"    other = {far}", "    nearer = depth > other"]
+        head = [f"    depth = {near}", f"    other = {far}"]
+        head += [f"    nearer = on{first}" if switched else "    nearer = depth > other"]
         head += ["    depth = depth if nearer else other", f"    side = {sign} if nearer else {-sign}"]
         head += [f"    {one} = {one} if nearer else {other}" for one, other in self._partners()]
-        return [*head, *self._guarded_terms(first, _SIDE, "side*v", "d")]
-
-    def _switched_lines(self, stop: int) -> list[str]:
-        depth, rate = self._depth_and_rate(stop)
-        terms = self._terms(stop, sympy.Integer(self.model.scene.barriers[stop].sign))
-        lines, texts = assignments(terms, f"d{stop}_", indent="        ")
-        off = [f"    {name} = 0.0" for name in texts]
-        on = [f"    if pushing[{stop}]:", f"        depth = max({depth}, {_TINY})"]
-        on += [f"        rate = {rate}"] if _uses_rate(terms) else []
-        return [*off, *on, *lines, *(f"        {name} = {text}" for name, text in texts.items())]
+        touching = f"on{first} or on{second}" if switched else ""
+        return [*head, *self._guarded_terms(first, _SIDE, "side*v", "d", touching)]
 
 
 def _uses_rate(terms: dict[str, sympy.Expr]) -> bool:

@@ -43,7 +43,7 @@ class FlightWriter:
 
     def text(self, places: dict[sympy.Symbol, int]) -> str:
         """Both functions; `places` has the index of each parameter in ``theta``."""
-        return f"ORDER = {ORDER}\n\n\n{self._rate(places)}\n\n{self._taylor(places)}"
+        return f"ORDER, TERMS = {ORDER}, {ORDER + 1}\n\n\n{self._rate(places)}\n\n{self._taylor(places)}"
 
     def _rate(self, places: dict[sympy.Symbol, int]) -> str:
         x, v, *extra = self.model.state
@@ -69,7 +69,7 @@ class FlightWriter:
         for index, (frequency, even, odd) in enumerate(self.waves):
             lines += [f"    rate{index} = {printer.doprint(frequency)}", f"    even{index} = {printer.doprint(even)}"]
             lines += [f"    odd{index} = {printer.doprint(odd)}"]
-        lines += ["    for _e in range(EQUATIONS):", "        series[_e, 0] = z[_e]", "    for _k in range(ORDER):"]
+        lines += ["    for _e in range(EQUATIONS):", "        series[_e*TERMS] = z[_e]", "    for _k in range(ORDER):"]
         lines += ["        once = 1.0 if _k == 0 else 0.0", "        share = 1.0/(_k + 1.0)"]
         if self.waves:
             lines.append("        f = " + " + ".join(f"even{index}" for index in range(len(self.waves))))
@@ -88,14 +88,14 @@ class FlightWriter:
             if not factors:
                 terms.append(f"({text})*once")
             elif len(factors) == 1:
-                series = "f" if factors[0] == len(self.variables) else f"series[{factors[0]}, _k]"
+                series = "f" if factors[0] == len(self.variables) else f"series[{factors[0]}*TERMS + _k]"
                 terms.append(f"({text})*{series}")
             else:
                 first, second = factors
                 lines += ["        product = 0.0", "        for _j in range(_k + 1):"]
-                lines += [f"            product += series[{first}, _j]*series[{second}, _k - _j]"]
+                lines += [f"            product += series[{first}*TERMS + _j]*series[{second}*TERMS + _k - _j]"]
                 terms.append(f"({text})*product")
-        return [*lines, f"        series[{row}, _k + 1] = share*({' + '.join(terms) or '0.0'})"]
+        return [*lines, f"        series[{row}*TERMS + _k + 1] = share*({' + '.join(terms) or '0.0'})"]
 
 
 def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:

@@ -1,7 +1,8 @@
 """The scene part of a kernel: the flow of a model as Python text. Layers above this one do not use SymPy.
 
 The right-hand side has two forms: `derivative` for steppers that pack trajectories in lanes (scalars in and out, stops
-as branch-free guards) and `rhs` for steppers that locate every contact (arrays, each stop switched by the caller).
+as branch-free guards) and `rates` for steppers that locate every contact (the same, each stop switched by the caller),
+which `rhs` calls for a single state.
 """
 
 from __future__ import annotations
@@ -104,6 +105,16 @@ class SceneText:
             rows |= {"DERIVATIVES": self._place_of("m_00"), "COVARIANCE": self._place_of("W00")}
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
 
+    @property
+    def barriers(self) -> int:
+        """Number of stops."""
+        return len(self._model.contacts)
+
+    @property
+    def curved(self) -> bool:
+        """Whether second derivatives of contact laws are integrated, which may be infinite at first touch."""
+        return bool(self._model.contacts) and self.flow is Flow.HAMILTONIAN_VARIATIONAL
+
     def _place_of(self, variable: str) -> int:
         return self.variables.index(variable) if variable in self.variables else 0
 
@@ -127,25 +138,27 @@ class SceneText:
     @property
     def derivative(self) -> str:
         """Function `derivative(x, v, …, f, parameters…)`."""
-        contact_lines, zero = self._contacts.guarded()
-        lines, texts = self._rates(zero)
-        arguments = [*self.variables, *(["f"] if self.forced else []), *self.parameters]
-        head = f"def derivative({', '.join(arguments)}):"
-        values = ", ".join(texts[name] for name in self.variables)
-        return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
+        return self._rates_function("derivative", switched=False)
 
     @property
     def rhs(self) -> str:
-        """Function `rhs(t, z, pushing, theta, out)`."""
-        lines, texts = self._rates()
-        read = set().union(*(rate.free_symbols for rate in self._equations.rates))
-        read.update(self._model.state[:2] if self._contacts.stops else ())
-        body = [f"    {one} = z[{index}]" for index, one in enumerate(self._equations.variables) if one in read]
-        body += ["    f = forcing(t, theta)"] if self.forced else []
-        body += self._contacts.switched()
-        body += [*lines, *(f"    out[{index}] = {texts[name]}" for index, name in enumerate(self.variables))]
-        head = [f"    {name} = theta[{place}]" for name, place in self.parameters.items()]
-        return "\n".join(["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", *head, *body, ""])
+        """Functions `rates(x, v, …, f, on0, …, parameters…)` and `rhs(t, z, pushing, theta, out)`."""
+        places = range(len(self.variables))
+        values = [*(f"z[{place}]" for place in places), *(["forcing(t, theta)"] if self.forced else [])]
+        values += [f"pushing[{stop}]" for stop in range(len(self._model.contacts))]
+        values += [f"theta[{place}]" for place in self.parameters.values()]
+        lines = ["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):"]
+        lines += [f"    {', '.join(f'out[{place}]' for place in places)} = rates({', '.join(values)})", ""]
+        return "\n".join([self._rates_function("rates", switched=True), "", *lines])
+
+    def _rates_function(self, name: str, switched: bool) -> str:
+        contact_lines, zero = self._contacts.lines(switched)
+        lines, texts = self._rates(zero)
+        switches = [f"on{stop}" for stop in range(len(self._model.contacts))] if switched else []
+        arguments = [*self.variables, *(["f"] if self.forced else []), *switches, *self.parameters]
+        head = f"def {name}({', '.join(arguments)}):"
+        values = ", ".join(texts[variable] for variable in self.variables)
+        return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
 
     @property
     def stops(self) -> str:

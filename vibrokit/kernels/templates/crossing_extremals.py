@@ -7,11 +7,12 @@ f⁻ before and f⁺ after the jump. A force that does not jump, but whose slope
 
 from numba import njit
 
+from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
 from vibrokit.kernels.templates.scene import STATES, rhs
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER, SPARE, TOUCHED
+from vibrokit.kernels.templates.steps import CLOCK, INNER, ROW, TOUCHED
 
 # --- scene above, stepper below ---
 
@@ -20,14 +21,14 @@ MATRIX = PHASE + 1
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, workspace):
+def cross(i, y, memory, pushing, theta, settings, room):
     """Settle at an event, and map the momenta and all derivatives across it."""
-    before, after = workspace[0], workspace[1]  # the slopes of the last step are no longer needed
+    before, after = room, offset_by(room, ROW)  # the slopes of the last step are no longer needed
     pushed = pushing[i]
     rhs(y[CLOCK], y, pushing, theta, before)
     if (memory[TOUCHED] < 0.0 or pushed) and grazes(i, y, before[1], theta, settings):
         return GRAZED
-    settle(y, memory, pushing, theta, workspace[SPARE])
+    settle(y, memory, pushing, theta, offset_by(room, 2 * ROW))
     if pushing[i] == pushed:
         return COMPLETED
     rhs(y[CLOCK], y, pushing, theta, after)
@@ -48,12 +49,12 @@ def cross(i, y, memory, pushing, theta, settings, workspace):
 
 
 @njit(**INNER)
-def turn_law(i, y, pushing, theta, workspace):
+def turn_law(i, y, pushing, theta, room):
     """Switch a law on or off where it passes zero: there the rates of the momenta jump, by j = −p₂ ∂F/∂q.
 
     The event is at F(q) = 0, whose normal is along j, so that δp jumps by j (j·δq)/(j·q′).
     """
-    before, after = workspace[0], workspace[1]
+    before, after = room, offset_by(room, ROW)
     rhs(y[CLOCK], y, pushing, theta, before)
     pushing[i] = not pushing[i]
     rhs(y[CLOCK], y, pushing, theta, after)

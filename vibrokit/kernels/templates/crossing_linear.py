@@ -10,19 +10,19 @@ from numba import njit
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.templates.scene import COVARIANCE, DERIVATIVES, STATES, rhs
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER, SPARE
+from vibrokit.kernels.templates.steps import CLOCK, INNER
 
 # --- scene above, stepper below ---
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, workspace):
+def cross(i, y, memory, pushing, theta, settings, slope):
     """Settle at an event, and map the derivatives and the covariance across it."""
-    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
-    before = workspace[SPARE, 1]
-    settle(y, memory, pushing, theta, workspace[SPARE])
-    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
-    leap = workspace[SPARE, 1] - before
+    rhs(y[CLOCK], y, pushing, theta, slope)
+    before = slope[1]
+    settle(y, memory, pushing, theta, slope)
+    rhs(y[CLOCK], y, pushing, theta, slope)
+    leap = slope[1] - before
     if leap != 0.0:
         leap /= y[1]
         if DERIVATIVES > 0:

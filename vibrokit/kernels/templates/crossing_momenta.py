@@ -10,22 +10,22 @@ from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
 from vibrokit.kernels.templates.scene import STATES, rhs
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER, SPARE, TOUCHED
+from vibrokit.kernels.templates.steps import CLOCK, INNER, TOUCHED
 
 # --- scene above, stepper below ---
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, workspace):
+def cross(i, y, memory, pushing, theta, settings, slope):
     """Settle at an event, and map the momenta across it."""
     involved = memory[TOUCHED] < 0.0 or pushing[i]
-    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
-    before = workspace[SPARE, 1]
+    rhs(y[CLOCK], y, pushing, theta, slope)
+    before = slope[1]
     if involved and grazes(i, y, before, theta, settings):
         return GRAZED
-    settle(y, memory, pushing, theta, workspace[SPARE])
-    rhs(y[CLOCK], y, pushing, theta, workspace[SPARE])
-    leap = y[STATES + 1] * (workspace[SPARE, 1] - before)
+    settle(y, memory, pushing, theta, slope)
+    rhs(y[CLOCK], y, pushing, theta, slope)
+    leap = y[STATES + 1] * (slope[1] - before)
     if leap != 0.0:
         y[STATES] -= leap / y[1]
     return COMPLETED

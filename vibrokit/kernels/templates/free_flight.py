@@ -8,58 +8,71 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.stopping import COMPLETED, STALLED
-from vibrokit.kernels.templates.crossing_extremals import cross
+from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
+from vibrokit.kernels.templates.landing import STEPS, landed
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
     EQUATIONS,
     ORDER,
     SIDES,
+    STATE,
     flight_rate,
     stop,
     taylor,
 )
-from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, EPSILON, INNER, SPARE
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, TASK, UNDERWAY, put, take
 
 # --- scene above, stepper below ---
 
 
 @njit(**INNER)
-def fly(y, end, memory, pushing, theta, settings, workspace, coefficients):
+def fly(lane, memory, pushing, theta, settings, lanes, room):
     """Follow the free motion until a stop is touched, or to the end time."""
-    reach = 1.5 / flight_rate(theta)
-    while y[CLOCK] < end:
+    y, series, reach = room, offset_by(room, SERIES), 1.5 / flight_rate(theta)
+    take(STATE, lane, lanes, y)
+    while y[CLOCK] < memory[END]:
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
-        remaining = end - y[CLOCK]
+        remaining = memory[END] - y[CLOCK]
         last = remaining <= 1.01 * reach
         length, touched = remaining if last else reach, -1
-        taylor(y[CLOCK], y, theta, coefficients)
+        taylor(y[CLOCK], y, theta, series)
         if BARRIERS > 0:
-            touched, length = first_touch(length, theta, coefficients)
+            touched, length = first_touch(length, theta, series)
         for e in range(EQUATIONS):
-            value = coefficients[e, ORDER]
+            value = series[e * TERMS + ORDER]
             for k in range(ORDER - 1, -1, -1):
-                value = value * length + coefficients[e, k]
+                value = value * length + series[e * TERMS + k]
             y[e] = value
-        y[CLOCK] = end if last and touched < 0 else y[CLOCK] + length
+        y[CLOCK] = memory[END] if last and touched < 0 else y[CLOCK] + length
         if BARRIERS > 0:
             if touched >= 0:
-                y[0] = stop(touched, theta)
-                settle(y, memory, pushing, theta, workspace[SPARE])  # unbroken
-                return COMPLETED  # unbroken
-                return cross(touched, y, memory, pushing, theta, settings, workspace)  # breaking
+                put(y, STATE, lane, lanes)
+                return meet(touched, lane, memory, pushing, theta, settings, lanes, room)
+    put(y, STATE, lane, lanes)
     return COMPLETED
+
+
+@njit(**INNER)
+def judge(lane, memory, pushing, theta, settings, lanes, room):
+    """Judge an attempt, which is always one in contact: ask for another, or go on from its end."""
+    if BARRIERS > 0:
+        if memory[TASK] == STEPS:
+            return judge_contact(lane, memory, pushing, theta, settings, lanes, room)
+        if landed(lane, memory, pushing, theta, lanes, room):
+            return conclude_landing(lane, memory, pushing, theta, settings, lanes, room)
+    return UNDERWAY
 
 
 @njit(**INNER)
 def first_touch(length, theta, c):
     """Stop that is touched first within `length` (−1: none), and the moment."""
-    size, second, third = abs(c[0, 0]) + abs(c[0, 1]) * length, 0.0, 0.0
+    size, second, third = abs(c[0]) + abs(c[1]) * length, 0.0, 0.0
     power = 1.0  # length^(k − 2)
     for k in range(2, ORDER + 1):
-        term = abs(c[0, k]) * power
+        term = abs(c[k]) * power
         size += term * length * length
         second += k * (k - 1) * term
         third += k * (k - 1) * (k - 2) * term / length
@@ -81,11 +94,11 @@ def touch_of(i, length, size, second, third, theta, c):
     wall, side, s = stop(i, theta), SIDES[i], 0.0
     rounding = EPSILON * (4.0 * abs(wall) + 2.0 * size)
     for _ in range(300):
-        x, v, a = c[0, ORDER], 0.0, 0.0
+        x, v, a = c[ORDER], 0.0, 0.0
         for k in range(ORDER - 1, -1, -1):
             a = a * s + v
             v = v * s + x
-            x = x * s + c[0, k]
+            x = x * s + c[k]
         gap, closing, pull = side * (wall - x), side * v, 2.0 * side * a
         if s == 0.0 and gap == 0.0:
             closing = min(closing, 0.0)  # it starts here and is free, so it leaves

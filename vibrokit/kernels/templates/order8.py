@@ -4,120 +4,161 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, STALLED
-from vibrokit.kernels.templates.crossing_extremals import cross
-from vibrokit.kernels.templates.located import DEPTH_GOAL, RATE_GOAL, land
-from vibrokit.kernels.templates.scene import BARRIERS, SIDES, stop
-from vibrokit.kernels.templates.settling import settle
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED
+from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
+from vibrokit.kernels.templates.landing import (
+    DEPTH_GOAL,
+    FLIPS,
+    RATE_GOAL,
+    STEPS,
+    TOUCHES,
+    TURNS,
+    depth_at,
+    land,
+    landed,
+)
+from vibrokit.kernels.templates.scene import BARRIERS, ERROR, FACTOR, LANES, LENGTH, SIDES, SLOPES, STATE, TRIAL
 from vibrokit.kernels.templates.steps import (
+    AIM,
     CLOCK,
-    COUNT,
+    END,
     EPSILON,
+    FIRST,
     FREE_STEP,
     INNER,
+    LAST,
     SPAN,
-    SPARE,
-    STAGE,
+    TAKEN,
+    TASK,
     TIME,
-    TRIAL,
-    ZERO,
-    attempt,
-    copy,
-    misfit,
-    slope,
-    stretch,
-    stuck,
+    TOUCHED,
+    UNDERWAY,
+    WHOLE,
+    accept,
+    ask,
+    of,
+    plan,
+    shortened,
 )
 
 # --- scene above, stepper below ---
 
-CLEAR, TOO_LONG = -1, -2  # what `watch` finds in a step, or the stop that it runs into
+CLEAR = -1  # no stop
 
 
 @njit(**INNER)
-def fly(y, end, memory, pushing, theta, settings, workspace, coefficients):
-    """Follow the free motion until a stop is touched, or to the end time."""
-    trial, none = workspace[TRIAL], int(ZERO)  # no stop decides the course
-    while y[CLOCK] < end:
-        remaining = end - y[CLOCK]
-        last = memory[FREE_STEP] >= 0.99 * remaining
-        h = remaining if last else memory[FREE_STEP]
-        first, touched, length, before, misses = h, CLEAR, h, np.inf, 0
-        copy(y, workspace[STAGE])
-        slope(TIME, 0.0, h, none, pushing, theta, workspace, int(ZERO))
-        while True:
-            memory[COUNT] += 1.0
-            if memory[COUNT] > settings[1]:
-                return STALLED
-            attempt(TIME, 0.0, h, y, none, pushing, theta, workspace)
-            error = misfit(h, y, memory[SPAN], settings[0], 0.0, 0.0, workspace)
-            tiny = h <= EPSILON * (abs(y[CLOCK]) + memory[SPAN])
-            if error > 1.0 and not tiny and misses < 2:
-                misses = misses + 1 if stuck(error, before, settings[0]) else 0
-                before = error
-                h *= min(0.7, stretch(error))
-                continue
-            if not np.isfinite(error):
-                return DIVERGED
-            length = h
-            if BARRIERS > 0:
-                touched, length = watch(h, tiny, y, pushing, theta, workspace)
-                if touched == TOO_LONG:
-                    h *= 0.5
-                    continue
-            break
-        if touched == CLEAR and not (last and h == first and h * stretch(error) < memory[FREE_STEP]):
-            memory[FREE_STEP] = h * stretch(error)
-        copy(trial, y)
-        if last and length == first:
-            y[CLOCK] = end
-        if BARRIERS > 0 and touched >= 0:
-            y[0] = stop(touched, theta)
-            settle(y, memory, pushing, theta, workspace[SPARE])  # unbroken
-            return COMPLETED  # unbroken
-            return cross(touched, y, memory, pushing, theta, settings, workspace)  # breaking
+def fly(lane, memory, pushing, theta, settings, lanes, room):
+    """Ask for a step of the free motion."""
+    remaining = memory[END] - of(STATE, CLOCK, lane, lanes)
+    last = memory[FREE_STEP] >= 0.99 * remaining
+    memory[LAST], memory[TASK] = 1.0 if last else 0.0, STEPS
+    length = remaining if last else memory[FREE_STEP]
+    plan(TIME, 0.0, length, 0.0, np.inf, lane, memory, lanes)
+    return ask(length, lane, memory, settings, lanes)
+
+
+@njit(**INNER)
+def judge(lane, memory, pushing, theta, settings, lanes, room):
+    """Judge an attempt: ask for another, or go on from its end."""
+    if BARRIERS > 0:
+        if memory[TASK] != STEPS:
+            if not landed(lane, memory, pushing, theta, lanes, room):
+                return UNDERWAY
+            if memory[TASK] >= FLIPS:
+                return conclude_landing(lane, memory, pushing, theta, settings, lanes, room)
+            return flown_to(lane, memory, pushing, theta, settings, lanes, room)
+        if memory[TOUCHED] >= 0.0:
+            return judge_contact(lane, memory, pushing, theta, settings, lanes, room)
+    length, error = lanes[LENGTH + lane], lanes[ERROR + lane]
+    tiny = is_tiny(length, lane, memory, lanes)
+    new = shortened(error, lanes[FACTOR + lane], tiny, lane, memory, settings, lanes)
+    if new != 0.0:
+        return ask(new, lane, memory, settings, lanes)
+    if not np.isfinite(error):
+        return DIVERGED
+    memory[TAKEN] = lanes[FACTOR + lane]
+    if BARRIERS > 0:
+        return watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room)
+    return free(length, length, lane, memory, lanes)
+
+
+@njit(**INNER)
+def is_tiny(length, lane, memory, lanes):
+    return length <= EPSILON * (abs(of(STATE, CLOCK, lane, lanes)) + memory[SPAN])
+
+
+@njit(**INNER)
+def free(length, whole, lane, memory, lanes):
+    """Accept an attempt that touches nothing; `whole` is the length of the step before it was shortened to end here."""
+    longer = whole * memory[TAKEN]
+    reaches = memory[LAST] > 0.0 and whole == memory[FIRST]
+    if not (reaches and longer < memory[FREE_STEP]):
+        memory[FREE_STEP] = longer
+    accept(lane, lanes)
+    if reaches and length == whole:
+        lanes[STATE + CLOCK * LANES + lane] = memory[END]
     return COMPLETED
 
 
 @njit(**INNER)
-def watch(h, tiny, y, pushing, theta, workspace):
-    """Find a touch within the step in TRIAL and shorten the step to end on it; return the stop, and the length."""
-    trial = workspace[TRIAL]
-    for i in range(BARRIERS):
-        wall, side = stop(i, theta), SIDES[i]
-        before, after = side * (y[0] - wall), side * (trial[0] - wall)
-        turns, up = turns_of(side, trial[1], workspace)
-        if turns > 1 and not tiny:
-            return TOO_LONG, h
-        if after > 0.0:
-            if before < 0.0:
-                return i, land(DEPTH_GOAL, TIME, 0.0, h, y, i, pushing, theta, workspace)
-            if not tiny:
-                return TOO_LONG, h  # it left and returned within the step
-            return i, h
-        if turns == 1 and up:
-            rise, fall = side * y[1], side * trial[1]
-            if not (rise > 0.0 > fall):
-                continue
-            top = summit(before, rise, after, fall, h)
-            if top + 0.3 * (top - min(before, after)) <= 0.0:
-                continue
-            turn = land(RATE_GOAL, TIME, 0.0, h, y, i, pushing, theta, workspace)
-            if side * (trial[0] - wall) > 0.0 and before < 0.0:
-                return i, land(DEPTH_GOAL, TIME, 0.0, turn, y, i, pushing, theta, workspace)
-            if side * (trial[0] - wall) > 0.0 and not tiny:
-                return TOO_LONG, h
-            return CLEAR, turn
-    return CLEAR, h
+def touch(i, lane, memory, pushing, theta, settings, lanes, room):
+    """Accept an attempt that ends at the touch of a stop."""
+    accept(lane, lanes)
+    return meet(i, lane, memory, pushing, theta, settings, lanes, room)
 
 
 @njit(**INNER)
-def turns_of(side, final, workspace):
+def flown_to(lane, memory, pushing, theta, settings, lanes, room):
+    """Go on from an event of the flight: a touch, or a turn near a stop, before which it may have been touched."""
+    i, whole = int(memory[AIM]), memory[WHOLE]
+    if memory[TASK] == TOUCHES:
+        return touch(i, lane, memory, pushing, theta, settings, lanes, room)
+    memory[TASK] = STEPS
+    if depth_at(TRIAL, i, lane, lanes, theta) > 0.0:
+        if depth_at(STATE, i, lane, lanes, theta) < 0.0:
+            land(TOUCHES, DEPTH_GOAL, i, lanes[LENGTH + lane], lane, memory, theta, lanes)
+            return UNDERWAY
+        if not is_tiny(whole, lane, memory, lanes):
+            return ask(0.5 * whole, lane, memory, settings, lanes)
+    return free(lanes[LENGTH + lane], whole, lane, memory, lanes)
+
+
+@njit(**INNER)
+def watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room):
+    """Find a touch within the attempt, and shorten the step to end on it."""
+    for i in range(BARRIERS):
+        side = SIDES[i]
+        before, after = depth_at(STATE, i, lane, lanes, theta), depth_at(TRIAL, i, lane, lanes, theta)
+        turns, up = turns_of(side, lane, lanes)
+        if turns > 1 and not tiny:
+            return ask(0.5 * length, lane, memory, settings, lanes)
+        if after > 0.0:
+            if before < 0.0:
+                land(TOUCHES, DEPTH_GOAL, i, length, lane, memory, theta, lanes)
+                return UNDERWAY
+            if not tiny:  # it left and returned within the step
+                return ask(0.5 * length, lane, memory, settings, lanes)
+            return touch(i, lane, memory, pushing, theta, settings, lanes, room)
+        if turns == 1 and up:
+            rise, fall = side * of(STATE, 1, lane, lanes), side * of(TRIAL, 1, lane, lanes)
+            if not (rise > 0.0 > fall):
+                continue
+            top = summit(before, rise, after, fall, length)
+            if top + 0.3 * (top - min(before, after)) <= 0.0:
+                continue
+            land(TURNS, RATE_GOAL, i, length, lane, memory, theta, lanes)
+            return UNDERWAY
+    return free(length, length, lane, memory, lanes)
+
+
+@njit(**INNER)
+def turns_of(side, lane, lanes):
     """Number of turns within a step, by its stages, and whether the first is away from a stop."""
-    largest = max(abs(workspace[0, 0]), abs(workspace[5, 0]), abs(final))
+    row, final = (CLOCK + 1) * LANES, of(TRIAL, 1, lane, lanes)
+    largest = max(abs(lanes[SLOPES + lane]), abs(lanes[SLOPES + 5 * row + lane]), abs(final))
     turns, up, before = 0, False, 0.0
     for s in (0, 3, 5, 9, 10, 12):
-        rate = side * (final if s == 12 else workspace[s, 0])
+        rate = side * (final if s == 12 else lanes[SLOPES + s * row + lane])
         if abs(rate) < 1e-3 * largest:
             continue
         if rate * before < 0.0:

@@ -3,71 +3,96 @@
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
-from vibrokit.kernels.templates.located import press
-from vibrokit.kernels.templates.order8 import fly
-from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, OPTIONS
+from vibrokit.kernels.templates.contact import press
+from vibrokit.kernels.templates.order8 import fly, judge
+from vibrokit.kernels.templates.scene import (
+    BARRIERS,
+    EQUATIONS,
+    LANES,
+    NUMBERS,
+    OPTIONS,
+    STATE,
+    attempt_lanes,
+    misfit_lanes,
+)
 from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
     COUNT,
+    END,
     FIRST_STEP,
     FREE_STEP,
     INNER,
+    MEMORIES,
     MEMORY,
-    ROWS,
+    ROOM,
+    ROW,
     SPAN,
-    SPARE,
     TIMED,
     TOUCHED,
+    UNDERWAY,
+    ZERO,
+    face,
+    keep_alive,
+    of,
+    put,
 )
 
 # --- scene above, stepper below ---
 
 
 @njit(**INNER)
-def copy_state(source, target):
-    for e in range(EQUATIONS):
-        target[e] = source[e]
-
-
-@njit(**INNER)
-def begin(y, interval, memory, pushing, theta, workspace):
-    """Reset the memory, so that the motion depends on y alone."""
+def begin(y, interval, lane, memory, pushing, theta, lanes, room):
+    """Reset the memory of a lane, so that the motion depends on y alone."""
     memory[SPAN] = abs(interval)
     memory[FREE_STEP] = interval / 16.0
     memory[FIRST_STEP] = interval / 128.0
     memory[CONTACT_STEP] = memory[FIRST_STEP]
+    memory[TOUCHED] = -1.0
     if BARRIERS > 0:
-        settle(y, memory, pushing, theta, workspace[SPARE])
-    else:
-        memory[TOUCHED] = -1.0
+        settle(y, memory, pushing, theta, offset_by(room, ROW))
+        face(lane, memory, pushing, theta, lanes)
+    put(y, STATE, lane, lanes)
 
 
 @njit(**INNER)
-def travel(y, end, memory, pushing, theta, settings, workspace, coefficients):
-    """Integrate y to the time `end`, from contact to contact."""
-    memory[COUNT], memory[TIMED] = 0.0, 0.0
-    status = COMPLETED
-    while y[CLOCK] < end and status == COMPLETED:
+def travel(end, memory):
+    """Begin to integrate a lane to the time `end`."""
+    memory[COUNT], memory[TIMED], memory[END] = 0.0, 0.0, end
+
+
+@njit(**INNER)
+def proceed(status, lane, memory, pushing, theta, settings, lanes, room):
+    """Ask for the next step of a lane; return its status, `UNDERWAY` before the end time."""
+    while status == COMPLETED and of(STATE, CLOCK, lane, lanes) < memory[END]:
         if BARRIERS > 0 and memory[TOUCHED] >= 0.0:
-            status = press(y, end, memory, pushing, theta, settings, workspace)
+            status = press(int(memory[TOUCHED]), lane, memory, pushing, theta, settings, lanes, room)
         else:
-            status = fly(y, end, memory, pushing, theta, settings, workspace, coefficients)
-    for e in range(EQUATIONS):
-        if not np.isfinite(y[e]):
-            return DIVERGED
+            status = fly(lane, memory, pushing, theta, settings, lanes, room)
+    if status == COMPLETED:
+        for e in range(EQUATIONS):
+            if not np.isfinite(of(STATE, e, lane, lanes)):
+                return DIVERGED
     return status
+
+
+@njit(**INNER)
+def clear(lane, lanes):
+    """Leave numbers in an idle lane that attempts can work with."""
+    for number in range(lane, NUMBERS, LANES):
+        lanes[number] = 0.0
 
 
 @njit(**OPTIONS)
 def advance(
     states,
-    theta,
+    parameters,
     start_time,
     interval,
-    settings,
+    options,
     budget,
     phases,
     every,
@@ -86,53 +111,93 @@ def advance(
     out_label,
     visits,
 ):
-    memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
-    workspace, coefficients, y = workspaces()
+    numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
+    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
+    theta, settings = pointer_to(parameters), pointer_to(options)
+    y = room
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
-    for index in range(states.shape[0]):
-        status, label, done = COMPLETED, -1, 0
-        copy_state(states[index], out_states[index])
-        while status == COMPLETED and done < budget[index]:
-            # Where the forcing repeats, so do the times: the phase cannot drift.
-            passed = phases[index] + done
-            start = start_time + (passed % cycle if cycle > 0 else passed) * interval
-            copy_state(out_states[index], y)
-            x, v = y[0], y[1]
-            y[CLOCK] = start
-            begin(y, interval, memory, pushing, theta, workspace)
-            status = travel(y, start + interval, memory, pushing, theta, settings, workspace, coefficients)
-            if status == COMPLETED:
-                done += 1
-                passed += 1
-                copy_state(y, out_states[index])
-                at_section = passed % every == 0
-                if visits.shape[1] > 0 and passed % keep == 0:
-                    visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
-                    copy_state(y, visits[index, visit])
-                status, label = stop_status(
-                    y[0], y[1], at_section, region, area, labels, home, points, point_labels, metrics
-                )
-                if between and status == COMPLETED and turned_outside(x, v, y[0], y[1], interval, region):
-                    status = LEFT_REGION
-        out_intervals[index], out_status[index], out_label[index] = done, status, label
-
-
-@njit(**INNER)
-def workspaces():
-    return np.zeros((ROWS, CLOCK + 1)), np.zeros((EQUATIONS, 32)), np.zeros(CLOCK + 1)
+    count, waiting, active = states.shape[0], 0, 0
+    holder, done = np.full(LANES, -1, dtype=np.int64), np.zeros(LANES, dtype=np.int64)
+    while waiting < count or active > 0:
+        for lane in range(LANES):
+            own, pushed = offset_by(room, MEMORIES + lane * MEMORY), offset_by(pushing, lane * max(BARRIERS, 1))
+            status = UNDERWAY
+            if holder[lane] >= 0:
+                status = judge(lane, own, pushed, theta, settings, lanes, room)
+                status = proceed(status, lane, own, pushed, theta, settings, lanes, room)
+            while status != UNDERWAY or (holder[lane] < 0 and waiting < count):
+                if holder[lane] >= 0:  # an interval has ended
+                    index, label = holder[lane], -1
+                    if status == COMPLETED:
+                        x, v = out_states[index, 0], out_states[index, 1]
+                        for e in range(EQUATIONS):
+                            out_states[index, e] = of(STATE, e, lane, lanes)
+                        done[lane] += 1
+                        passed = phases[index] + done[lane]
+                        at_section = passed % every == 0
+                        if visits.shape[1] > 0 and passed % keep == 0:
+                            visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
+                            for e in range(EQUATIONS):
+                                visits[index, visit, e] = out_states[index, e]
+                        here = out_states[index, 0], out_states[index, 1]
+                        status, label = stop_status(
+                            here[0], here[1], at_section, region, area, labels, home, points, point_labels, metrics
+                        )
+                        if between and status == COMPLETED and turned_outside(x, v, here[0], here[1], interval, region):
+                            status = LEFT_REGION
+                    if status != COMPLETED or done[lane] >= budget[index]:
+                        out_intervals[index], out_status[index], out_label[index] = done[lane], status, label
+                        holder[lane], status = -1, UNDERWAY
+                        active -= 1
+                        clear(lane, lanes)
+                        continue
+                else:
+                    index, waiting = waiting, waiting + 1
+                    for e in range(EQUATIONS):
+                        out_states[index, e] = states[index, e]
+                    out_intervals[index], out_status[index], out_label[index] = 0, COMPLETED, -1
+                    if budget[index] <= 0:
+                        continue
+                    holder[lane], done[lane] = index, 0
+                    active += 1
+                # Where the forcing repeats, so do the times: the phase cannot drift.
+                passed = phases[index] + done[lane]
+                start = start_time + (passed % cycle if cycle > 0 else passed) * interval
+                for e in range(EQUATIONS):
+                    y[e] = out_states[index, e]
+                y[CLOCK] = start
+                begin(y, interval, lane, own, pushed, theta, lanes, room)
+                travel(start + interval, own)
+                status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
+        if active > 0:
+            attempt_lanes(lanes, theta, pushing, room)
+            misfit_lanes(lanes, settings[0], abs(interval))
+    keep_alive(numbers, switches)
 
 
 @njit(**OPTIONS)
-def record(state, theta, start_time, spacing, settings, out):
-    memory, pushing = np.zeros(MEMORY), np.zeros(max(BARRIERS, 1), dtype=np.bool_)
-    workspace, coefficients, y = workspaces()
-    copy_state(state, out[0])
-    copy_state(state, y)
+def record(state, parameters, start_time, spacing, options, out):
+    numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
+    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
+    theta, settings = pointer_to(parameters), pointer_to(options)
+    own, y, samples = offset_by(room, MEMORIES), room, out.shape[0]
+    span = spacing * (samples - 1)
+    for e in range(EQUATIONS):
+        out[0, e] = y[e] = state[e]
     y[CLOCK] = start_time
-    begin(y, spacing * (out.shape[0] - 1), memory, pushing, theta, workspace)
-    for sample in range(1, out.shape[0]):
-        status = travel(y, start_time + sample * spacing, memory, pushing, theta, settings, workspace, coefficients)
-        if status != COMPLETED:
-            return sample
-        copy_state(y, out[sample])
-    return out.shape[0]
+    begin(y, span, int(ZERO), own, pushing, theta, lanes, room)
+    sample, status = 1, COMPLETED
+    while sample < samples and status == COMPLETED:
+        travel(start_time + sample * spacing, own)
+        status = proceed(COMPLETED, int(ZERO), own, pushing, theta, settings, lanes, room)
+        while status == UNDERWAY:
+            attempt_lanes(lanes, theta, pushing, room)
+            misfit_lanes(lanes, settings[0], abs(span))
+            status = judge(int(ZERO), own, pushing, theta, settings, lanes, room)
+            status = proceed(status, int(ZERO), own, pushing, theta, settings, lanes, room)
+        if status == COMPLETED:
+            for e in range(EQUATIONS):
+                out[sample, e] = of(STATE, e, int(ZERO), lanes)
+            sample += 1
+    keep_alive(numbers, switches)
+    return sample

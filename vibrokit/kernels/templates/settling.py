@@ -23,7 +23,7 @@ SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
 
 
 @njit(**INNER)
-def settle(y, memory, pushing, theta, spare):
+def settle(y, memory, pushing, theta, slope):
     """Find the stop that is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
     memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
     switch_off(pushing)
@@ -33,8 +33,8 @@ def settle(y, memory, pushing, theta, spare):
         touched = depth > 0.0
         if depth == 0.0:
             switch_off(pushing)
-            rhs(y[CLOCK], y, pushing, theta, spare)
-            acceleration = SIDES[i] * spare[1]
+            rhs(y[CLOCK], y, pushing, theta, slope)
+            acceleration = SIDES[i] * slope[1]
             # A contact too shallow for x to represent does not count.
             seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
             seen = seen and abs(rate) * memory[SPAN] > EPSILON * abs(wall)
@@ -59,4 +59,9 @@ def switch_off(pushing):
 
 @njit(**INNER)
 def push_at(i, y, theta):
-    return law(i, max(SIDES[i] * (y[0] - stop(i, theta)), 1e-30), SIDES[i] * y[1], theta)
+    return push_of(i, y[0], y[1], theta)
+
+
+@njit(**INNER)
+def push_of(i, x, v, theta):
+    return law(i, max(SIDES[i] * (x - stop(i, theta)), 1e-30), SIDES[i] * v, theta)

@@ -1,73 +1,55 @@
-"""The steppers that locate every contact, pasted under the sample scene."""
+"""The steppers that locate every contact."""
 
-import importlib.util
+import dataclasses
 import itertools
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from vibrokit.kernels import templates
+import vibrokit as vk
+from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
+from vibrokit.symbolic.flow_kind import Flow
 
-MARKER = "# --- scene above, stepper below ---\n"
-NOT_HERE = re.compile(r"^.*  # (breaking|bending)\n", re.MULTILINE)  # no force of the sample scene jumps
-IMPORTS = """
-import numpy as np
-from vibrokit.kernels.cubic import crossing, summit
-from vibrokit.kernels.error_blocks import error_blocks
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED, stop_status, turned_outside
-from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHTS
-"""
 DAMPING, STIFFNESS, AMPLITUDE, FREQUENCY, FORCE, HERTZ, STOP = 0.02, 1.0, 0.18, 0.57, 0.2, 50.0, 0.5
 PERIOD = 2 * np.pi / FREQUENCY
 EVERYWHERE = np.array([[-np.inf, np.inf], [-np.inf, np.inf]])
-# A Hunt-Crossley law: its force would pull at release.
-CLAMPED = {
-    "CLAMPED = (False, False)": "CLAMPED = (True, True)",
-    "depth * sqrt(depth)\n    return": "depth * sqrt(depth) * (1.0 + 3.0 * rate)\n    return",
-    "theta[7] * depth * sqrt(depth)\n\n": "theta[7] * depth * sqrt(depth) * (1.0 + 3.0 * rate)\n\n",
-    "push -= theta[5] * depth * sqrt(depth)": "push -= theta[5] * depth * sqrt(depth) * (1.0 + 3.0 * v)",
-    "push += theta[7] * depth * sqrt(depth)": "push += theta[7] * depth * sqrt(depth) * (1.0 - 3.0 * v)",
-}
+SCENE = vk.Oscillator(
+    natural_frequency=np.sqrt(STIFFNESS),
+    damping_ratio=DAMPING / 2,
+    barriers=(vk.Barrier(vk.Hertz(HERTZ), STOP, "right"), vk.Barrier(vk.Hertz(HERTZ), -STOP, "left")),
+    excitations=(vk.Harmonic(AMPLITUDE, FREQUENCY), vk.Constant(FORCE)),
+    noise=vk.WhiteNoise(intensity=1.0),
+)
+# Its force would pull at release.
+PULLING = vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=HERTZ, c=3.0)
 
 
-def theta(**changes):
-    values = {
-        "damping": DAMPING, "stiffness": STIFFNESS, "amplitude": AMPLITUDE, "frequency": FREQUENCY, "force": FORCE,
-        "right": HERTZ, "right_stop": STOP, "left": HERTZ, "left_stop": -STOP,
-    }  # fmt: skip
-    return np.array(list((values | changes).values()))
+def theta(damping=DAMPING, amplitude=AMPLITUDE, force=FORCE, right=HERTZ, left=HERTZ, right_stop=STOP, left_stop=-STOP):
+    changed = dataclasses.replace(
+        SCENE,
+        damping_ratio=damping / 2,
+        barriers=(
+            vk.Barrier(vk.Hertz(right), right_stop, "right"),
+            vk.Barrier(vk.Hertz(left), left_stop, "left"),
+        ),
+        excitations=(vk.Harmonic(amplitude, FREQUENCY), vk.Constant(force)),
+    )
+    return theta_of(changed)
 
 
-def pasted(folder, stepper, changes=()):
-    room = Path(templates.__file__).parent
-    scene = (room / "scene.py").read_text(encoding="utf-8")
-    for old, new in dict(changes).items():
-        assert old in scene
-        scene = scene.replace(old, new)
-    names = ("steps", "settling", "located", stepper, "sections")
-    pieces = [(room / f"{name}.py").read_text("utf-8").split(MARKER)[1] for name in names]
-    text = "\n\n".join([scene, IMPORTS, *(NOT_HERE.sub("", piece) for piece in pieces)])
-    path = folder / f"{stepper}.py"
-    path.write_text(text, encoding="utf-8")
-    specification = importlib.util.spec_from_file_location(f"pasted_{stepper}", path)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module", params=["order8", "free_flight"])
-def module(request, tmp_path_factory):
-    return pasted(tmp_path_factory.mktemp("pasted"), request.param)
+@pytest.fixture(scope="module", params=[vk.Order8(), vk.FreeFlight()], ids=lambda stepper: stepper.name)
+def module(request):
+    return kernel_for(SCENE, Flow.HAMILTONIAN, request.param).module
 
 
 @pytest.fixture(scope="module")
-def clamped(tmp_path_factory):
-    return pasted(tmp_path_factory.mktemp("clamped"), "order8", CLAMPED)
+def clamped():
+    barriers = (vk.Barrier(PULLING, STOP, "right"), vk.Barrier(PULLING, -STOP, "left"))
+    scene = dataclasses.replace(SCENE, barriers=barriers)
+    return kernel_for(scene, Flow.HAMILTONIAN, vk.Order8()).module, theta_of(scene)
 
 
 def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None, limit=1e5, region=EVERYWHERE):
@@ -78,7 +60,7 @@ def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None
     points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
     outputs = out, done, status, label, np.zeros((count, 0, 5))
     module.advance(
-        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0]),
+        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0, 1.0]),
         np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, *outputs,
     )  # fmt: skip
     return out, done, status
@@ -252,7 +234,10 @@ def test_energy_at_any_stiffness_and_without_gap(module):
 def test_law_that_would_pull_is_let_go(clamped):
     """The fine solution agrees with small Runge–Kutta steps of max(law, 0), which lose order at the kinks."""
     states = starts(6, 0.0)
-    fine, coarse = (advance(clamped, states, tolerance, interval=4.0)[0][:, :2] for tolerance in (1e-13, 1e-9))
+    module, values = clamped
+    fine, coarse = (
+        advance(module, states, tolerance, interval=4.0, values=values)[0][:, :2] for tolerance in (1e-13, 1e-9)
+    )
 
     def rates(t, z):
         x, v = z[:, 0], z[:, 1]
@@ -273,7 +258,7 @@ def test_law_that_would_pull_is_let_go(clamped):
 def test_record_passes_through_the_sections(module):
     out = np.empty((41, 5))
     state = starts(1)[0]
-    assert module.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0]), out) == 41
+    assert module.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0, 1.0]), out) == 41
     sections = [advance(module, state, 1e-13, k)[0][0] for k in (1, 2)]
     assert out[[20, 40], :2] == pytest.approx(np.array(sections)[:, :2], abs=1e-10)
 
@@ -297,4 +282,4 @@ def test_stops_are_reported(module):
     assert status[1] == DIVERGED
     assert np.isfinite(out).all()
     samples = np.empty((9, 5))
-    assert module.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0]), samples) < 9
+    assert module.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0, 1.0]), samples) < 9

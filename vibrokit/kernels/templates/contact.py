@@ -1,0 +1,251 @@
+"""The stops: a contact is followed to its end.
+
+Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; it changes only between steps. At
+most one stop is touched at a time. Lines marked "breaking" or "unbroken" are kept only for scenes and flows in which
+something jumps at the touch of a stop, or nothing does; "bending" or "unbent", where a law is cut at zero.
+"""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.cubic import summit
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED
+from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
+from vibrokit.kernels.templates.landing import (
+    DEPTH_GOAL,
+    FLIPS,
+    LAW_GOAL,
+    RELEASES,
+    STEPS,
+    depth_at,
+    land,
+)
+from vibrokit.kernels.templates.scene import (
+    CLAMPED,
+    COURSE,
+    ERROR,
+    FACTOR,
+    LANES,
+    LENGTH,
+    SIDES,
+    SIGMA,
+    STATE,
+    TRIAL,
+    law,
+    rhs,
+    stop,
+)
+from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_of, settle
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
+    CONTACT_STEP,
+    END,
+    EPSILON,
+    FIRST,
+    FIRST_STEP,
+    INNER,
+    LAST,
+    PULLED,
+    ROOT_DEPTH,
+    ROOT_TIME,
+    SINCE,
+    SPAN,
+    TAKEN,
+    TASK,
+    TIME,
+    TIMED,
+    TOUCHED,
+    UNDERWAY,
+    accept,
+    ask,
+    face,
+    of,
+    plan,
+    put,
+    shortened,
+    take,
+)
+
+# --- scene above, stepper below ---
+
+
+@njit(**INNER)
+def press(i, lane, memory, pushing, theta, settings, lanes, room):
+    """Ask for a step in contact, on the course that is chosen for it."""
+    now, x, rate = of(STATE, CLOCK, lane, lanes), of(STATE, 0, lane, lanes), SIDES[i] * of(STATE, 1, lane, lanes)
+    course, sigma = course_of(i, lane, memory, pushing, theta, lanes, room)
+    remaining = memory[END] - now
+    last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
+    length = length_of(course, sigma, remaining if last else memory[CONTACT_STEP], rate)
+    depth = max(depth_at(STATE, i, lane, lanes, theta), 1e-30)
+    memory[LAST], memory[TASK] = 1.0 if last else 0.0, STEPS
+    plan(course, sigma, length, grain_of(i, depth, x, rate, theta), depth, lane, memory, lanes)
+    return ask(length, lane, memory, settings, lanes)
+
+
+@njit(**INNER)
+def course_of(i, lane, memory, pushing, theta, lanes, room):
+    """Choose the course of the next step in contact, and where on it the state lies."""
+    depth, rate = depth_at(STATE, i, lane, lanes, theta), SIDES[i] * of(STATE, 1, lane, lanes)
+    if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
+        slope = offset_by(room, ROW)
+        take(STATE, lane, lanes, room)
+        rhs(room[CLOCK], room, pushing, theta, slope)
+        acceleration = SIDES[i] * slope[1]
+        if rate * rate > (4.0 if acceleration > 0.0 else -1.0) * acceleration * depth:
+            return ROOT_DEPTH, np.sqrt(depth)
+    if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
+        return ROOT_TIME, np.sqrt(of(STATE, CLOCK, lane, lanes) - memory[SINCE])
+    return TIME, 0.0
+
+
+@njit(**INNER)
+def length_of(course, sigma, lapse, rate):
+    """Length along a course of a step that lasts `lapse`."""
+    if course == ROOT_TIME:
+        return lapse / (np.sqrt(sigma * sigma + lapse) + sigma)
+    if course == ROOT_DEPTH:
+        square = sigma * sigma + rate * lapse
+        return np.sqrt(square) - sigma if square > 0.02 * sigma * sigma else -sigma
+    return lapse
+
+
+@njit(**INNER)
+def grain_of(i, depth, x, rate, theta):
+    """Uncertainty of the law due to the rounding of x."""
+    more = 0.5 * depth + 64.0 * EPSILON * abs(x)
+    return 3.0 * EPSILON * abs(x) * abs(law(i, depth + more, rate, theta) - law(i, depth, rate, theta)) / more
+
+
+@njit(**INNER)
+def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
+    """Judge an attempt in contact: ask for another, or go on from its end."""
+    i, course, length = int(memory[TOUCHED]), lanes[COURSE + lane], lanes[LENGTH + lane]
+    error, now, then = lanes[ERROR + lane], of(STATE, CLOCK, lane, lanes), of(TRIAL, CLOCK, lane, lanes)
+    tiny = abs(then - now) <= EPSILON * (abs(now) + memory[SPAN]) or abs(length) < 1e-12 * abs(memory[FIRST])
+    new = shortened(error, lanes[FACTOR + lane], tiny, lane, memory, settings, lanes)
+    if new != 0.0:
+        return ask(new, lane, memory, settings, lanes)
+    if not np.isfinite(error):
+        return DIVERGED
+    if course == ROOT_DEPTH:
+        if then > memory[END] or SIDES[i] * of(TRIAL, 1, lane, lanes) >= 0.0:
+            memory[TIMED] = 2.0 if then > memory[END] else 1.0
+            return COMPLETED
+    elif memory[PULLED] == 0.0 and not tiny and leaves(i, then - now, lane, lanes, theta):
+        return ask(0.5 * length, lane, memory, settings, lanes)
+    if memory[LAST] > 0.0 and length != memory[FIRST]:
+        memory[LAST] = 0.0
+    memory[FIRST], memory[TAKEN] = length, lanes[FACTOR + lane]
+    if SOME_CLAMPED:
+        if CLAMPED[i]:
+            return turn(i, lane, memory, pushing, theta, settings, lanes, room)
+    return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
+
+
+@njit(**INNER)
+def leaves(i, lapse, lane, lanes, theta):
+    """Whether a step in time ends outside the stop, or may have been outside between."""
+    wall = stop(i, theta)
+    before, after = SIDES[i] * of(STATE, 1, lane, lanes), SIDES[i] * of(TRIAL, 1, lane, lanes)
+    end = depth_at(TRIAL, i, lane, lanes, theta)
+    if end < -4.0 * EPSILON * abs(wall):
+        return True
+    if before < 0.0 < after:
+        start = depth_at(STATE, i, lane, lanes, theta)
+        least = -summit(-start, -before, -end, -after, lapse)
+        return least < 0.1 * (max(start, end) - least)
+    return False
+
+
+@njit(**INNER)
+def turn(i, lane, memory, pushing, theta, settings, lanes, room):
+    """End a step where the law changes its sign, or where a mass that is not pushed leaves the stop."""
+    before = push_of(i, of(STATE, 0, lane, lanes), of(STATE, 1, lane, lanes), theta)
+    after = push_of(i, of(TRIAL, 0, lane, lanes), of(TRIAL, 1, lane, lanes), theta)
+    pulled, length = memory[PULLED] != 0.0, lanes[LENGTH + lane]
+    turned = after > 0.0 if pulled else after < 0.0
+    if turned and (before < 0.0 if pulled else before > 0.0):
+        land(FLIPS, LAW_GOAL, i, length, lane, memory, theta, lanes)
+        return UNDERWAY
+    if turned:
+        for e in range(CLOCK + 1):
+            lanes[TRIAL + e * LANES + lane] = lanes[STATE + e * LANES + lane]
+        length = 0.0
+    return turned_at(i, length, turned, lane, memory, pushing, theta, settings, lanes, room)
+
+
+@njit(**INNER)
+def turned_at(i, length, turned, lane, memory, pushing, theta, settings, lanes, room):
+    """Let go a mass that is not pushed and has left the stop; conclude otherwise."""
+    if memory[PULLED] != 0.0 and depth_at(TRIAL, i, lane, lanes, theta) < 0.0:
+        land(RELEASES, DEPTH_GOAL, i, length, lane, memory, theta, lanes)
+        return UNDERWAY
+    return conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, room)
+
+
+@njit(**INNER)
+def conclude_landing(lane, memory, pushing, theta, settings, lanes, room):
+    """Go on from an event within a contact."""
+    i, length = int(memory[AIM]), lanes[LENGTH + lane]
+    if memory[TASK] == FLIPS:
+        memory[TASK] = STEPS
+        return turned_at(i, length, True, lane, memory, pushing, theta, settings, lanes, room)
+    lanes[TRIAL + lane] = stop(i, theta)
+    return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
+
+
+@njit(**INNER)
+def conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, room):
+    """Accept the attempt."""
+    course, sigma = lanes[COURSE + lane], lanes[SIGMA + lane]
+    lapse = of(TRIAL, CLOCK, lane, lanes) - of(STATE, CLOCK, lane, lanes)
+    accept(lane, lanes)
+    last = memory[LAST] > 0.0
+    if last and length == memory[FIRST]:
+        lanes[STATE + CLOCK * LANES + lane] = memory[END]
+    plan_contact(course, sigma, length, lapse, last, memory)
+    y = room
+    if turned:
+        take(STATE, lane, lanes, y)
+        memory[PULLED] = 1.0 - memory[PULLED]
+        memory[SINCE] = np.nan
+        pushing[i] = not pushing[i]  # unbent
+        turn_law(i, y, pushing, theta, offset_by(room, ROW))  # bending
+        put(y, STATE, lane, lanes)
+        face(lane, memory, pushing, theta, lanes)
+    elif (course == ROOT_DEPTH and sigma + length == 0.0) or depth_at(STATE, i, lane, lanes, theta) <= 0.0:
+        return meet(i, lane, memory, pushing, theta, settings, lanes, room)
+    return COMPLETED
+
+
+@njit(**INNER)
+def meet(i, lane, memory, pushing, theta, settings, lanes, room):
+    """Go on from a state exactly at a stop."""
+    y = room
+    take(STATE, lane, lanes, y)
+    y[0] = stop(i, theta)
+    settle(y, memory, pushing, theta, offset_by(room, ROW))  # unbroken
+    status = COMPLETED  # unbroken
+    status = cross(i, y, memory, pushing, theta, settings, offset_by(room, ROW))  # breaking
+    put(y, STATE, lane, lanes)
+    face(lane, memory, pushing, theta, lanes)
+    return status
+
+
+@njit(**INNER)
+def plan_contact(course, sigma, length, lapse, last, memory):
+    """Choose how long the next step in contact shall last."""
+    factor = memory[TAKEN]
+    if course == ROOT_TIME:
+        if sigma == 0.0:
+            memory[FIRST_STEP] = lapse * min(factor, 1.5) ** 2
+        longer = factor * length
+        lapse = longer * (2.0 * (sigma + length) + longer)
+    else:
+        lapse *= factor
+    if length != 0.0 and not (last and lapse < memory[CONTACT_STEP]):
+        memory[CONTACT_STEP] = lapse
+    if memory[TIMED] == 1.0:
+        memory[TIMED] = 0.0
