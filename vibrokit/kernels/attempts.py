@@ -24,7 +24,7 @@ _WAVES = "from vibrokit.kernels.waves import cos, sin"
 
 
 class AttemptWriter:
-    """Writes `attempt_lanes(lanes, theta, pushing, room)` and `misfit_lanes(lanes, tolerance, span)`, and the offsets that they use.
+    """Writes `attempt_lanes` and `misfit_lanes`, and the offsets that they use; `templates/scene.py` says what they do.
 
     With few equations, a stage is one loop over the lanes. With many, that loop would need more registers and a longer
     compilation than it gains: the point of a stage is computed row by row first.
@@ -113,7 +113,9 @@ class AttemptWriter:
         if self._curved:
             lines += ["    for lane in range(LANES):", f"        if {self._at('NEAR')} > 0.5:"]
             offset = self._places["SLOPES"] + stage * (clock + 1) * self._lanes
-            lines += [f"            extrapolate({float(NODES[stage])!r}, {offset} + lane, lane, lanes, pushing, theta, room)"]
+            lines += [
+                f"            extrapolate({float(NODES[stage])!r}, {offset} + lane, lane, lanes, pushing, theta, room)"
+            ]
         return lines
 
     def _on_course(self, node: float) -> list[str]:

@@ -24,10 +24,10 @@ from vibrokit.parts.spring.linear import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
 _STEPS = 256
-_MOST_STEPS, _MOST_NOISY_STEPS = 4096, 65536  # in an interval of one free oscillation or less
+_MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
-_TOLERANCE = 1e-10
+_TOLERANCE, _ENSEMBLE_TOLERANCE = 1e-10, 1e-6
 _PACKAGE = str(Path(__file__).parents[1])
 
 
@@ -36,22 +36,22 @@ class CoarseStepsWarning(UserWarning):
 
 
 def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
-    """Choose the stepper for many trajectories: RK4 if its steps resolve every contact, otherwise as for single ones.
+    """Choose the stepper for many trajectories: RK4 if few steps resolve every contact, otherwise Order8.
 
-    Measured on ``hertz-0.570``, two periods, two threads, as ``vibrokit trade hertz-0.570`` prints it: RK4(256) has a
-    median error of 9e-5 at 1.2 µs per trajectory and period; twice the steps, 2e-5 at 1.8 µs. The cheapest located
-    setting, FreeFlight(1e-4), has 1e-4 at 18 µs. So RK4 is the default unless it needs more steps than that ratio.
+    Measured on ``hertz-0.570``, Hamilton's equations over five periods, two threads: RK4(256) has a median error of
+    2e-3 at 0.52 µs per trajectory and period, RK4(1024) 2e-4 at 1.7 µs, Order8(1e-6) 4e-7 at 2.7 µs. So located contacts
+    are cheaper wherever RK4 needs more than 1024 steps.
     """
     try:
         steps = _power_of_two(_steps_needed(scene, flow))
     except StepperError:  # not a flow that fixed steps can follow
-        return single_stepper(scene, flow)
+        return Order8(_ENSEMBLE_TOLERANCE)
     if flow is Flow.HAMILTONIAN_VARIATIONAL and scene.barriers and kernel_for(scene, flow, RK4()).module.BENDS:
-        return single_stepper(scene, flow)  # fixed steps have its derivatives where p = 0 only
+        return Order8(_ENSEMBLE_TOLERANCE)  # fixed steps have its derivatives where p = 0 only
     turns = max(1.0, _turns(scene))
     if flow is Flow.NOISY:  # if these are too few, integration warns
         return RK4(min(steps, int(_MOST_NOISY_STEPS * turns)))
-    return RK4(steps) if steps <= _MOST_STEPS * turns else single_stepper(scene, flow)
+    return RK4(steps) if steps <= _MOST_STEPS * turns else Order8(_ENSEMBLE_TOLERANCE)
 
 
 def single_stepper(scene: Scene, flow: Flow) -> Stepper:

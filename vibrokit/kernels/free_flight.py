@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class FreeFlight(LocatedStepper):
-    """Exact flight between the stops, for linear springs and sinusoidal forces, one trajectory at a time.
+    """Exact flight between the stops, for linear springs and sinusoidal forces.
 
     The flight is its Taylor series to rounding error, at any damping and at resonance; the first touch is found by
     bounds that cannot miss one. Contacts are stepped as `Order8` does, to the same order. Choose it for orbits,

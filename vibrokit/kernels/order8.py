@@ -78,12 +78,13 @@ class LocatedStepper(Stepper):
 
 @dataclasses.dataclass(frozen=True)
 class Order8(LocatedStepper):
-    """Dormand–Prince 8(5,3) with adaptive steps, one trajectory at a time; contacts are located and stepped through.
+    """Dormand–Prince 8(5,3) with adaptive steps, trajectories packed in vector lanes; contacts are located.
 
     Order 8 for linear and Hertz stops and every law that is smooth in the depth or in its square root, whose contact
     is stepped in √time and √depth; other laws lose order at first touch, and the error control takes shorter
-    steps. Choose it for orbits and certificates of any scene, and for stiff stops; choose `FreeFlight` where the spring
-    is linear, `RK4` for large ensembles.
+    steps. The lanes of a block attempt their steps together, each of its own length and along its own course. Choose it
+    for orbits, certificates and accurate ensembles of any scene, and for stiff stops; choose `FreeFlight` for the same
+    with a linear spring at tolerances below 1e-11, `RK4` for large ensembles at moderate accuracy.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
 from vibrokit.kernels.templates.landing import (
     DEPTH_GOAL,

@@ -7,8 +7,8 @@ as bounds on the second and third derivative exclude a zero.
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import STEPS, landed
 from vibrokit.kernels.templates.scene import (

@@ -1,6 +1,5 @@
 """Steps that are shortened to end on an event: a touch, a turn of the motion, or where a law changes its sign."""
 
-import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import crossing

@@ -45,11 +45,14 @@ from vibrokit.kernels.templates.steps import (
 
 
 @njit(**INNER)
-def begin(y, interval, lane, memory, pushing, theta, lanes, room):
-    """Reset the memory of a lane, so that the motion depends on y alone."""
+def begin(y, interval, lane, memory, pushing, theta, settings, lanes, room):
+    """Reset the memory of a lane, so that the motion depends on y alone.
+
+    The first steps are those that a free oscillation and the contacts of ``hertz-0.570`` were observed to need.
+    """
     memory[SPAN] = abs(interval)
-    memory[FREE_STEP] = interval / 16.0
-    memory[FIRST_STEP] = interval / 128.0
+    memory[FREE_STEP] = min(interval, 6.0 * settings[0] ** 0.125 * settings[3])
+    memory[FIRST_STEP] = memory[FREE_STEP] / 64.0
     memory[CONTACT_STEP] = memory[FIRST_STEP]
     memory[TOUCHED] = -1.0
     if BARRIERS > 0:
@@ -166,7 +169,7 @@ def advance(
                 for e in range(EQUATIONS):
                     y[e] = out_states[index, e]
                 y[CLOCK] = start
-                begin(y, interval, lane, own, pushed, theta, lanes, room)
+                begin(y, interval, lane, own, pushed, theta, settings, lanes, room)
                 travel(start + interval, own)
                 status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
         if active > 0:
@@ -185,7 +188,7 @@ def record(state, parameters, start_time, spacing, options, out):
     for e in range(EQUATIONS):
         out[0, e] = y[e] = state[e]
     y[CLOCK] = start_time
-    begin(y, span, int(ZERO), own, pushing, theta, lanes, room)
+    begin(y, span, int(ZERO), own, pushing, theta, settings, lanes, room)
     sample, status = 1, COMPLETED
     while sample < samples and status == COMPLETED:
         travel(start_time + sample * spacing, own)
