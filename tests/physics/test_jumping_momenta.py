@@ -228,12 +228,12 @@ def test_fixed_steps_refuse_momenta_that_jump():
     for flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL):
         with pytest.raises(StepperError, match="momenta jump too"):
             kernel_for(osc, flow, vk.RK4())
-        assert isinstance(ensemble_stepper(osc, flow), vk.FreeFlight)
+        assert isinstance(ensemble_stepper(osc, flow), vk.Order8)
 
 
 def test_who_chooses_for_derivatives():
     flow = Flow.HAMILTONIAN_VARIATIONAL
-    assert isinstance(ensemble_stepper(one_stop(vk.Linear(K)), flow), vk.FreeFlight)
+    assert isinstance(ensemble_stepper(one_stop(vk.Linear(K)), flow), vk.Order8)
     assert isinstance(ensemble_stepper(one_stop(vk.Hertz(K)), flow), vk.RK4)
     assert isinstance(ensemble_stepper(one_stop(vk.Linear(K)), Flow.HAMILTONIAN), vk.RK4)
 

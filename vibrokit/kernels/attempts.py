@@ -19,43 +19,43 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
 _FEW_EQUATIONS = 8
-_REGISTERS = "from vibrokit.kernels.registers import use_widest_registers"
-_WAVES = "from vibrokit.kernels.waves import cos, sin"
+_EACH_NUMBER = "    for _k in range((EQUATIONS + 1)*LANES):"
+_IMPORTS = (
+    "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers",
+    "from vibrokit.kernels.pointers import offset_by",
+    "from vibrokit.kernels.waves import cos, sin",
+)
 
 
 class AttemptWriter:
     """Writes `attempt_lanes` and `misfit_lanes`, and the offsets that they use; `templates/scene.py` says what they do.
 
-    With few equations, a stage is one loop over the lanes. With many, that loop would need more registers and a longer
-    compilation than it gains: the point of a stage is computed row by row first.
+    The slopes of a stage are one function, and all else are loops over the variables: written out for each stage and
+    variable, it took a tenth less time to run and three times as long to compile.
     """
 
     def __init__(self, text: SceneText) -> None:
         self._text = text
         self._count = len(text.variables)
-        self._few = self._count <= _FEW_EQUATIONS
-        self._lanes = 16 if self._few else 8
         self._stops = text.barriers
-        # At a touch the second derivative of a law is infinite, and only these equations have it.
-        self._curved = text.curved
-        self._places: dict[str, int] = {}
-        size = self._count + 1
-        rows = {"STATE": size, "TRIAL": size, "LENGTH": 1, "ERROR": 1, "FACTOR": 1, "FIFTHS": 1, "THIRDS": 1}
-        rows |= {"BROKEN": 1, "ALLOWED": 1}
+        # Few enough lanes that their numbers stay in the nearest cache.
+        self._lanes = 16 if self._count <= _FEW_EQUATIONS else 8
+        size = self._count + 1  # with the time
+        rows = {"STATE": size, "TRIAL": size, "LENGTH": 1, "ERROR": 1, "FACTOR": 1}
+        rows |= {"LENGTHS": size, "POINT": size, "SLOPES": STAGES * size, "SIZES": size, "FIFTHS": size, "THIRDS": size}
         if self._stops:
             rows |= {"SIGMA": 1, "COURSE": 1, "WALL": 1, "SIDE": 1, "PUSHES": self._stops, "GRAIN": 1, "DEPTH": 1}
-            rows |= {"HAZE": 1, "NEAR": 1}
-        rows |= {"SLOPES": STAGES * size} | ({} if self._few else {"POINT": size})
-        self._numbers = 0
+            rows |= {"NEAR": 1}
+        self._places, self._numbers = {}, 0
         for name, height in rows.items():
             self._places[name] = self._numbers
             self._numbers += height * self._lanes
 
     def text(self) -> list[str]:
-        """The pieces: offsets, attempt, misfit."""
+        """The pieces: offsets, slopes, attempt, misfit."""
         offsets = [f"{name} = {place}" for name, place in self._places.items()]
-        head = [_REGISTERS, _WAVES, "", f"LANES = {self._lanes}", f"NUMBERS = {self._numbers}", *offsets, ""]
-        return ["\n".join(head), "\n".join(self._attempt()), "\n".join(self._misfit())]
+        head = [*_IMPORTS, "", f"LANES = {self._lanes}", f"NUMBERS = {self._numbers}", *offsets, ""]
+        return ["\n".join(lines) for lines in (head, self._slopes(), self._attempt(), self._misfit())]
 
     def _at(self, name: str, row: int | str = 0) -> str:
         """Text of the number of a lane in a row of a block of rows; a row may be text, such as ``e``."""
@@ -63,68 +63,46 @@ class AttemptWriter:
             return f"lanes[{self._places[name] + row * self._lanes} + lane]"
         return f"lanes[{self._places[name]} + {row}*LANES + lane]"
 
-    def _slope(self, stage: int, row: int | str) -> str:
-        place = stage * (self._count + 1)
-        if isinstance(row, int):
-            return self._at("SLOPES", place + row)
-        return f"lanes[{self._places['SLOPES'] + place * self._lanes} + {row}*LANES + lane]"
+    def _each(self, name: str, stage: int = 0) -> str:
+        """Text of the number `_k` of a block of rows for all variables."""
+        return f"lanes[{self._places[name] + stage * (self._count + 1) * self._lanes} + _k]"
 
-    def _combined(self, weights: NDArray[np.float64], row: int | str) -> str:
-        """Text of the weighted slopes of one variable; empty if all weights are 0."""
-        return " + ".join(f"{float(w)!r}*{self._slope(stage, row)}" for stage, w in enumerate(weights) if w)
+    def _combined(self, weights: NDArray[np.float64]) -> str:
+        """Text of the weighted slopes; empty if all weights are 0."""
+        return " + ".join(f"{float(w)!r}*{self._each('SLOPES', stage)}" for stage, w in enumerate(weights) if w)
 
-    def _moved(self, weights: NDArray[np.float64], row: int | str) -> str:
-        """Text of a variable at a point of the step."""
-        slopes, length = self._combined(weights, row), self._at("LENGTH")
-        return f"{self._at('STATE', row)}{f' + {length}*({slopes})' if slopes else ''}"
+    def _moved(self, target: str, weights: NDArray[np.float64]) -> list[str]:
+        """Lines that put a point of the step in a block of rows."""
+        slopes = self._combined(weights)
+        text = self._each("STATE") + (f" + {self._each('LENGTHS')}*({slopes})" if slopes else "")
+        return [_EACH_NUMBER, f"        {self._each(target)} = {text}"]
 
-    def _attempt(self) -> list[str]:
-        lines = ["@njit(**INLINED)", "def attempt_lanes(lanes, theta, pushing, room):", "    use_widest_registers()"]
+    def _slopes(self) -> list[str]:
+        """Function `slopes_lanes(node, lanes, slopes, theta)`: the slopes at POINT along each course."""
+        names = (*self._text.variables, "_now")
+        lines = ["@njit(**CONTRACTED)", "def slopes_lanes(node, lanes, slopes, theta):"]
+        lines += ["    use_widest_registers()", "    promise_no_overlap()"]
         lines += [f"    {name} = theta[{place}]" for name, place in self._text.parameters.items()]
-        for stage in range(STAGES):
-            lines += self._stage(stage)
-        lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
-        lines += [f"            {self._at('TRIAL', '_e')} = {self._moved(RESULT, '_e')}"]
-        if self._stops:
-            end = f"({self._at('SIGMA')} + {self._at('LENGTH')})"
-            lines += ["    for lane in range(LANES):", f"        if {self._at('COURSE')} > 1.5:"]
-            lines += [f"            {self._at('TRIAL')} = {self._at('WALL')} + {self._at('SIDE')}*{end}*{end}"]
-        return [*lines, ""]
-
-    def _stage(self, stage: int) -> list[str]:
-        names, clock, weights = (*self._text.variables, "_now"), self._count, WEIGHTS[stage]
-        if self._few:
-            lines = ["    for lane in range(LANES):"]
-            lines += [f"        {name} = {self._moved(weights, row)}" for row, name in enumerate(names)]
-        else:
-            lines = ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
-            lines += [f"            {self._at('POINT', '_e')} = {self._moved(weights, '_e')}"]
-            lines += ["    for lane in range(LANES):"]
-            lines += [f"        {name} = {self._at('POINT', row)}" for row, name in enumerate(names)]
-        lines += self._on_course(float(NODES[stage])) if self._stops else []
+        lines += ["    for lane in range(LANES):"]
+        lines += [f"        {name} = {self._at('POINT', row)}" for row, name in enumerate(names)]
+        lines += self._on_course() if self._stops else []
         lines += ["        f = forcing(_now, theta)"] * self._text.forced
         pushing = [f"{self._at('PUSHES', stop)} > 0.5" for stop in range(self._stops)]
         values = [*self._text.variables, *["f"] * self._text.forced, *pushing, *self._text.parameters]
         slopes = [f"_slope{row}" for row in range(self._count)]
         lines += [f"        {', '.join(slopes)} = rates({', '.join(values)})"]
         weight = "_weight*" if self._stops else ""
-        lines += [f"        {self._slope(stage, row)} = {weight}{slope}" for row, slope in enumerate(slopes)]
-        lines += [f"        {self._slope(stage, clock)} = {'_weight' if self._stops else '1.0'}"]
-        if self._curved:
-            lines += ["    for lane in range(LANES):", f"        if {self._at('NEAR')} > 0.5:"]
-            offset = self._places["SLOPES"] + stage * (clock + 1) * self._lanes
-            lines += [
-                f"            extrapolate({float(NODES[stage])!r}, {offset} + lane, lane, lanes, pushing, theta, room)"
-            ]
-        return lines
+        rates = [*(f"{weight}{slope}" for slope in slopes), "_weight" if self._stops else "1.0"]
+        lines += [f"        slopes[{row * self._lanes} + lane] = {rate}" for row, rate in enumerate(rates)]
+        return [*lines, ""]
 
-    def _on_course(self, node: float) -> list[str]:
+    def _on_course(self) -> list[str]:
         """Lines that put x on the course of the lane, and find how fast the variables change along it.
 
         A depth below the rounding of x is replaced by one that x represents.
         """
         lines = [
-            f"_sigma = {self._at('SIGMA')} + {node!r}*{self._at('LENGTH')}",
+            f"_sigma = {self._at('SIGMA')} + node*{self._at('LENGTH')}",
             f"_deep, _rooted = {self._at('COURSE')} > 1.5, {self._at('COURSE')} > 0.5",
             f"_wall, _side = {self._at('WALL')}, {self._at('SIDE')}",
             "x = _wall + _side*_sigma*_sigma if _deep else x",
@@ -135,80 +113,83 @@ class AttemptWriter:
             "x = _wall + _side*_least if _shallow else x",
             "_weight = (2.0*_sigma if _rooted else 1.0)/(_rate if _deep else 1.0)",
         ]
-        if self._curved:
+        if self._text.curved:
             lines += ["_closes = _deep or (_rate > 0.0 and _sigma*_sigma*_rate <= 4.0*_least)"]
             lines += [f"{self._at('NEAR')} = 1.0 if _shallow and _closes else 0.0"]
             lines += [f"{self._at('POINT')} = x"]
         return [f"        {line}" for line in lines]
 
-    def _misfit(self) -> list[str]:
-        text = self._text
-        blocks = error_blocks(text.states, text.states * text.flow.has_momenta, self._count)
-        lines = ["@njit(**INLINED)", "def misfit_lanes(lanes, tolerance, span):", "    use_widest_registers()"]
-        lines += ["    for lane in range(LANES):", "        _fifth, _third, _broken = 0.0, 0.0, 0.0"]
-        sizes = {int(block): [int(row) for row in np.flatnonzero(blocks == block)] for block in dict.fromkeys(blocks)}
-        for name, block in (("_reach", 0), ("_speed", 1)):
-            lines += self._size_of(name, sizes[block])
-        lines += ["        _least = 0.01*_reach/span", "        _speed = _speed if _speed > _least else _least"]
-        lines += ["        _allowed = tolerance"]
+    def _attempt(self) -> list[str]:
+        lines = ["@njit(**CONTRACTED)", "def attempt_lanes(lanes, theta, pushing, room):", "    use_widest_registers()"]
+        lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
+        lines += [f"            {self._at('LENGTHS', '_e')} = {self._at('LENGTH')}"]
+        for stage in range(STAGES):
+            node, place = float(NODES[stage]), self._places["SLOPES"] + stage * (self._count + 1) * self._lanes
+            lines += self._moved("POINT", WEIGHTS[stage])
+            lines += [f"    slopes_lanes({node!r}, lanes, offset_by(lanes, {place}), theta)"]
+            if self._text.curved:
+                lines += ["    for lane in range(LANES):", f"        if {self._at('NEAR')} > 0.5:"]
+                lines += [f"            extrapolate({node!r}, {place} + lane, lane, lanes, pushing, theta, room)"]
+        lines += self._moved("TRIAL", RESULT)
         if self._stops:
-            lines += self._rounding()
-        clock = self._count
+            end = f"({self._at('SIGMA')} + {self._at('LENGTH')})"
+            lines += ["    for lane in range(LANES):", f"        if {self._at('COURSE')} > 1.5:"]
+            lines += [f"            {self._at('TRIAL')} = {self._at('WALL')} + {self._at('SIDE')}*{end}*{end}"]
+        return [*lines, ""]
+
+    def _misfit(self) -> list[str]:
+        text, clock = self._text, self._count
+        blocks = error_blocks(text.states, text.states * text.flow.has_momenta, clock)
+        lines = ["@njit(**CONTRACTED)", "def misfit_lanes(lanes, tolerance, span):", "    use_widest_registers()"]
+        values = self._each("STATE"), self._each("TRIAL"), f"{self._each('LENGTHS')}*{self._each('SLOPES')}"
+        lines += [_EACH_NUMBER, f"        _one, _two, _three = {', '.join(f'abs({value})' for value in values)}"]
+        lines += ["        _one = _one if _one > _two else _two"]
+        lines += [f"        {self._each('SIZES')} = _one if _one > _three else _three"]
+        for name, weights in (("FIFTHS", FIFTH), ("THIRDS", THIRD)):
+            lines += [_EACH_NUMBER, f"        {self._each(name)} = abs({self._combined(weights)})"]
+        lines += ["    for lane in range(LANES):", "        _fifth, _third, _broken = 0.0, 0.0, 0.0"]
+        lines += [f"        _reach, _speed = {self._at('SIZES', 0)}, {self._at('SIZES', 1)}"]
+        lines += ["        _least = 0.01*_reach/span", "        _speed = _speed if _speed > _least else _least"]
+        lines += ["        _allowed, _haze = tolerance, 1.0", *(self._rounding() if self._stops else [])]
         lines += [f"        _lapse = _reach/(abs({self._at('TRIAL', 1)}) + _reach/span)"]
         lines += ["        _lapse = _lapse if _lapse < span else span", *self._compare([clock], "_lapse")]
-        for block, rows in sizes.items():
-            if block == 2 and len(sizes) > 3:
-                lines += self._pause()
-            if block > 1:
-                lines += self._size_of("_size", rows)
-            lines += self._compare(rows, ("_reach", "_speed")[block] if block < 2 else "_size")
+        for block in dict.fromkeys(blocks.tolist()):
+            rows = [int(row) for row in np.flatnonzero(blocks == block)]
+            unit = ("_reach", "_speed")[block] if block < 2 else "_unit"
+            lines += _largest("_unit", [self._at("SIZES", row) for row in rows]) if block >= 2 else []
+            if text.curved and rows[0] > 2 * text.states:  # derivatives of the momenta
+                lines += ["        _unit = _unit*_haze"]
+            lines += self._compare(rows, unit)
         return [*lines, *self._error(), ""]
 
     def _rounding(self) -> list[str]:
         """Lines that loosen the tolerance to what the rounding of x allows."""
         lapse = f"abs({self._at('TRIAL', self._count)} - {self._at('STATE', self._count)})"
-        after = f"{self._at('SIDE')}*({self._at('TRIAL')} - {self._at('WALL')})"
         lines = [
             f"_blur = {self._at('GRAIN')}*{lapse}",
             "_allowed = _blur/_speed if _blur > tolerance*_speed else tolerance",
-            f"_depth = {after}",
+            f"_depth = {self._at('SIDE')}*({self._at('TRIAL')} - {self._at('WALL')})",
             f"_depth = _depth if _depth > {self._at('DEPTH')} else {self._at('DEPTH')}",
             f"_haze = 4.0*EPSILON*abs({self._at('STATE')})/_depth",
-            f"{self._at('HAZE')} = _haze/_allowed if _haze > _allowed else 1.0",
+            "_haze = _haze/_allowed if _haze > _allowed else 1.0",
         ]
         return [f"        {line}" for line in lines]
 
-    def _size_of(self, name: str, rows: Iterable[int]) -> list[str]:
-        lines = [f"        {name} = 0.0"]
-        for row in rows:
-            slope = f"{self._at('LENGTH')}*{self._slope(0, row)}"
-            for value in (self._at("STATE", row), self._at("TRIAL", row), slope):
-                lines += [f"        _one = abs({value})", f"        {name} = _one if _one > {name} else {name}"]
-        return lines
-
     def _compare(self, rows: Iterable[int], unit: str) -> list[str]:
         """Lines that raise the two estimates to those of a block of variables, in its unit."""
-        lines = [f"        _unit = {unit} if {unit} > 0.0 else np.inf", "        _a, _b = 0.0, 0.0"]
-        for row in rows:
-            lines += [f"        _broken += {self._at('TRIAL', row)} - {self._at('TRIAL', row)}"]
-            for name, weights in (("_a", FIFTH), ("_b", THIRD)):
-                lines += [f"        _one = abs({self._combined(weights, row)})"]
-                lines += [f"        {name} = _one if _one > {name} else {name}"]
-        if self._curved and 2 * self._text.states < min(rows) < self._count:  # derivatives of the momenta
-            lines += [f"        _unit = _unit*{self._at('HAZE')}"]
-        for name, most in (("_fifth", "_a"), ("_third", "_b")):
-            lines += [f"        {name} = {most}/_unit if {most}/_unit > {name} else {name}"]
+        lines = [f"        _per = {unit} if {unit} > 0.0 else np.inf"]
+        lines += [f"        _broken += {self._at('TRIAL', row)} - {self._at('TRIAL', row)}" for row in rows]
+        for name, estimates in (("_fifth", "FIFTHS"), ("_third", "THIRDS")):
+            lines += _largest("_most", [self._at(estimates, row) for row in rows])
+            lines += [f"        {name} = _most/_per if _most/_per > {name} else {name}"]
         return lines
 
-    def _pause(self) -> list[str]:
-        """Lines between two loops over the lanes, so that none needs too many registers."""
-        kept = (("FIFTHS", "_fifth"), ("THIRDS", "_third"), ("BROKEN", "_broken"), ("ALLOWED", "_allowed"))
-        lines = [f"        {self._at(row)} = {name}" for row, name in kept]
-        lines += ["    for lane in range(LANES):"]
-        return lines + [f"        {name} = {self._at(row)}" for row, name in kept]
-
     def _error(self) -> list[str]:
-        """Lines that combine the estimates, and the factor by which to lengthen the next step."""
+        """Lines that combine the estimates, and the factor by which to lengthen the next step.
+
+        The fifth-order estimate can vanish by chance. In a step that is short enough the error is 0.02 to 0.1 times the
+        square of the third-order one, which is a lower bound.
+        """
         length = self._at("LENGTH")
         lines = [
             "_error = abs(" + length + ")*_fifth*_fifth/sqrt(_fifth*_fifth + 0.01*_third*_third)",
@@ -223,3 +204,9 @@ class AttemptWriter:
             f"{self._at('FACTOR')} = _factor if _factor > 0.15 else (0.15 if _broken == 0.0 else 0.1)",
         ]
         return [f"        {line}" for line in lines]
+
+
+def _largest(name: str, values: list[str]) -> list[str]:
+    first, *others = values
+    lines = [f"        {name} = {first}"]
+    return [*lines, *(f"        {name} = {name} if {name} > {value} else {value}" for value in others)]

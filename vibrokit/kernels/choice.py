@@ -39,8 +39,8 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     """Choose the stepper for many trajectories: RK4 if few steps resolve every contact, otherwise Order8.
 
     Measured on ``hertz-0.570``, Hamilton's equations over five periods, two threads: RK4(256) has a median error of
-    2e-3 at 0.52 µs per trajectory and period, RK4(1024) 2e-4 at 1.7 µs, Order8(1e-6) 4e-7 at 2.7 µs. So located contacts
-    are cheaper wherever RK4 needs more than 1024 steps.
+    2e-3 at 0.52 µs per trajectory and period, RK4(1024) 2e-4 at 1.7 µs, Order8(1e-6) 5e-7 at 3 µs. So located
+    contacts are cheaper wherever RK4 needs more than 1024 steps.
     """
     try:
         steps = _power_of_two(_steps_needed(scene, flow))

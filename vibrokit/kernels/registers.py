@@ -1,7 +1,8 @@
-"""Lets a compiled function use the widest vector registers."""
+"""What a compiled function may assume, so that its loops become vector code."""
 
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -17,6 +18,19 @@ def use_widest_registers(_context: Any) -> Any:
     def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         # llvmlite knows no attributes of this form and refuses them, but writes what its set holds.
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
+@intrinsic
+def promise_no_overlap(_context: Any) -> Any:
+    """Promise that what the function that calls this writes by one of its pointers, it reads by no other."""
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        for argument in builder.function.args[2:]:  # after those for the result and for exceptions
+            if isinstance(argument.type, ir.PointerType):
+                argument.add_attribute("noalias")
         return context.get_dummy_value()
 
     return types.void(), generate
