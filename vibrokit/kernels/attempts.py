@@ -18,7 +18,7 @@ from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHT
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
-_FEW_EQUATIONS = 8
+_LANES = 8  # those of one register; more were not faster, and fewer trajectories would fill them
 _EACH_NUMBER = "    for _k in range((EQUATIONS + 1)*LANES):"
 _IMPORTS = (
     "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers",
@@ -38,8 +38,6 @@ class AttemptWriter:
         self._text = text
         self._count = len(text.variables)
         self._stops = text.barriers
-        # Few enough lanes that their numbers stay in the nearest cache.
-        self._lanes = 16 if self._count <= _FEW_EQUATIONS else 8
         size = self._count + 1  # with the time
         rows = {"STATE": size, "TRIAL": size, "LENGTH": 1, "ERROR": 1, "FACTOR": 1}
         rows |= {"LENGTHS": size, "POINT": size, "SLOPES": STAGES * size, "SIZES": size, "FIFTHS": size, "THIRDS": size}
@@ -49,23 +47,23 @@ class AttemptWriter:
         self._places, self._numbers = {}, 0
         for name, height in rows.items():
             self._places[name] = self._numbers
-            self._numbers += height * self._lanes
+            self._numbers += height * _LANES
 
     def text(self) -> list[str]:
         """The pieces: offsets, slopes, attempt, misfit."""
         offsets = [f"{name} = {place}" for name, place in self._places.items()]
-        head = [*_IMPORTS, "", f"LANES = {self._lanes}", f"NUMBERS = {self._numbers}", *offsets, ""]
+        head = [*_IMPORTS, "", f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", *offsets, ""]
         return ["\n".join(lines) for lines in (head, self._slopes(), self._attempt(), self._misfit())]
 
     def _at(self, name: str, row: int | str = 0) -> str:
         """Text of the number of a lane in a row of a block of rows; a row may be text, such as ``e``."""
         if isinstance(row, int):
-            return f"lanes[{self._places[name] + row * self._lanes} + lane]"
+            return f"lanes[{self._places[name] + row * _LANES} + lane]"
         return f"lanes[{self._places[name]} + {row}*LANES + lane]"
 
     def _each(self, name: str, stage: int = 0) -> str:
         """Text of the number `_k` of a block of rows for all variables."""
-        return f"lanes[{self._places[name] + stage * (self._count + 1) * self._lanes} + _k]"
+        return f"lanes[{self._places[name] + stage * (self._count + 1) * _LANES} + _k]"
 
     def _combined(self, weights: NDArray[np.float64]) -> str:
         """Text of the weighted slopes; empty if all weights are 0."""
@@ -93,7 +91,7 @@ class AttemptWriter:
         lines += [f"        {', '.join(slopes)} = rates({', '.join(values)})"]
         weight = "_weight*" if self._stops else ""
         rates = [*(f"{weight}{slope}" for slope in slopes), "_weight" if self._stops else "1.0"]
-        lines += [f"        slopes[{row * self._lanes} + lane] = {rate}" for row, rate in enumerate(rates)]
+        lines += [f"        slopes[{row * _LANES} + lane] = {rate}" for row, rate in enumerate(rates)]
         return [*lines, ""]
 
     def _on_course(self) -> list[str]:
@@ -124,7 +122,7 @@ class AttemptWriter:
         lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
         lines += [f"            {self._at('LENGTHS', '_e')} = {self._at('LENGTH')}"]
         for stage in range(STAGES):
-            node, place = float(NODES[stage]), self._places["SLOPES"] + stage * (self._count + 1) * self._lanes
+            node, place = float(NODES[stage]), self._places["SLOPES"] + stage * (self._count + 1) * _LANES
             lines += self._moved("POINT", WEIGHTS[stage])
             lines += [f"    slopes_lanes({node!r}, lanes, offset_by(lanes, {place}), theta)"]
             if self._text.curved:

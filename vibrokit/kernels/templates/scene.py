@@ -25,13 +25,14 @@ ORDER, TERMS = 22, 23
 DERIVATIVES = 0
 COVARIANCE = 0
 
-LANES = 16
-STATE, TRIAL = 0, 96  # states (z, t) before and after an attempt, each number in a row of lanes
-LENGTH, ERROR, FACTOR = 192, 208, 224  # of the attempt; its error by the tolerance; by what to lengthen the next
-SIGMA, COURSE, WALL, SIDE, PUSHES = 240, 256, 272, 288, 304  # the course, and the stops
-GRAIN, DEPTH, HAZE, NEAR = 336, 352, 368, 384  # rounding of x at a stop
-SLOPES, POINT = 400, 1552  # at the stages, and the point of a stage
-NUMBERS = 1648
+LANES = 8
+STATE, TRIAL = 0, 48  # states (z, t) before and after an attempt, each number in a row of lanes
+LENGTH, ERROR, FACTOR = 96, 104, 112  # of the attempt; its error by the tolerance; by what to lengthen the next
+LENGTHS, POINT, SLOPES = 120, 168, 216  # for each number; the point of a stage, and the slopes at all stages
+SIZES, FIFTHS, THIRDS = 792, 840, 888  # of the numbers, and of two estimates of their errors
+SIGMA, COURSE, WALL, SIDE, PUSHES = 936, 944, 952, 960, 968  # the course, and the stops
+GRAIN, DEPTH, NEAR = 984, 992, 1000  # rounding of x at a stop
+NUMBERS = 1008
 
 
 @njit(**INLINED)
@@ -81,7 +82,7 @@ def misfit_lanes(lanes, tolerance, span):
 
     Each block is measured by its own size; a velocity near 0 by a hundredth of x over `span`, the time to integrate
     over. No step must be more accurate than the rounding of x allows: GRAIN is the uncertainty of the acceleration
-    from it, HAZE the relative one of the second derivative of a law, which affects only derivatives of the momenta.
+    from it, HAZE in the code the relative one of the second derivative of a law, which affects only derivatives of the momenta.
 
     The fifth-order estimate can vanish by chance. In a step that is short enough the error is 0.02 to 0.1 times the
     square of the third-order one, which is a lower bound.
