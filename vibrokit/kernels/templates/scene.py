@@ -82,7 +82,7 @@ def misfit_lanes(lanes, tolerance, span):
 
     Each block is measured by its own size; a velocity near 0 by a hundredth of x over `span`, the time to integrate
     over. No step must be more accurate than the rounding of x allows: GRAIN is the uncertainty of the acceleration
-    from it, HAZE in the code the relative one of the second derivative of a law, which affects only derivatives of the momenta.
+    from it. So is that of the second derivative of a law, which affects only derivatives of the momenta.
 
     The fifth-order estimate can vanish by chance. In a step that is short enough the error is 0.02 to 0.1 times the
     square of the third-order one, which is a lower bound.
