@@ -4,8 +4,7 @@ The argument is reduced by π/2 in three parts (Cody & Waite), exactly for |x| b
 Methods and Programs for Mathematical Functions, 1989); the error is below 2 units in the last place of 1.
 """
 
-from math import floor
-
+import numpy as np
 from numba import njit
 
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "forceinline": True}
@@ -20,13 +19,13 @@ _C4, _C5, _C6 = -2.75573141792967388112e-7, 2.08757008419747316778e-9, -1.135853
 @njit(**_OPTIONS)
 def _wave(x: float, ahead: float) -> float:
     """Return sin(x + ahead π/2) for a whole number `ahead`."""
-    quarters = float(floor(x * _PER_QUARTER + 0.5))
+    quarters = np.floor(x * _PER_QUARTER + 0.5)
     r = ((x - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
     z = r * r
     odd = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
     even = 1.0 - 0.5 * z + z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
     turned = quarters + ahead
-    turn = turned - 4.0 * floor(turned * 0.25)
+    turn = turned - 4.0 * np.floor(turned * 0.25)
     value = even if turn == 1.0 or turn == 3.0 else odd
     return -value if turn > 1.5 else value
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import xarray
 
+from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.graph.hierarchy import PATH_FACTOR, HierarchySearch, TargetEstimate
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.potential import Potential
@@ -195,6 +196,17 @@ class GraphSearch:
             except StructureError:  # on few nodes, no exit may be reached
                 if nodes == self.nodes:
                     raise
+
+    def beginnings(
+        self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
+    ) -> tuple[Candidate, ...]:
+        """Return candidates that begin otherwise than a known path, on two thirds of the nodes of a solution."""
+        nx, nv = solved.potential.grids.shape
+        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+        nodes = max(_FEWEST_NODES, 2 * nx // 3), max(_FEWEST_NODES, 2 * nv // 3)
+        return beginnings(
+            problem, HierarchySearch(problem, model, self._affordable_steps(problem.scene), nodes), energy
+        )
 
     def _refinements(self) -> Iterator[tuple[int, int]]:
         """Numbers of nodes from few to those that are set, each twice the one before."""

@@ -1,0 +1,48 @@
+"""Other beginnings of a known exit path, from the graph on a grid that covers no more than its beginning."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from vibrokit.analyzers.graph.hierarchy import HierarchySearch
+from vibrokit.analyzers.graph.targets import StateTarget
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.energy import ActivationEnergy, ExitPath
+
+_SHARE = 0.3  # of the action, that the beginning takes
+_LEAST = 1e-3  # of the action: a shorter one lies where the linearized equations hold
+
+
+def beginnings(problem: ExitProblem, search: HierarchySearch, energy: ActivationEnergy) -> tuple[Candidate, ...]:
+    """Return paths that differ from a known one up to a state on the section, where it has spent a third of its action.
+
+    While it spirals away from the attractor, an impact more or less changes the action of a path by parts of a
+    thousand, which a grid that holds the whole path cannot tell. On ``hertz-0.570``, leaving the hammering state, 240
+    nodes along each side of the beginning's own grid find the cheaper of two such paths, and 180 do not.
+
+    None are returned for a path without a beginning on the section. Raises StructureError as the search does.
+    """
+    path = energy.path
+    if path is None or not len(path.section):
+        return ()
+    spent = path.action[path.section] / path.action[-1]
+    early = np.flatnonzero(spent <= _SHARE)
+    if not early.size or spent[early[-1]] < _LEAST:
+        return ()
+    start = int(path.section[early[-1]])
+    known = float(path.action[start])
+    target = StateTarget(energy.target, energy.saddle, known, path.q[start, :2][None])
+    estimates, _ = search.estimates((target,), search.finest)
+    return tuple(_continued(found, path, start, energy.value - known) for found in estimates[target].candidates)
+
+
+def _continued(found: Candidate, path: ExitPath, start: int, rest: float) -> Candidate:
+    """The same path, which goes on along a known one."""
+    step = found.times[1] - found.times[0]
+    every = round(step / (path.t[1] - path.t[0]))
+    states = np.concatenate([found.states, path.q[start + every :: every, :2]])
+    times = step * np.arange(len(states), dtype=float)
+    return dataclasses.replace(found, times=times, states=states, action=found.action + rest)
