@@ -15,8 +15,8 @@ _SPELLED = {"lambda": "lamda"}  # the spelling of SymPy; lambda is a Python keyw
 # that a parameter with such a name gets one.
 _IN_CODE = re.compile(
     r"(?!.*_$)(_.*|[xvtzfhS]|[A-Z]{3,}|[pm]_\d+|[CUW]\d+(_\w+)?|k\d_\w+|f\d|(even|odd|rate)\d*|depth|other|nearer|side"
-    r"|touching|pushing|lanes?|on\d+|theta|out|series|once|share|product|first|second|later|half|size|start|table|room|parameters|options"
-    r"|rates|excitation|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|extrapolate|step_lanes|kick_\w+|record|advance"
+    r"|touching|pushing|lanes?|on\d+|theta|out|series|once|share|product|first|second|later|half|size|start|table|node|slopes"
+    r"|rates|excitation|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
     r"|njit|np|min|max|abs|range|sign|a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
 )
 

@@ -120,7 +120,9 @@ def advance(
     y = room
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
     count, waiting, active = states.shape[0], 0, 0
-    holder, done = np.full(LANES, -1, dtype=np.int64), np.zeros(LANES, dtype=np.int64)
+    holder, done = np.zeros(LANES, dtype=np.int64), np.zeros(LANES, dtype=np.int64)
+    for lane in range(LANES):  # compiles faster than np.full
+        holder[lane] = -1
     while waiting < count or active > 0:
         for lane in range(LANES):
             own, pushed = offset_by(room, MEMORIES + lane * MEMORY), offset_by(pushing, lane * max(BARRIERS, 1))
