@@ -1,0 +1,52 @@
+"""Other beginnings of a known path: on a forced double well they are the same path, since no other competes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.graph.beginnings import beginnings
+from vibrokit.analyzers.graph.hierarchy import HierarchySearch
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.problem import ExitProblem
+
+OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
+GRAPH = vk.GraphSearch(nodes=(60, 60), steps_per_period=8)
+
+
+@pytest.fixture(scope="module")
+def problem():
+    structure = vk.find_structure(OSC, cells=(20, 20), starts=(8, 8), manifolds=False)
+    return ExitProblem(OSC, structure, structure.attractors[0], vk.LeaveBasin())
+
+
+@pytest.fixture(scope="module")
+def energy(problem):
+    (found,) = vk.LeastAction(graph=GRAPH, shooting=None, source=0).run(OSC, problem.structure).energies
+    return found
+
+
+@pytest.fixture(scope="module")
+def search(problem):
+    model = StepModel(problem.scene, vk.RK4(256))
+    return HierarchySearch(problem, model, (8,), (60, 60))
+
+
+def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, energy):
+    found = beginnings(problem, search, energy)
+    assert found
+    for candidate in found:
+        speed = np.abs(np.diff(energy.path.q[:, :2], axis=0)).max(axis=0) * 128 / 8
+        assert (np.abs(candidate.states[-1] - energy.path.q[-1, :2]) <= speed).all()
+        np.testing.assert_allclose(np.diff(candidate.times), candidate.times[1])
+        assert candidate.action == pytest.approx(energy.value, rel=0.05)
+
+
+def test_none_without_a_path(problem, search, energy):
+    assert beginnings(problem, search, dataclasses.replace(energy, path=None)) == ()
+
+
+def test_none_for_a_path_that_spends_its_action_at_once(problem, search, energy):
+    path = dataclasses.replace(energy.path, section=energy.path.section[-1:])
+    assert beginnings(problem, search, dataclasses.replace(energy, path=path)) == ()
