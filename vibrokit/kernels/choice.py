@@ -27,7 +27,9 @@ _STEPS = 256
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
-_TOLERANCE, _ENSEMBLE_TOLERANCE = 1e-10, 1e-6
+_TOLERANCE = 1e-10
+LOCATED = Order8(1e-6)
+"""For ensembles, wherever fixed steps would be too many."""
 _PACKAGE = str(Path(__file__).parents[1])
 
 
@@ -45,13 +47,13 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
     try:
         steps = _power_of_two(_steps_needed(scene, flow))
     except StepperError:  # not a flow that fixed steps can follow
-        return Order8(_ENSEMBLE_TOLERANCE)
+        return LOCATED
     if flow is Flow.HAMILTONIAN_VARIATIONAL and scene.barriers and kernel_for(scene, flow, RK4()).module.BENDS:
-        return Order8(_ENSEMBLE_TOLERANCE)  # fixed steps have its derivatives where p = 0 only
+        return LOCATED  # fixed steps have its derivatives where p = 0 only
     turns = max(1.0, _turns(scene))
     if flow is Flow.NOISY:  # if these are too few, integration warns
         return RK4(min(steps, int(_MOST_NOISY_STEPS * turns)))
-    return RK4(steps) if steps <= _MOST_STEPS * turns else Order8(_ENSEMBLE_TOLERANCE)
+    return RK4(steps) if steps <= _MOST_STEPS * turns else LOCATED
 
 
 def single_stepper(scene: Scene, flow: Flow) -> Stepper:

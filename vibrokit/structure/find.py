@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.choice import ensemble_stepper, single_stepper
+from vibrokit.kernels.choice import LOCATED, ensemble_stepper, single_stepper
 from vibrokit.kernels.named import name_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
@@ -40,7 +40,7 @@ _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
 _SEARCH_SETTLING = 1e-3
-_MOST_STEPS = 8192  # above this, locating contacts is as fast
+_MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
 
 Array = NDArray[np.float64]
 
@@ -169,7 +169,7 @@ class _Finder:
         if self.request.stepper is not None or not isinstance(self.stepper, RK4):
             return self.stepper
         finer = self.stepper.refined().refined()
-        return finer if finer.steps <= _MOST_STEPS else self.orbit_stepper
+        return finer if finer.steps <= _MOST_STEPS else LOCATED
 
     def _find_attractors(self) -> None:
         """Search from a grid of starts, and choose a stepper with which every attractor persists."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, run_ensemble
-from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
@@ -36,7 +35,6 @@ _LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
 _FIRST_ROUND = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for a long time
-_LEAST_WATCHED = 16
 _WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent
 _LEAST_MEASURED = 1000  # periods
@@ -87,11 +85,6 @@ class Search:
             elif patient or self.attractors:
                 self._watch(states)
             report(self.starts)
-
-    @property
-    def _many(self) -> int:
-        """Number of starts that are followed for a long time: fewer for steppers without lanes."""
-        return _WATCHED if isinstance(self.stepper, FixedSteps) else _LEAST_WATCHED
 
     def _follow(self, states: Array, periods: int, stepper: Stepper) -> tuple[Ensemble, NDArray[np.int64]]:
         """Follow states until they reach a known attractor, or for some periods."""
@@ -173,7 +166,7 @@ class Search:
 
     def _watch(self, states: Array) -> None:
         """Distinguish long transients from motion that never settles, by its survival at two accuracies."""
-        watched = states[np.linspace(0, len(states) - 1, min(self._many, len(states))).astype(int)]
+        watched = states[np.linspace(0, len(states) - 1, min(_WATCHED, len(states))).astype(int)]
         survivors = watched[:0]
         for stepper in (self.stepper, self.stepper.refined()):
             ended, labels = self._follow(watched, _WATCH, stepper)
