@@ -34,7 +34,7 @@ def starts_near(point, flow, count):
     states = [point + 1e-2 * rng.standard_normal((count, n))]
     if flow.has_momenta:
         states += [1e-3 * rng.standard_normal((count, n)), np.zeros((count, 1))]
-    if flow.has_derivatives:
+    if flow in (Flow.STATE_VARIATIONAL, Flow.HAMILTONIAN_VARIATIONAL):
         size = 2 * n if flow.has_momenta else n
         states += [np.broadcast_to(np.eye(size).ravel(), (count, size**2))]
     return np.hstack(states)

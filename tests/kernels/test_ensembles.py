@@ -347,3 +347,10 @@ def test_a_misspelt_condition_is_refused():
     assert _fitting(text, {"forced": True, "noisy": False}) == "x = 1\ny = 2  # of two words\n"
     with pytest.raises(ValueError, match="z = 3  # noisi"):
         _fitting(text.replace("noisy", "noisi"), {"forced": True, "noisy": False})
+
+
+@pytest.mark.parametrize("flow", [Flow.STATE, Flow.HAMILTONIAN_VARIATIONAL], ids=lambda flow: flow.value)
+def test_states_of_another_flow_are_refused(flow):
+    """A kernel would read and write beyond them."""
+    with pytest.raises(ValueError, match=r"shape \(count, \d+\), got \(3, 5\)"):
+        run_ensemble(impacting(), flow, RK, np.zeros((3, 5)))

@@ -141,10 +141,17 @@ def run_ensemble(
     Returns
     -------
     Ensemble
+
+    Raises
+    ------
+    ValueError
+        The states do not have the layout of the flow.
     """
     kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
-    starts = np.ascontiguousarray(states, dtype=float)
+    starts, equations = np.ascontiguousarray(states, dtype=float), kernel.module.EQUATIONS
+    if starts.ndim != 2 or starts.shape[1] != equations:  # a kernel would read and write beyond the array
+        raise ValueError(f"states of the {flow.value} flow have shape (count, {equations}), got {starts.shape}.")
     budgets, begun = (np.broadcast_to(numbers, len(starts)) for numbers in (budget, phases))
     span = scene.section_interval if interval is None else interval
     common = (theta_of(scene), start_time, span, np.array(stepper.settings(scene, span)))
