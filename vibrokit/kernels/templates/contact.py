@@ -38,6 +38,7 @@ from vibrokit.kernels.templates.scene import (
 )
 from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_of, settle
 from vibrokit.kernels.templates.steps import (
+    AIM,
     CLOCK,
     CONTACT_STEP,
     END,
@@ -49,6 +50,7 @@ from vibrokit.kernels.templates.steps import (
     PULLED,
     ROOT_DEPTH,
     ROOT_TIME,
+    ROW,
     SINCE,
     SPAN,
     TAKEN,

@@ -17,11 +17,12 @@ from vibrokit.kernels.templates.scene import (
     ORDER,
     SIDES,
     STATE,
+    TERMS,
     flight_rate,
     stop,
     taylor,
 )
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, TASK, UNDERWAY, put, take
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, SERIES, TASK, UNDERWAY, put, take
 
 # --- scene above, stepper below ---
 

@@ -15,6 +15,7 @@ from vibrokit.kernels.templates.steps import (
     INNER,
     LOW,
     RISING,
+    ROW,
     SHORTER,
     TASK,
     TIME,

@@ -29,6 +29,7 @@ from vibrokit.kernels.templates.scene import (
     SIDES,
     SIGMA,
     STATE,
+    TERMS,
     TRIAL,
     WALL,
     rhs,
@@ -56,7 +57,7 @@ MEMORY = 25
 ROW = CLOCK + 1
 MEMORIES = 5 * ROW
 SERIES = MEMORIES + LANES * MEMORY
-ROOM = SERIES + 24 * EQUATIONS
+ROOM = SERIES + TERMS * EQUATIONS
 ZERO = 0.0  # for int(ZERO), an integer that is no constant
 EPSILON = 2.220446049250313e-16
 LEAST_DEPTH = 64.0 * EPSILON
