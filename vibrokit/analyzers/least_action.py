@@ -183,7 +183,7 @@ class _Work:
         if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.is_fixed:
             return
         least: dict[int, ActivationEnergy] = {}
-        for branch in sorted(self._polished()[0], key=lambda branch: branch.value):
+        for branch in self._polished()[0]:  # the cheapest first
             least.setdefault(branch.target, branch)
         for branch in least.values():
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid

@@ -55,11 +55,9 @@ class AttemptWriter:
         head = [*_IMPORTS, "", f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", *offsets, ""]
         return ["\n".join(lines) for lines in (head, self._slopes(), self._attempt(), self._misfit())]
 
-    def _at(self, name: str, row: int | str = 0) -> str:
-        """Text of the number of a lane in a row of a block of rows; a row may be text, such as ``e``."""
-        if isinstance(row, int):
-            return f"lanes[{self._places[name] + row * _LANES} + lane]"
-        return f"lanes[{self._places[name]} + {row}*LANES + lane]"
+    def _at(self, name: str, row: int = 0) -> str:
+        """Text of the number of a lane in a row of a block of rows."""
+        return f"lanes[{self._places[name] + row * _LANES} + lane]"
 
     def _each(self, name: str, stage: int = 0) -> str:
         """Text of the number `_k` of a block of rows for all variables."""
@@ -120,7 +118,7 @@ class AttemptWriter:
     def _attempt(self) -> list[str]:
         lines = ["@njit(**CONTRACTED)", "def attempt_lanes(lanes, theta, pushing, room):", "    use_widest_registers()"]
         lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
-        lines += [f"            {self._at('LENGTHS', '_e')} = {self._at('LENGTH')}"]
+        lines += ["            lanes[LENGTHS + _e*LANES + lane] = lanes[LENGTH + lane]"]
         for stage in range(STAGES):
             node, place = float(NODES[stage]), self._places["SLOPES"] + stage * (self._count + 1) * _LANES
             lines += self._moved("POINT", WEIGHTS[stage])

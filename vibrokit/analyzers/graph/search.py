@@ -185,11 +185,9 @@ class GraphSearch:
                 f"{attractor.name} lies outside the region of the structure, which is all that the graph covers; find "
                 "the structure on a wider region."
             )
-        steps = self._affordable_steps(problem.scene)
         with stage("exit targets", subject=attractor.name):
-            model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-            targets = exit_targets(problem, model)
-        search = HierarchySearch(problem, model, steps, self.nodes)
+            search = self._hierarchies(problem, self.nodes)
+            targets = exit_targets(problem, search.model)
         for nodes in self._refinements():
             try:
                 yield from _solutions(problem, search, targets, nodes)
@@ -202,11 +200,14 @@ class GraphSearch:
     ) -> tuple[Candidate, ...]:
         """Return candidates that begin otherwise than a known path, on two thirds of the nodes of a solution."""
         nx, nv = solved.potential.grids.shape
-        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
         nodes = max(_FEWEST_NODES, 2 * nx // 3), max(_FEWEST_NODES, 2 * nv // 3)
-        return beginnings(
-            problem, HierarchySearch(problem, model, self._affordable_steps(problem.scene), nodes), energy
-        )
+        return beginnings(problem, self._hierarchies(problem, nodes), energy)
+
+    def _hierarchies(self, problem: ExitProblem, finest: tuple[int, int]) -> HierarchySearch:
+        """What solves hierarchies of up to so many nodes."""
+        steps = self._affordable_steps(problem.scene)
+        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+        return HierarchySearch(problem, model, steps, finest)
 
     def _refinements(self) -> Iterator[tuple[int, int]]:
         """Numbers of nodes from few to those that are set, each twice the one before."""

@@ -14,10 +14,7 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
 from vibrokit.kernels.templates.landing import (
     DEPTH_GOAL,
-    FLIPS,
     LAW_GOAL,
-    RELEASES,
-    STEPS,
     depth_at,
     land,
 )
@@ -45,14 +42,17 @@ from vibrokit.kernels.templates.steps import (
     EPSILON,
     FIRST,
     FIRST_STEP,
+    FLIPS,
     INNER,
     LAST,
     PULLED,
+    RELEASES,
     ROOT_DEPTH,
     ROOT_TIME,
     ROW,
     SINCE,
     SPAN,
+    STEPS,
     TAKEN,
     TASK,
     TIME,
@@ -81,9 +81,8 @@ def press(i, lane, memory, pushing, theta, settings, lanes, room):
     last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
     length = length_of(course, sigma, remaining if last else memory[CONTACT_STEP], rate)
     depth = max(depth_at(STATE, i, lane, lanes, theta), 1e-30)
-    memory[LAST], memory[TASK] = 1.0 if last else 0.0, STEPS
-    plan(course, sigma, length, grain_of(i, depth, x, rate, theta), depth, lane, memory, lanes)
-    return ask(length, lane, memory, settings, lanes)
+    grain = grain_of(i, depth, x, rate, theta)
+    return plan(course, sigma, length, last, grain, depth, lane, memory, settings, lanes)
 
 
 @njit(**INNER)
@@ -137,7 +136,7 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
             return COMPLETED
     elif memory[PULLED] == 0.0 and not tiny and leaves(i, then - now, lane, lanes, theta):
         return ask(0.5 * length, lane, memory, settings, lanes)
-    if memory[LAST] > 0.0 and length != memory[FIRST]:
+    if length != memory[FIRST]:
         memory[LAST] = 0.0
     memory[FIRST], memory[TAKEN] = length, lanes[FACTOR + lane]
     if SOME_CLAMPED:

@@ -10,7 +10,7 @@ from numba import njit
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
-from vibrokit.kernels.templates.landing import STEPS, landed
+from vibrokit.kernels.templates.landing import landed
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
     EQUATIONS,
@@ -22,7 +22,7 @@ from vibrokit.kernels.templates.scene import (
     stop,
     taylor,
 )
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, SERIES, TASK, UNDERWAY, put, take
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, SERIES, STEPS, TASK, UNDERWAY, put, take
 
 # --- scene above, stepper below ---
 

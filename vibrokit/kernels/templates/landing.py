@@ -30,8 +30,6 @@ from vibrokit.kernels.templates.steps import (
 # --- scene above, stepper below ---
 
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0.0, 1.0, 2.0
-# What a lane is about; the latter four land, and say what follows.
-STEPS, TOUCHES, TURNS, FLIPS, RELEASES = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @njit(**INNER)

@@ -8,11 +8,7 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import (
     DEPTH_GOAL,
-    FLIPS,
     RATE_GOAL,
-    STEPS,
-    TOUCHES,
-    TURNS,
     depth_at,
     land,
     landed,
@@ -24,14 +20,18 @@ from vibrokit.kernels.templates.steps import (
     END,
     EPSILON,
     FIRST,
+    FLIPS,
     FREE_STEP,
     INNER,
     LAST,
     SPAN,
+    STEPS,
     TAKEN,
     TASK,
     TIME,
     TOUCHED,
+    TOUCHES,
+    TURNS,
     UNDERWAY,
     WHOLE,
     accept,
@@ -51,10 +51,8 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
     """Ask for a step of the free motion."""
     remaining = memory[END] - of(STATE, CLOCK, lane, lanes)
     last = memory[FREE_STEP] >= 0.99 * remaining
-    memory[LAST], memory[TASK] = 1.0 if last else 0.0, STEPS
     length = remaining if last else memory[FREE_STEP]
-    plan(TIME, 0.0, length, 0.0, np.inf, lane, memory, lanes)
-    return ask(length, lane, memory, settings, lanes)
+    return plan(TIME, 0.0, length, last, 0.0, np.inf, lane, memory, settings, lanes)
 
 
 @njit(**INNER)

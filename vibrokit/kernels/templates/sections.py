@@ -185,24 +185,25 @@ def record(state, parameters, start_time, spacing, options, out):
     numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
     lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
     theta, settings = pointer_to(parameters), pointer_to(options)
+    lane = int(ZERO)
     own, y, samples = offset_by(room, MEMORIES), room, out.shape[0]
     span = spacing * (samples - 1)
     for e in range(EQUATIONS):
         out[0, e] = y[e] = state[e]
     y[CLOCK] = start_time
-    begin(y, span, int(ZERO), own, pushing, theta, settings, lanes, room)
+    begin(y, span, lane, own, pushing, theta, settings, lanes, room)
     sample, status = 1, COMPLETED
     while sample < samples and status == COMPLETED:
         travel(start_time + sample * spacing, own)
-        status = proceed(COMPLETED, int(ZERO), own, pushing, theta, settings, lanes, room)
+        status = proceed(COMPLETED, lane, own, pushing, theta, settings, lanes, room)
         while status == UNDERWAY:
             attempt_lanes(lanes, theta, pushing, room)
             misfit_lanes(lanes, settings[0], abs(span))
-            status = judge(int(ZERO), own, pushing, theta, settings, lanes, room)
-            status = proceed(status, int(ZERO), own, pushing, theta, settings, lanes, room)
+            status = judge(lane, own, pushing, theta, settings, lanes, room)
+            status = proceed(status, lane, own, pushing, theta, settings, lanes, room)
         if status == COMPLETED:
             for e in range(EQUATIONS):
-                out[sample, e] = of(STATE, e, int(ZERO), lanes)
+                out[sample, e] = of(STATE, e, lane, lanes)
             sample += 1
     keep_alive(numbers, switches)
     return sample

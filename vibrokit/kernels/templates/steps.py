@@ -53,6 +53,8 @@ FIRST, LAST, BEFORE, MISSES = 10, 11, 12, 13
 # bracket, the length and the value before, whether the value rises, and the number of attempts.
 TASK, GOAL, AIM, WHOLE, TAKEN, LOW, HIGH, SHORTER, VALUE, RISING, TRIES = 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24
 MEMORY = 25
+# The tasks: to take steps, or to land on an event, which says what follows.
+STEPS, TOUCHES, TURNS, FLIPS, RELEASES = 0.0, 1.0, 2.0, 3.0, 4.0
 # Room beside the numbers of the lanes: a state, rows for slopes that events work in, the memories, and a series.
 ROW = CLOCK + 1
 MEMORIES = 5 * ROW
@@ -98,16 +100,6 @@ def of(offset, e, lane, lanes):
 
 
 @njit(**INNER)
-def plan(course, sigma, length, grain, depth, lane, memory, lanes):
-    """Ask for the first attempt of a step: `grain` and `depth` are those of a contact, 0 and infinite in flight."""
-    memory[FIRST], memory[BEFORE], memory[MISSES] = length, np.inf, 0.0
-    lanes[LENGTH + lane] = length
-    if BARRIERS > 0:
-        lanes[COURSE + lane], lanes[SIGMA + lane] = course, sigma
-        lanes[GRAIN + lane], lanes[DEPTH + lane] = grain, depth
-
-
-@njit(**INNER)
 def ask(length, lane, memory, settings, lanes):
     """Ask for an attempt of this length; no more than a number of attempts are allowed."""
     memory[COUNT] += 1.0
@@ -115,6 +107,20 @@ def ask(length, lane, memory, settings, lanes):
         return STALLED
     lanes[LENGTH + lane] = length
     return UNDERWAY
+
+
+@njit(**INNER)
+def plan(course, sigma, length, last, grain, depth, lane, memory, settings, lanes):
+    """Ask for the first attempt of a step; `last` is whether the step is to reach the end.
+
+    `grain` and `depth` are those of a contact, 0 and infinite in flight.
+    """
+    memory[TASK], memory[LAST] = STEPS, 1.0 if last else 0.0
+    memory[FIRST], memory[BEFORE], memory[MISSES] = length, np.inf, 0.0
+    if BARRIERS > 0:
+        lanes[COURSE + lane], lanes[SIGMA + lane] = course, sigma
+        lanes[GRAIN + lane], lanes[DEPTH + lane] = grain, depth
+    return ask(length, lane, memory, settings, lanes)
 
 
 @njit(**INNER)
