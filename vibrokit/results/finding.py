@@ -96,6 +96,12 @@ class Code(StrEnum):
     CELLS_NOT_FOLLOWED = (
         "cells-not-followed", WARNING, "{fraction:.2%} of the cells were not followed.", "Run it again with more time.",
     )  # fmt: skip
+    COARSE_GRID = (
+        "coarse-grid", INFO,
+        "The basins have {nx} × {nv} cells: transients are long, and a finer grid would take some {sections:.1e} "
+        "sections.",
+        "Give cells for a finer one.",
+    )  # fmt: skip
     SADDLES = "saddles", INFO, "Unstable orbits on basin boundaries: {count}."
     BOUNDARIES_SKIPPED = (
         "boundaries-skipped", WARNING,

@@ -18,7 +18,6 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, stage, working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import NOT_FOLLOWED, Basins
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
@@ -27,7 +26,7 @@ from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.basins.grid import BasinGrid, cell_findings, with_fractions
+from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
 from vibrokit.structure.scales import frame_of, lies_in, search_region, states_at
@@ -49,7 +48,7 @@ def find_structure(
     osc: Oscillator,
     *,
     region: Any = None,
-    cells: tuple[int, int] = (200, 200),
+    cells: tuple[int, int] | None = None,
     refine: int = 0,
     margin: int | None = 2,
     starts: tuple[int, int] = (24, 24),
@@ -66,8 +65,9 @@ def find_structure(
     """Find the steady states of the noise-free system, their basins, the saddles between them and their manifolds.
 
     Starts on a grid are followed until they recur; each orbit is refined by Newton's method on the variational
-    equations. Motion that does not recur is followed for 20000 periods at two accuracies of integration, and is an
-    attractor only if it survives both; its largest Lyapunov exponent determines its kind. Basins are found on a grid,
+    equations. Motion that does not recur is watched at two accuracies of integration, and is an attractor only if it
+    survives both; its largest Lyapunov exponent determines its kind. The watch ends when the survivors together have
+    gone on for 200000 periods since the last start settled, or after 20000 periods. Basins are found on a grid,
     saddles by tracking the basins' boundaries, manifolds from the saddles.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If no attractor
@@ -78,8 +78,9 @@ def find_structure(
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them.
-    cells : (int, int)
-        Cells of the basin grid in x and v.
+    cells : (int, int), optional
+        Cells of the basin grid in x and v. By default 200 × 200; 100 × 100 or 50 × 50 where transients are so long that
+        the finer grid would take more than 10⁷ sections.
     refine : int
         How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional
@@ -143,7 +144,7 @@ class _Finder:
             osc, _SEARCH_SETTLING * self.searched.size, self._search_stepper(), self.orbit_stepper, executor
         )
         self.attractors: tuple[Attractor, ...] = ()
-        self.basins: Basins | None = None
+        self.grid: BasinGrid | None = None
         self.saddle_search: SaddleSearch | None = None
         self.manifolds: tuple[Manifold, ...] = ()
         self.without_manifolds: list[Finding] = []
@@ -213,18 +214,18 @@ class _Finder:
     def _find_basins(self) -> None:
         """Classify every cell of the grid, and set the basin fraction of each attractor."""
         request = self.request
-        grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
+        self.grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
         try:
-            grid.fill()
+            self.grid.fill()
         finally:
-            self.basins = grid.basins
-            self.attractors = with_fractions(self.attractors, self.basins)
+            self.attractors = with_fractions(self.attractors, self.grid.basins)
 
     def _find_saddles(self) -> None:
         """Track the boundaries between basins to the saddles on them."""
-        assert self.basins is not None
-        classifier = self.classifier.sharing(self.basins, self.request.margin or 2)
-        self.saddle_search = SaddleSearch(classifier, self.basins, self.orbit_stepper)
+        assert self.grid is not None
+        basins = self.grid.basins
+        classifier = self.classifier.sharing(basins, self.request.margin or 2)
+        self.saddle_search = SaddleSearch(classifier, basins, self.orbit_stepper)
         self.saddle_search.run(self.rng)
 
     def _grow_manifolds(self) -> None:
@@ -248,14 +249,13 @@ class _Finder:
 
     def structure(self, work: Work) -> Structure:
         """Return the record of all that was found."""
-        basins, saddles = self.basins, self.saddle_search
-        if basins is None:
-            basins = Basins(self.frame, np.full(self.request.cells, NOT_FOLLOWED, dtype=np.int16))
+        saddles = self.saddle_search
+        grid = self.grid or BasinGrid(self.classifier, self.request.cells)
         return Structure(
             attractors=self.attractors,
             saddles=saddles.saddles if saddles else (),
             manifolds=self.manifolds,
-            basins=basins,
+            basins=grid.basins,
             survival=self.search.survival,
             settling=self.tolerance,
             budget=self.budget,
@@ -263,23 +263,23 @@ class _Finder:
             complete=self.stopped is None,
             scene=scene_data(self.osc),
             settings=self.request.settings,
-            findings=self._findings(basins),
+            findings=self._findings(grid),
             stats=work.stats,
             seed=self.request.rng,
             seconds=work.seconds,
         )
 
-    def _findings(self, basins: Basins) -> tuple[Finding, ...]:
+    def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
         search, saddles = self.search, self.saddle_search
         found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
         if search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
         found += search.findings
         found += [_survival_finding(survival) for survival in search.survival]
-        found += cell_findings(basins)
+        found += grid.findings
         if saddles is not None:
             found += saddles.findings
-            outside = sum(not lies_in(basins.region, saddle) for saddle in saddles.saddles)
+            outside = sum(not lies_in(grid.basins.region, saddle) for saddle in saddles.saddles)
             found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
         return (*found, *self.without_manifolds, *([self.stopped] if self.stopped else []))
 

@@ -20,10 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError, shown
-from vibrokit.kernels.choice import ensemble_stepper, single_stepper
+from vibrokit.kernels.choice import LOCATED, single_stepper
 from vibrokit.kernels.ensemble import carry, compiled_kernel, run_ensemble
-from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.order8 import LocatedStepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.vector_field import VectorField
@@ -42,8 +40,6 @@ BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
 _START = 1e-6  # extent of the domain from the saddle, relative to the region
 _CLOSE = 1e-9  # largest error of the saddle, relative to the region
-_TOLERANCE = 1e-6  # of located contacts: a picture needs no more, and 1e-10 takes 2.6 times as long
-_MOST_STEPS = 1024  # of an ensemble in a free oscillation, above which located contacts are no slower
 _PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
 _NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
 _LENGTH, _TOTAL_LENGTH = 10.0, 160.0  # default arc length, of a branch and of all, in diagonals of the region
@@ -105,10 +101,10 @@ def grow_manifolds(
     in units of the region's width and height; the angle between neighbouring chords longer than a hundredth of that is
     at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``.
 
-    The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is that of
-    ensembles with four times the steps, or that of single trajectories at a tolerance of 1e-6 if that is no slower.
-    On ``hertz-0.570``, against FreeFlight(1e-10) and its 32 s, 99% of the points of RK4(1024), in 1.9 s, lie within
-    2e-4 of the curve and all within 5e-3, over arcs of 20 diagonals; of RK4(256), in 1.1 s, within 1e-2 and 2e-2.
+    The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is
+    `Order8(1e-6)`: on the bundled scenes it takes no longer than RK4(1024), and where contacts are stiffer a half.
+    On ``hertz-0.570``, against FreeFlight(1e-10), 99% of the points of RK4(1024) lie within 2e-4 of the curve and all
+    within 5e-3, over arcs of 20 diagonals; of RK4(256) within 1e-2 and 2e-2.
 
     A StructureError is raised if the saddle does not have one stable and one unstable direction, or if there are more
     states than x and v.
@@ -127,7 +123,7 @@ def grow_manifolds(
     ]
     for backwards in stable:  # not in several threads at once
         flow = Flow.STATE_REVERSED if backwards else Flow.STATE
-        compiled_kernel(osc, flow, stepper or _default_stepper(osc, flow))
+        compiled_kernel(osc, flow, stepper or LOCATED)
     with contextlib.closing(carry(_branch, tasks, executor)) as grown:
         for branch in grown:
             yield branch
@@ -167,7 +163,7 @@ def _branch(
         return Manifold(saddle_index, place, backwards, side, here.point[None], ManifoldEnd.TOO_EXTREME)
     point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
     flow = Flow.STATE_REVERSED if backwards else Flow.STATE
-    chosen = stepper or _default_stepper(osc, flow)
+    chosen = stepper or LOCATED
     if osc.autonomous:
         interval, periods = min(osc.section_interval, math.log(_MOST_GROWTH) / rate), 1
     else:
@@ -178,15 +174,6 @@ def _branch(
     images = FlowMap(osc, chosen, flow, periods * repeats, interval)
     domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
     return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
-
-
-def _default_stepper(osc: Oscillator, flow: Flow) -> Stepper:
-    rough = ensemble_stepper(osc, flow)
-    turns = max(1.0, osc.section_interval * osc.natural_frequency / (2 * math.pi))
-    if isinstance(rough, FixedSteps) and rough.steps <= _MOST_STEPS * turns:
-        return rough.refined().refined()
-    located = single_stepper(osc, flow)
-    return dataclasses.replace(located, tolerance=_TOLERANCE) if isinstance(located, LocatedStepper) else located
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

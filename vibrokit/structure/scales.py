@@ -11,10 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq, minimize_scalar
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
@@ -26,6 +28,7 @@ _SAMPLES, _LEAST_SAMPLES = 64, 512  # of a force in 2π/ω_n, and in all; its ma
 _LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its period is longer
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
+_SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
 _DECADES = 12  # of deflections, above and below 1 m, at which a spring's force is compared with its linear part
 
 Array = NDArray[np.float64]
@@ -134,14 +137,17 @@ def states_at(osc: Oscillator, places: Array) -> Array:
 def search_region(osc: Oscillator) -> Region:
     """Return a region for starts: it contains the stops, and the reach of a linear oscillator under the same forces."""
     reach = length_of(osc)
-    return Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
+    return _without_deep_contact(
+        osc, Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
+    )
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     """Return a region that contains the attractors' points and the stops, with a margin around them.
 
     It is at least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
-    or, if all attractors are at rest, as the length scale of the scene.
+    or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
+    largest speed can reach.
     """
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
@@ -157,7 +163,38 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     swing = float(np.abs(x - x.mean()).max())
     speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()))
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
-    return Region((float(middle - half), float(middle + half)), (-speed, speed))
+    region = Region((float(middle - half), float(middle + half)), (-speed, speed))
+    return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
+
+
+def _without_deep_contact(osc: Oscillator, region: Region, kept: tuple[float, float] = (math.inf, -math.inf)) -> Region:
+    """Return the part of a region that the mass reaches with the region's largest speed; `kept` stays inside.
+
+    A state deeper in a stiff stop has more energy than any state of interest: it is thrown out at a speed far above
+    those of the region, and strikes the stops many times in each period before it is back.
+    """
+    (low, high), speed = region.x, max(region.v)
+    for barrier in osc.barriers:
+        edge = high if barrier.side == "right" else low
+        most = barrier.sign * (edge - barrier.position)
+        if most <= 0:
+            continue
+        end = barrier.position + barrier.sign * (1 + 2 * _MARGIN) * _reached_depth(osc, barrier, speed, most)
+        if barrier.side == "right":
+            high = min(high, max(end, kept[1]))
+        else:
+            low = max(low, min(end, kept[0]))
+    return Region((low, high), region.v)
+
+
+def _reached_depth(osc: Oscillator, barrier: Barrier, speed: float, most: float) -> float:
+    """Depth (m), at most `most`, at which the force beyond that at first touch has stopped a mass of some speed."""
+    depths = most * np.concatenate([[0.0], np.geomspace(_SHALLOWEST, 1.0, _DEPTHS)])
+    places = np.stack([barrier.position + barrier.sign * depths, np.zeros_like(depths)], axis=1)
+    force = -barrier.sign * VectorField(osc).rate(states_at(osc, places))[:, 1]
+    energy = cumulative_trapezoid(force - force[0], depths, initial=0.0)
+    beyond = np.flatnonzero(~(energy <= 0.5 * speed**2))
+    return float(depths[beyond[0]]) if beyond.size else most
 
 
 def lies_in(region: Region, orbit: Attractor | Saddle) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import Ensemble, run_ensemble
+from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
@@ -20,7 +20,7 @@ from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
-from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, survival_of
+from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import size_of
@@ -35,9 +35,8 @@ _LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
 _FIRST_ROUND = 64  # periods; doubled from round to round
 _WATCHED = 64  # starts that are followed for a long time
-_WATCH = 20_000  # periods
 _MEASURED = 16  # starts of a Lyapunov exponent
-_LEAST_MEASURED = 1000  # periods
+_LEAST_MEASURED, _MOST_MEASURED = 1000, 20_000  # periods
 _LEAST_STARTS = 4
 _VISITS = 2048  # of each survivor, to group survivors by attractor
 _OVERLAP = 4.0  # times the settling distance
@@ -86,14 +85,13 @@ class Search:
                 self._watch(states)
             report(self.starts)
 
-    def _follow(self, states: Array, periods: int, stepper: Stepper) -> tuple[Ensemble, NDArray[np.int64]]:
-        """Follow states until they reach a known attractor, or for some periods."""
-        stop = arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.tolerance)
-        return follow(self.osc, states, stop, periods, stepper, self.executor)
+    def _arrival(self) -> Stop:
+        """The test for having reached a known attractor."""
+        return arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.tolerance)
 
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit and those that diverged."""
-        ended, labels = self._follow(states, periods, self.stepper)
+        ended, labels = follow(self.osc, states, self._arrival(), periods, self.stepper, self.executor)
         self.diverged += int(np.sum(labels == ESCAPED))
         return ended.states[labels == UNSETTLED]
 
@@ -169,9 +167,8 @@ class Search:
         watched = states[np.linspace(0, len(states) - 1, min(_WATCHED, len(states))).astype(int)]
         survivors = watched[:0]
         for stepper in (self.stepper, self.stepper.refined()):
-            ended, labels = self._follow(watched, _WATCH, stepper)
-            survivors = ended.states[labels == UNSETTLED]
-            self.survival = (*self.survival, survival_of(ended, labels, _WATCH, stepper))
+            survival, survivors = watch(self.osc, watched, self._arrival(), stepper, executor=self.executor)
+            self.survival = (*self.survival, survival)
         if self.survival[0].survivors and len(survivors):
             self._add_wandering(self._add_orbits(survivors, _LONGER_PERIOD))
         elif self.survival[0].survivors:
@@ -209,7 +206,7 @@ def _rounds(wait: int) -> list[int]:
 def _measuring_time(osc: Oscillator) -> int:
     """Periods in which motion that settles, however slowly, shows it: three e-foldings of the damping."""
     folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
-    return _LEAST_MEASURED if folds == 0 else min(_WATCH, max(_LEAST_MEASURED, math.ceil(3 / folds)))
+    return _LEAST_MEASURED if folds == 0 else min(_MOST_MEASURED, max(_LEAST_MEASURED, math.ceil(3 / folds)))
 
 
 def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: int) -> Array:

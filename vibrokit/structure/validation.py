@@ -19,6 +19,7 @@ from vibrokit.oscillator import Oscillator, generator_from
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
+from vibrokit.structure.basins.grid import DEFAULT_CELLS
 
 _MOST_CELLS = 10**9
 
@@ -50,7 +51,7 @@ class Request:
                 raise StructureError(f"{name} must be True or False, got {shown(getattr(self, name))}.")
         checked = {
             "region": None if self.region is None else Region.of(self.region),
-            "cells": pair("cells", self.cells),
+            "cells": None if self.cells is None else pair("cells", self.cells),
             "starts": pair("starts", self.starts),
             "settling": float(settling),
             "refine": whole("refine", self.refine, 0, 10),
@@ -59,9 +60,10 @@ class Request:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        if self.cells[0] * self.cells[1] * 4**self.refine > _MOST_CELLS:
+        cells = self.cells or DEFAULT_CELLS
+        if math.prod(cells) * 4**self.refine > _MOST_CELLS:
             raise StructureError(
-                f"refine = {self.refine} makes more than {_MOST_CELLS} cells of {self.cells}; give a smaller number."
+                f"refine = {self.refine} makes more than {_MOST_CELLS} cells of {cells}; give a smaller number."
             )
 
     @property

@@ -51,20 +51,45 @@ def follow(
     return ended, np.where(ended.status == REACHED, ended.label, without)
 
 
-def survival_of(ended: Ensemble, labels: NDArray[np.int64], periods: int, stepper: Stepper) -> Survival:
-    """Return how long starts survived that `follow` followed; one that diverged counts as settled then."""
-    alive = labels == UNSETTLED
-    settled_after = np.where(alive, -1, ended.intervals)
+def watch(
+    osc: Oscillator,
+    states: Array,
+    stop: Stop,
+    stepper: Stepper,
+    *,
+    longest: int = 20_000,
+    exposure: int = 200_000,
+    executor: concurrent.futures.Executor | None = None,
+) -> tuple[Survival, Array]:
+    """Follow starts (count, n) until it is known how long they survive; return that, and the survivors' last states.
+
+    The watch ends when all have arrived at a known orbit or diverged, after `longest` periods, or when the survivors
+    together have gone on for `exposure` periods since the last one settled: transients with a mean lifetime below a
+    third of that would have settled once in that time with a probability of 95 %.
+    """
+    here, settled_after = np.array(states, dtype=float), np.full(len(states), -1, dtype=np.int64)
+    alive, periods = np.arange(len(states)), 0
+    while alive.size:
+        quiet = periods - max(0, int(settled_after.max()))
+        stretch = min(longest - periods, math.ceil(exposure / alive.size) - quiet)
+        if stretch <= 0:
+            break
+        ended, labels = follow(osc, here[alive], stop, stretch, stepper, executor)
+        here[alive] = ended.states
+        settled = labels != UNSETTLED
+        settled_after[alive[settled]] = periods + ended.intervals[settled]
+        alive, periods = alive[~settled], periods + stretch
     lifetime, error = fit_decay(settled_after, periods)
-    return Survival(
+    survival = Survival(
         stepper=str(stepper),
-        starts=len(labels),
+        starts=len(states),
         periods=periods,
-        survivors=int(alive.sum()),
+        survivors=len(alive),
         lifetime=lifetime,
         lifetime_error=error,
         settled_after=settled_after,
     )
+    return survival, here[alive]
 
 
 def fit_decay(settled_after: NDArray[np.int64], periods: int) -> tuple[float, float]:

@@ -78,8 +78,11 @@ class BasinClassifier:
         self.label(found, states, start_time)
         return found
 
-    def label(self, found: Whole, states: Array, start_time: float = 0.0) -> None:
-        """Write the labels of states into an array of NOT_FOLLOWED; an interrupt leaves those known so far in it."""
+    def label(self, found: Whole, states: Array, start_time: float = 0.0) -> int:
+        """Write the labels of states into an array of NOT_FOLLOWED; an interrupt leaves those known so far in it.
+
+        Returns the number of sections that all of them took together.
+        """
         trajectories = _Trajectories(self, states, found)
         trajectories.to_section(start_time)
         stretch, known = _FIRST_STRETCH, 0
@@ -93,6 +96,7 @@ class BasinClassifier:
             stretch = min(4 * stretch, self.budget)
             known, before = int(np.sum(found != NOT_FOLLOWED)), known
             advance(known - before, CELLS)
+        return trajectories.sections
 
     def sharing(self, basins: Basins, margin: int) -> BasinClassifier:
         """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.stop_cells`."""
@@ -136,6 +140,7 @@ class _Trajectories:
         self.remaining = np.full(len(states), classifier.budget, dtype=np.int64)
         self.found = found
         self.detours = np.zeros(len(states), dtype=np.int64)
+        self.sections = 0  # of all together
 
     def active(self) -> Whole:
         return np.flatnonzero(self.found == NOT_FOLLOWED)
@@ -162,6 +167,7 @@ class _Trajectories:
             stop=stop, executor=classifier.executor,
         )  # fmt: skip
         self.states[which] = ended.states
+        self.sections += int(ended.intervals.sum())
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
         self.found[which[ended.status == DIVERGED]] = ESCAPED

@@ -23,6 +23,9 @@ from vibrokit.structure.search import persistent_stepper
 from vibrokit.symbolic.flow_kind import Flow
 
 _COARSEST = 4096  # cells of the first grid, followed to the attractors
+DEFAULT_CELLS = (200, 200)
+"""Of the finest grid."""
+_MOST_SECTIONS = 10_000_000  # that the finer of two grids may take by default, about 20 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
 _SETTLING = 1e-3  # of the region's size, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
@@ -48,17 +51,21 @@ class BasinGrid:
 
     The first grid is followed to the attractors. On each finer one a trajectory ends, after one section at least, in a
     cell of the grid before whose whole neighbourhood agrees; see `vibrokit.structure.basins.stop_cells`.
+    `cells` are those of the last grid; None: 200 × 200, or the finest before it that takes no more than 10⁷ sections.
     `margin` is how far cells must agree to classify a trajectory; None: every cell is followed to an attractor. The
     cells near a boundary are split in four `refine` times; the others keep their labels.
     """
 
     def __init__(
-        self, classifier: BasinClassifier, cells: tuple[int, int], *, margin: int | None = 2, refine: int = 0
+        self, classifier: BasinClassifier, cells: tuple[int, int] | None, *, margin: int | None = 2, refine: int = 0
     ) -> None:
         self._classifier, self._margin, self._refine = classifier, margin, refine
-        whole = (int(cells[0]), int(cells[1]))
+        self._most_sections = math.inf if cells is not None else _MOST_SECTIONS
+        whole = cells or DEFAULT_CELLS
         self._shapes = _shapes(whole) if margin is not None else [whole]
         self._labels = np.full(whole, NOT_FOLLOWED, dtype=np.int16)
+        self._sections = 0  # that the last grid took
+        self._avoided = 0  # sections that the grid after the last one would take, if they are too many
 
     @property
     def basins(self) -> Basins:
@@ -71,32 +78,65 @@ class BasinGrid:
     def fill(self) -> None:
         """Follow all cells."""
         counts = [math.prod(shape) for shape in self._shapes]
-        total = sum(counts) + sum(counts[-1] * 4**split for split in range(1, self._refine + 1))
-        finished = None
+        splits = sum(4**split for split in range(1, self._refine + 1))
+        total = sum(counts) + splits * counts[-1]
+        classifier = self._classifier
         with stage("basins", unit=CELLS, total=total):
-            for shape in self._shapes[:-1]:
-                finished = self._filled(np.full(shape, NOT_FOLLOWED, dtype=np.int16), finished)
-            finished = self._filled(self._labels, finished)
+            for level, shape in enumerate(self._shapes[:-1]):
+                coarse = np.full(shape, NOT_FOLLOWED, dtype=np.int16)
+                self._follow(coarse, classifier)
+                classifier = self._sharing(coarse)
+                expected = self._expected(classifier)
+                if expected > self._most_sections:
+                    self._shapes, self._labels, self._avoided = self._shapes[: level + 1], coarse, expected
+                    advance(sum(counts[level + 1 :]) + splits * (counts[-1] - counts[level]))
+                    break
+            else:
+                self._follow(self._labels, classifier)
             for _ in range(self._refine):
                 near = ~agreeing(self._labels, max(1, self._margin or 0))
+                classifier = self._sharing(self._labels)
                 self._labels = _split(np.where(near, NOT_FOLLOWED, self._labels).astype(np.int16))
-                finished = self._filled(self._labels, finished)
+                self._follow(self._labels, classifier)
 
-    def _filled(self, labels: Labels, coarser: Basins | None) -> Basins:
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings about the cells that lead to no attractor, and about a grid coarser than the default."""
+        found = cell_findings(self.basins)
+        if self._avoided:
+            nx, nv = self._shapes[-1]
+            found += (Finding.of(Code.COARSE_GRID, nx=nx, nv=nv, sections=self._avoided),)
+        return found
+
+    def _sharing(self, finished: Labels) -> BasinClassifier:
+        """Return a classifier that uses a finished grid, if it may."""
+        if self._margin is None:
+            return self._classifier
+        return self._classifier.sharing(Basins(self._classifier.region, finished), self._margin)
+
+    def _expected(self, classifier: BasinClassifier) -> int:
+        """Return about how many sections the next grid takes.
+
+        It has four times the cells; of these, the ones in cells that classify need one section, the others as many as
+        now.
+        """
+        assert classifier.core is not None
+        labels = classifier.core.labels
+        return 4 * (int(np.sum(labels >= 0)) + round(self._sections * float(np.mean(labels < 0))))
+
+    def _follow(self, labels: Labels, classifier: BasinClassifier) -> None:
         """Follow the cells that are not known yet, some at a time."""
-        classifier = self._classifier
-        if coarser is not None and self._margin is not None:
-            classifier = classifier.sharing(coarser, self._margin)
+        self._sections = 0
         places = np.flatnonzero(labels == NOT_FOLLOWED)
         advance(labels.size - len(places))
         for start in range(0, len(places), _CHUNK):
             part = places[start : start + _CHUNK]
             found = np.full(len(part), NOT_FOLLOWED, dtype=np.int64)
             try:
-                classifier.label(found, centres(classifier.osc, classifier.region, labels.shape, part))
+                states = centres(classifier.osc, classifier.region, labels.shape, part)
+                self._sections += classifier.label(found, states)
             finally:
                 labels.flat[part] = found
-        return Basins(classifier.region, labels)
 
 
 def _shapes(cells: tuple[int, int]) -> list[tuple[int, int]]:

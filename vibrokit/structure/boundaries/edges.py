@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.results.basins import ESCAPED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, Basins
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
@@ -77,6 +77,7 @@ class Straddles:
         self.origins = np.concatenate(origins)  # labels of the cells that each initial pair lies between
         self.end_labels = np.zeros(self.ends.shape[:2], dtype=np.int64)
         self.numbers = np.arange(len(self.ends))  # of each pair among the initial ones
+        self.sections = 0  # that classifications took
         self._points: list[Array] = []  # at each section, of all pairs
         self._stretches: list[Array] = []
         self._bring_together(np.arange(len(self.ends)))
@@ -144,7 +145,7 @@ class Straddles:
         pieces = int(np.clip(_AT_ONCE // len(wide) - 1, _FEWEST_PIECES, _MOST_PIECES))
         corners = low[:, None] + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (high - low)[:, None]
         corners[:, -1] = high
-        labels = self.classifier.labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
+        labels = self._labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
         shrunk = np.zeros(len(wide), dtype=bool)
         for row, index in enumerate(wide):
             known = np.flatnonzero(settled(labels[row]) & np.isfinite(corners[row]).all(axis=1))
@@ -156,6 +157,11 @@ class Straddles:
             self.ends[index], self.end_labels[index] = corners[row, piece], labels[row, piece]
             shrunk[row] = piece[1] - piece[0] < pieces
         return shrunk
+
+    def _labels(self, states: Array) -> NDArray[np.int64]:
+        found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
+        self.sections += self.classifier.label(found, states)
+        return found
 
     def _widths(self) -> Array:
         return np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)

@@ -40,10 +40,11 @@ _FEW_POINTS = 12  # last points of a motion that must all be within that distanc
 _SAMPLES = 8192  # of a cycle
 _APPROACH = 0.25  # fraction of a motion that does not recur which is its transient
 _SEVERAL = 32  # sections after which only a few motions go on for each pair of labels
-_FEW = 6
+_FEW, _FEWEST = 6, 2
+_MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer go on
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they need longer
 _QUICK = 2000
-_LONG, _SHORT, _SLOW = 128, 32, 5000
+_LONGEST = 128  # sections
 _LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
 _RESIDUAL = 1e-10
@@ -58,20 +59,17 @@ class SaddleSearch:
 
     The classifier finds where states lead, and integrates those on the boundaries. One that uses a finished grid is
     fast; a boundary on which it finds no saddle is followed again without the grid. There are at most `trackers`
-    motions for each pair of basins that meet. A motion counts as one that does not repeat after `sections`; by default
-    128, or 32 where states need more than 5000 sections to settle, because each section on the boundary classifies
-    several states.
+    motions for each pair of basins that meet, six after 32 sections, and two when classifying states has taken 10⁶
+    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after 128 sections.
     """
 
     classifier: BasinClassifier
     basins: Basins
     orbit_stepper: Stepper
     trackers: int = 9
-    sections: int = 0
 
     def __post_init__(self) -> None:
         self.osc = self.classifier.osc
-        self.sections = self.sections or (_LONG if self.classifier.budget <= _SLOW else _SHORT)
         self.near = _NEAR * self.classifier.region.size
         self._found: list[Saddle] = []
         self._places: list[Array] = []
@@ -131,7 +129,7 @@ class SaddleSearch:
         motions = len(straddles.origins)
         tries = np.zeros(motions, dtype=np.int64)
         parts = PARTS_OF_A_TURN if self.osc.autonomous else 1
-        for step in range(1, self.sections * parts + 1):
+        for step in range(1, _LONGEST * parts + 1):
             if not len(straddles):
                 break
             straddles.advance()
@@ -139,8 +137,9 @@ class SaddleSearch:
                 arrived = np.array([self._arrived(straddles, n, tries) for n in range(len(straddles))], dtype=bool)
                 self._explain(straddles, arrived)
                 straddles.keep(~arrived)
-            if step == _SEVERAL * parts:
-                straddles.keep(_first_few(straddles.end_labels))
+            if step >= _SEVERAL * parts:
+                most = _FEW if straddles.sections < _MANY_SECTIONS else _FEWEST
+                straddles.keep(_first_few(straddles.end_labels, most))
             report(tracked + motions - len(straddles))
         self._describe_wandering(straddles)
         report(tracked + motions)
@@ -245,13 +244,13 @@ def _chaotic(tracks: list[EdgeTrack], exponent: float) -> Saddle:
     )
 
 
-def _first_few(labels: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _first_few(labels: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
     """Keep a few motions for each pair of labels."""
     seen: defaultdict[tuple[int, ...], int] = defaultdict(int)
     kept = np.zeros(len(labels), dtype=bool)
     for index, pair in enumerate(np.sort(labels, axis=1).tolist()):
         seen[tuple(pair)] += 1
-        kept[index] = seen[tuple(pair)] <= _FEW
+        kept[index] = seen[tuple(pair)] <= most
     return kept
 
 
