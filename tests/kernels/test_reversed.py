@@ -29,7 +29,7 @@ def scene(law=None, adhesive=False, **more):
 
 def preimages(osc, states, periods=1, *, stepper):
     """States of the section mapped backwards in time."""
-    return FlowMap(osc, stepper, Flow.STATE_REVERSED, periods)(states)
+    return FlowMap(osc, stepper, Flow.STATE_REVERSED, periods, osc.section_interval)(states)
 
 
 def backwards(acceleration, states, duration):

@@ -60,8 +60,9 @@ def test_a_third_attractor_at_0525(slower):
     assert (hammering.kind, hammering.period, hammering.hits) == ("periodic", 4, {"right": 8, "left": 0})
     assert (wandering.kind, wandering.period) == ("chaotic", 0)
     assert wandering.exponents[0].real > 5 * wandering.exponent_error > 0
-    for report in wandering.survival:  # at two accuracies, for 20000 periods
-        assert report.periods >= 20_000
+    for report in wandering.survival:  # at two accuracies
+        quiet = report.periods - report.settled_after.max()
+        assert report.survivors * quiet >= 200_000 or report.periods == 20_000
         assert report.survivors > report.starts / 4
     assert structure.survival[0].lifetime < 2000  # of those that settle: a long chaotic transient
     assert min(attractor.basin_fraction for attractor in structure.attractors) > 0.1

@@ -12,6 +12,7 @@ import vibrokit as vk
 from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
+from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, classify_grid
@@ -249,6 +250,24 @@ def test_an_interrupt_while_refining_keeps_the_other_cells(duffing):
     partial, _ = interrupted(BasinGrid(duffing, (60, 60), refine=2), first)
     assert partial.shape == (240, 240)
     assert 0 < np.mean(partial == NOT_FOLLOWED) < 0.7
+
+
+def test_a_grid_whose_finer_one_would_take_too_many_sections_is_the_last(duffing, monkeypatch):
+    fine = BasinGrid(duffing, None)
+    fine.fill()
+    assert fine.basins.labels.shape == (200, 200)
+    assert all(finding.code is not Code.COARSE_GRID for finding in fine.findings)
+    monkeypatch.setattr("vibrokit.structure.basins.grid._MOST_SECTIONS", 20_000)
+    grid = BasinGrid(duffing, None, refine=1)
+    _, seen = interrupted(grid, math.inf)
+    assert seen[-1].done == seen[-1].total
+    (finding,) = (finding for finding in grid.findings if finding.code is Code.COARSE_GRID)
+    assert grid.basins.labels.shape == (2 * finding.values["nx"], 2 * finding.values["nv"]) == (100, 100)
+    assert finding.values["sections"] > 20_000
+    assert grid.basins.fraction(0) == pytest.approx(fine.basins.fraction(0), abs=0.02)
+    given = BasinGrid(duffing, (200, 200))
+    given.fill()
+    np.testing.assert_array_equal(given.basins.labels, fine.basins.labels)
 
 
 def test_progress_counts_every_cell(duffing):

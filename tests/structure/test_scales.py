@@ -8,7 +8,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.parts.functions import cos, sin, tanh
-from vibrokit.structure.scales import length_of
+from vibrokit.structure.scales import frame_of, length_of, search_region
 
 
 class Square(vk.Excitation):
@@ -136,3 +136,34 @@ def test_the_wells_of_a_spring_are_found_in_any_unit(wells, frequency):
 
 def test_a_linear_spring_has_no_length():
     assert length_of(vk.Oscillator(natural_frequency=30.0, damping_ratio=0.1)) == 1.0
+
+
+# --- regions end in a stop where the mass does
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e8, 1e12])
+def test_a_region_ends_at_the_depth_that_its_speed_reaches(stiffness):
+    """A mass of speed v enters a Hertz stop to δ with (2/5) k δ^(5/2) = v²/2, and a linear one to δ = v/√k."""
+    stops = (vk.Barrier(vk.Hertz(stiffness), 0.5, "right"), vk.Barrier(vk.Linear(stiffness), -0.5, "left"))
+    region = search_region(scene(TwoTones(0.1, 0.5), stops=stops))
+    speed = max(region.v)
+    assert region.x[1] - 0.5 == pytest.approx(1.5 * (1.25 * speed**2 / stiffness) ** 0.4, rel=0.06)
+    assert -0.5 - region.x[0] == pytest.approx(1.5 * speed / math.sqrt(stiffness), rel=0.06)
+
+
+def test_a_soft_stop_does_not_narrow_a_region():
+    free, soft = (scene(vk.Harmonic(0.1, 0.5), stops=stops) for stops in ((), STOPS))
+    assert max(search_region(soft).x) >= 0.8 * length_of(soft)
+    assert max(search_region(free).x) == length_of(free)
+
+
+def test_a_region_contains_every_attractor():
+    """A mass that is pressed into a stop rests deeper than slow motions reach."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.1, excitations=(vk.Constant(2.0),),
+        barriers=(vk.Barrier(vk.Linear(100.0), 0.0, "right"),),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, cells=(10, 10), saddles=False)
+    (rest,) = structure.attractors
+    assert rest.points[0, 0] == pytest.approx(2.0 / 101.0)
+    assert frame_of(osc, structure.attractors).contains(rest.points).all()

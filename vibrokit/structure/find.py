@@ -80,7 +80,7 @@ def find_structure(
         Where to search; by default a region that contains the steady states and the stops with a margin around them.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; 100 × 100 or 50 × 50 where transients are so long that
-        the finer grid would take more than 10⁷ sections.
+        the finer grid would take more than 5 · 10⁶ sections.
     refine : int
         How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional

@@ -40,6 +40,7 @@ BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
 _START = 1e-6  # extent of the domain from the saddle, relative to the region
 _CLOSE = 1e-9  # largest error of the saddle, relative to the region
+_REFINEMENTS = 2  # of the default stepper
 _PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
 _NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
 _LENGTH, _TOTAL_LENGTH = 10.0, 160.0  # default arc length, of a branch and of all, in diagonals of the region
@@ -56,8 +57,8 @@ class FlowMap:
     osc: Oscillator
     stepper: Stepper
     flow: Flow
-    periods: int = 1
-    interval: float | None = None  # of a period (s); that of the section by default
+    periods: int
+    interval: float  # of a period (s)
 
     def __call__(self, states: Array, images: int = 1) -> Array:
         """Return images of states (count, n); NaN where they diverged: backwards in time, damping adds energy."""
@@ -102,9 +103,10 @@ def grow_manifolds(
     at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``.
 
     The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default it is
-    `Order8(1e-6)`: on the bundled scenes it takes no longer than RK4(1024), and where contacts are stiffer a half.
-    On ``hertz-0.570``, against FreeFlight(1e-10), 99% of the points of RK4(1024) lie within 2e-4 of the curve and all
-    within 5e-3, over arcs of 20 diagonals; of RK4(256) within 1e-2 and 2e-2.
+    `Order8(1e-6)`, or a finer one where that loses the saddle. On the bundled scenes it takes no longer than RK4(1024),
+    and a half of that where contacts are stiffer. On ``hertz-0.570``, against FreeFlight(1e-10), 99% of the points of
+    RK4(1024) lie within 2e-4 of the curve and all within 5e-3, over arcs of 20 diagonals; of RK4(256) within 1e-2 and
+    2e-2.
 
     A StructureError is raised if the saddle does not have one stable and one unstable direction, or if there are more
     states than x and v.
@@ -163,15 +165,15 @@ def _branch(
         return Manifold(saddle_index, place, backwards, side, here.point[None], ManifoldEnd.TOO_EXTREME)
     point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
     flow = Flow.STATE_REVERSED if backwards else Flow.STATE
-    chosen = stepper or LOCATED
+    once = FlowMap(osc, stepper or LOCATED, flow, saddle.period, osc.section_interval)
     if osc.autonomous:
-        interval, periods = min(osc.section_interval, math.log(_MOST_GROWTH) / rate), 1
+        once = dataclasses.replace(once, periods=1, interval=min(once.interval, math.log(_MOST_GROWTH) / rate))
     else:
-        interval, periods = osc.section_interval, saddle.period
-        point = _fixed_point(FlowMap(osc, chosen, flow, periods, interval), here, limits)
+        once, point = _with_fixed_point(once, here, limits, _REFINEMENTS if stepper is None else 0)
+    interval, periods = once.interval, once.periods
     repeats = math.ceil(math.log(_LEAST_GROWTH) / (rate * interval * periods))
     repeats += repeats % 2 if multiplier < 0 else 0
-    images = FlowMap(osc, chosen, flow, periods * repeats, interval)
+    images = dataclasses.replace(once, periods=periods * repeats)
     domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
     return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
 
@@ -214,8 +216,12 @@ def _direction(here: _Linearised, backwards: bool, limits: Limits) -> tuple[floa
     return float(multipliers[chosen]), vector if vector[0] > 0 or (vector[0] == 0 < vector[1]) else -vector
 
 
-def _fixed_point(images: FlowMap, here: _Linearised, limits: Limits) -> Array:
-    """Fixed point of the map that the curve grows along, by Newton's method with the derivative of a finer map."""
+def _with_fixed_point(images: FlowMap, here: _Linearised, limits: Limits, refinements: int) -> tuple[FlowMap, Array]:
+    """Return the map that the curve grows along, and its fixed point, by Newton's method with a finer derivative.
+
+    Along a long, very unstable orbit the errors of a stepper grow until the map has no fixed point; the stepper is
+    refined then.
+    """
     derivative = np.linalg.inv(here.derivative) if images.flow is Flow.STATE_REVERSED else here.derivative
     jacobian = derivative - np.eye(2)
 
@@ -225,12 +231,15 @@ def _fixed_point(images: FlowMap, here: _Linearised, limits: Limits) -> Array:
 
     (point,), _, (offset,) = newton(evaluate, here.point[None])
     error = float(np.linalg.norm(np.linalg.solve(jacobian, offset) / limits.width))
+    if not error < _CLOSE and refinements:
+        finer = dataclasses.replace(images, stepper=images.stepper.refined())
+        return _with_fixed_point(finer, here, limits, refinements - 1)
     if not error < _CLOSE:
         raise StructureError(
             f"with {images.stepper} there is no saddle near {tuple(np.round(point, 6).tolist())}: Newton's steps do "
             f"not fall below {error:.1g} of the region. Use a finer stepper, or one that locates contacts."
         )
-    return point
+    return images, point
 
 
 def _domain(images: FlowMap, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:

@@ -25,7 +25,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _COARSEST = 4096  # cells of the first grid, followed to the attractors
 DEFAULT_CELLS = (200, 200)
 """Of the finest grid."""
-_MOST_SECTIONS = 10_000_000  # that the finer of two grids may take by default, about 20 s with stops
+_MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
 _SETTLING = 1e-3  # of the region's size, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
@@ -51,7 +51,7 @@ class BasinGrid:
 
     The first grid is followed to the attractors. On each finer one a trajectory ends, after one section at least, in a
     cell of the grid before whose whole neighbourhood agrees; see `vibrokit.structure.basins.stop_cells`.
-    `cells` are those of the last grid; None: 200 × 200, or the finest before it that takes no more than 10⁷ sections.
+    `cells` are those of the last grid; None: 200 × 200, or the finest before it that takes no more than 5 · 10⁶ sections.
     `margin` is how far cells must agree to classify a trajectory; None: every cell is followed to an attractor. The
     cells near a boundary are split in four `refine` times; the others keep their labels.
     """
