@@ -23,7 +23,7 @@ from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring.linear import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
-_STEPS = 256
+_STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscillation or more; in a very short one
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
@@ -85,7 +85,8 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
 
 def _steps_needed(scene: Scene, flow: Flow) -> float:
     unit = scene.time_unit
-    needed = _PER_TURN * _turns(scene)
+    turns = _turns(scene)
+    needed = max(_FEWEST_STEPS, _STEPS * min(1.0, 4.0 * turns), _PER_TURN * turns)
     for contact in contact_times(scene, flow):
         needed = max(needed, _steps_per_contact(contact.exponent) * unit / contact.duration)
     return needed
@@ -104,7 +105,7 @@ def _steps_per_contact(exponent: float) -> int:
 
 
 def _power_of_two(needed: float) -> int:
-    return max(_STEPS, 2 ** math.ceil(math.log2(needed)))
+    return int(2 ** math.ceil(math.log2(needed)))
 
 
 def _flies(scene: Scene, flow: Flow) -> bool:

@@ -66,7 +66,8 @@ class Attractor:
     basin_fraction_error : float
         Its standard error, if the cells are taken as independent draws.
     residual : float
-        Distance between the first point and its image after one period of the orbit; NaN for motion that never repeats.
+        Distance between the first point and its image after one period of the orbit, in units of the scene's motions (a
+        length and ω_n times it); NaN for motion that never repeats.
     error : float
         Change of the first point when the integration is tightened; NaN for motion that never repeats.
     survival : tuple of Survival
@@ -150,7 +151,7 @@ ATTRACTOR_FIELDS: Mapping[str, Field] = {
     "peak_force": BySide("largest push of each stop", "m s-2"),
     "basin_fraction": Number("share of the region's cells that lead to the attractor", "1", 0.0, 1.0),
     "basin_fraction_error": Number("standard error of the share", "1", 0.0, 1.0),
-    "residual": Number("distance between the first point and its image after one orbit"),
+    "residual": Number("distance between the first point and its image after one orbit", "1"),
     "error": Number("change of the first point when the integration is tightened"),
 }
 SURVIVALS = Table(

@@ -61,9 +61,17 @@ class Region:
         return np.array([self.x, self.v])
 
     @property
-    def size(self) -> float:
-        """Width in x or in v, the smaller one."""
-        return float(np.min(np.diff(self.bounds)))
+    def widths(self) -> NDArray[np.float64]:
+        """Widths in x and in v."""
+        return np.diff(self.bounds)[:, 0]
+
+    def scaled(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return x and v of states (…, n) in units of the widths, so that their distances depend on no unit."""
+        return states[..., :2] / self.widths
+
+    def apart(self, one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distances between states (…, n) in x and v, in units of the widths."""
+        return np.asarray(np.linalg.norm(self.scaled(one) - self.scaled(other), axis=-1))
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return for each of some points or states (count, n) whether its x and v are in the region."""

@@ -33,7 +33,8 @@ class Saddle:
         Labels of the attractors that the two branches of the unstable direction reach; for a chaotic set, of the two
         basins between which it was found. Negative as in `Basins.labels` where a branch does not settle.
     residual : float
-        Distance between the first point and its image after one period of the orbit; NaN for a chaotic set.
+        Distance between the first point and its image after one period of the orbit, in units of the scene's motions (a
+        length and ω_n times it); NaN for a chaotic set.
     error : float
         How far the first point moves when the integration is tightened; NaN for a chaotic set.
     """

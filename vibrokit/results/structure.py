@@ -68,7 +68,7 @@ class Structure(Record):
     survival : tuple of Survival
         How long starts went on without settling; empty if all settled soon.
     settling : float
-        Distance at which an attractor counts as reached.
+        Distance at which an attractor counts as reached, as a fraction of the region's widths in x and v.
     budget : int
         Largest number of periods for which a trajectory was followed.
     stepper : str

@@ -19,9 +19,9 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import linear_map
-from vibrokit.structure.newton import Evaluation, newton
+from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import CONVERGED, Orbit
-from vibrokit.structure.scales import size_of
+from vibrokit.structure.scales import size_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
@@ -67,15 +67,16 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
     A StructureError is raised for a scene with periodic excitation, and if no equilibrium is near the guess.
     """
     refuse_forcing(osc)
-    (point,), (residual,), (jacobian,) = newton(equilibrium_equations(osc), guess[None])
-    if not residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(guess))):
+    units = units_of(osc)
+    (point,), (residual,), (jacobian,) = newton(scaled(equilibrium_equations(osc), units), guess[None])
+    if not residual <= CONVERGED * (1.0 + float(np.linalg.norm(guess / units))):
         raise StructureError(
             f"Newton's method found no equilibrium near {tuple(np.round(guess, 6).tolist())}: the residual is "
             f"{residual:.1e}; start nearer to one."
         )
     # Balanced: a stiff stop makes the rate of v huge in units of x, which would cost as many digits.
-    balanced, units = scipy.linalg.matrix_balance(jacobian, permute=False)
-    monodromy = units @ scipy.linalg.expm(balanced) @ np.linalg.inv(units)
+    balanced, balance = scipy.linalg.matrix_balance(jacobian, permute=False)
+    monodromy = balance @ scipy.linalg.expm(balanced) @ np.linalg.inv(balance)
     return Equilibrium(point, 1, 0.0, monodromy, float(residual))
 
 
@@ -156,9 +157,10 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
         steps[:, 1] = np.clip(steps[:, 1], -most, most)
         return steps
 
-    (unknowns,), (residual,), (monodromy,) = newton(cycle_equations(osc, stepper), guess[None], limited=limited)
-    start = turning_point(guess)
-    if not residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(start))):
+    units, start = units_of(osc), turning_point(guess)
+    equations = scaled(cycle_equations(osc, stepper), units)
+    (unknowns,), (residual,), (monodromy,) = newton(equations, guess[None], limited=limited)
+    if not residual <= CONVERGED * (1.0 + float(np.linalg.norm(start / units))):
         raise StructureError(
             f"Newton's method found no cycle of duration {duration:.6g} s near {tuple(np.round(start, 6).tolist())}: "
             f"the residual is {residual:.1e}. The start is too far away, or the cycle is one of a family; follow the "

@@ -89,7 +89,7 @@ def find_structure(
     starts : (int, int)
         Starts of the search in x and v.
     settling : float
-        Distance, as a fraction of the region's size, at which an attractor counts as reached.
+        Distance, as a fraction of the region's widths in x and v, at which an attractor counts as reached.
     budget : int, optional
         Largest number of periods that a trajectory is followed; by default it depends on the damping, and on the
         lifetime of chaotic transients if there are some.
@@ -141,7 +141,7 @@ class _Finder:
         self.stepper = request.stepper or ensemble_stepper(osc, Flow.STATE)
         self.searched = self.region or search_region(osc)
         self.search = Search(
-            osc, _SEARCH_SETTLING * self.searched.size, self._search_stepper(), self.orbit_stepper, executor
+            osc, _SEARCH_SETTLING * self.searched.widths, self._search_stepper(), self.orbit_stepper, executor
         )
         self.attractors: tuple[Attractor, ...] = ()
         self.grid: BasinGrid | None = None
@@ -182,7 +182,9 @@ class _Finder:
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
             raise StructureError(_none_inside(self.region, self.attractors))
         if self.request.stepper is None:
-            self.stepper = persistent_stepper(self.osc, self.attractors, self.stepper, self.tolerance)
+            self.stepper = persistent_stepper(
+                self.osc, self.attractors, self.stepper, self.request.settling * self.frame.widths
+            )
         lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
         if self.request.budget is None and lifetimes:
             self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
@@ -200,15 +202,10 @@ class _Finder:
         return self.region or frame_of(self.osc, self.attractors)
 
     @property
-    def tolerance(self) -> float:
-        """Distance at which an attractor counts as reached."""
-        return self.request.settling * self.frame.size
-
-    @property
     def classifier(self) -> BasinClassifier:
         """Finds the attractor that a state leads to."""
         return BasinClassifier(
-            self.osc, self.attractors, self.frame, self.tolerance, self.budget, self.stepper, self.executor
+            self.osc, self.attractors, self.frame, self.request.settling, self.budget, self.stepper, self.executor
         )
 
     def _find_basins(self) -> None:
@@ -257,7 +254,7 @@ class _Finder:
             manifolds=self.manifolds,
             basins=grid.basins,
             survival=self.search.survival,
-            settling=self.tolerance,
+            settling=self.request.settling,
             budget=self.budget,
             stepper=name_of(self.stepper),
             complete=self.stopped is None,

@@ -29,6 +29,16 @@ class Roots(NamedTuple):
     attached: NDArray[Any]  # (count, …)
 
 
+def scaled(equations: Callable[[Array], Evaluation], units: Array) -> Callable[[Array], Evaluation]:
+    """Return the same equations with residuals in some units (n,)."""
+
+    def evaluate(places: Array) -> Evaluation:
+        found = equations(places)
+        return found._replace(residuals=found.residuals / units, jacobians=found.jacobians / units[:, None])
+
+    return evaluate
+
+
 def newton(
     evaluate: Callable[[Array], Evaluation],
     guesses: Array,

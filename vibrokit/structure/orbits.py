@@ -16,8 +16,8 @@ from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import linear_map
-from vibrokit.structure.newton import Evaluation, newton
-from vibrokit.structure.scales import length_of, size_of
+from vibrokit.structure.newton import Evaluation, newton, scaled
+from vibrokit.structure.scales import units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 EQUAL = 1e-6
@@ -38,7 +38,7 @@ class Orbit:
     period: int  # in forcing periods
     duration: float  # time after which it repeats (s)
     monodromy: Array  # (n, n), derivative of the flow over the duration
-    residual: float  # distance between the point and its image
+    residual: float  # distance between the point and its image, in units of the scene
 
     def refined(self, osc: Oscillator, stepper: Stepper) -> Orbit:
         """Return the orbit that Newton's method finds from here with another stepper; may raise StructureError."""
@@ -70,9 +70,10 @@ def section_equations(
 
 def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
     """Refine a periodic point by Newton's method until the residual stays; StructureError where it stays large."""
-    (point,), (residual,), (monodromy,) = newton(section_equations(osc, period, stepper), guess[None])
+    units = units_of(osc)
+    (point,), (residual,), (monodromy,) = newton(scaled(section_equations(osc, period, stepper), units), guess[None])
     orbit = Orbit(point, period, period * osc.section_interval, monodromy, float(residual))
-    if not orbit.residual <= CONVERGED * (size_of(osc) + float(np.linalg.norm(guess))):
+    if not orbit.residual <= CONVERGED * (1.0 + float(np.linalg.norm(guess / units))):
         raise StructureError(
             f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: the "
             f"residual is {orbit.residual:.1e}. The start is too far away, or the orbit is not hyperbolic; follow the "
@@ -103,23 +104,16 @@ def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
 
 
 def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
-    """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion.
-
-    Displacements are compared with displacements and velocities with velocities, so that no unit of time matters;
-    states of the noise are compared with the size of both.
-    """
-    length, size = length_of(osc), size_of(osc)
-    scales = np.full(known.shape[1], size)
-    scales[:2] = length, length * osc.natural_frequency
-    near = np.abs(known - point) < tolerance * (scales + np.abs(known).max(axis=0))
+    """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion."""
+    near = np.abs(known - point) < tolerance * (units_of(osc) + np.abs(known).max(axis=0))
     return bool(near.all(axis=1).any())
 
 
-def arrival_at(orbits: Mapping[int, Array], tolerance: float) -> Stop:
-    """Return the test that ends a trajectory within a distance in (x, v) of a point of orbits, given by label."""
+def arrival_at(orbits: Mapping[int, Array], distances: Array) -> Stop:
+    """Return the test that ends a trajectory within distances in x and v of a point of orbits, given by label."""
     points = np.concatenate([np.empty((0, 2)), *(points[:, :2] for points in orbits.values())])
     labels = np.repeat(list(orbits), [len(points) for points in orbits.values()])
-    metrics = np.tile(np.eye(2) / tolerance, (len(points), 1, 1))
+    metrics = np.tile(np.diag(1.0 / distances), (len(points), 1, 1))
     return Stop(points=points, point_labels=labels.astype(np.int64), metrics=metrics)
 
 

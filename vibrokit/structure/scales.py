@@ -56,6 +56,17 @@ def length_of(osc: Oscillator) -> float:
     return length or 1.0
 
 
+def units_of(osc: Oscillator) -> Array:
+    """Return the sizes of the coordinates of a state, shape (n,): length, velocity, and both for those of the noise.
+
+    Displacements are compared with displacements and velocities with velocities, so that no unit matters.
+    """
+    length = length_of(osc)
+    units = np.full(states_at(osc, np.zeros((1, 2))).shape[1], size_of(osc))
+    units[:2] = length, length * osc.natural_frequency
+    return units
+
+
 def size_of(osc: Oscillator) -> float:
     """Return the size of states (x, v) that goes with it, x and v taken together."""
     return length_of(osc) * math.hypot(1.0, osc.natural_frequency)

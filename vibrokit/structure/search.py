@@ -23,7 +23,7 @@ from vibrokit.structure.attractors.describe import describe_orbit, describe_wand
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
-from vibrokit.structure.scales import size_of
+from vibrokit.structure.scales import units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
@@ -31,6 +31,7 @@ LONGEST_PERIOD = 16
 _LONGER_PERIOD = 256  # of orbits that are searched for among starts that settle slowly
 _RECURRENCE = 1e-5
 _NEAR = 1e-3  # distance, relative to the motion, between an orbit and its approximation by a coarse stepper
+_REACH = 0.1  # distance, relative to the motion, of a stable orbit that Newton's method finds from a guess
 _LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
 _FIRST_ROUND = 64  # periods; doubled from round to round
@@ -53,7 +54,7 @@ class Search:
     """Finds the steady states of a scene, one after another; an interrupt leaves those found so far."""
 
     osc: Oscillator
-    tolerance: float  # distance at which a state counts as settled on a known orbit
+    distances: Array  # (2,) in x and v, at which a state counts as settled on a known orbit
     stepper: Stepper  # of ensembles
     orbit_stepper: Stepper
     executor: concurrent.futures.Executor | None
@@ -87,7 +88,7 @@ class Search:
 
     def _arrival(self) -> Stop:
         """The test for having reached a known attractor."""
-        return arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.tolerance)
+        return arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.distances)
 
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit and those that diverged."""
@@ -101,8 +102,7 @@ class Search:
     def _add_orbits(self, states: Array, longest: int) -> Array:
         """Add the new stable orbits that states lie on; return the states that lie on none."""
         path = _section_path(self.osc, states, self.stepper, longest)
-        scale = size_of(self.osc) + np.abs(path).max(axis=(0, 2))
-        distance = np.linalg.norm(path[1:] - path[0], axis=2) / scale
+        distance = np.linalg.norm((path[1:] - path[0]) / (units_of(self.osc) + np.abs(path).max(axis=0)), axis=2)
         close = distance < _RECURRENCE
         settled = close.any(axis=0)
         for index in np.flatnonzero(settled):
@@ -129,12 +129,13 @@ class Search:
             orbit = least_period(self.osc, refine_orbit(self.osc, point, period, stepper), stepper)
         except StructureError:
             return False
+        points = visited(self.osc, orbit, stepper)
         unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1
-        if unstable or not same_point(self.osc, point, visited(self.osc, orbit, stepper), _NEAR):
+        if unstable or not same_point(self.osc, point, points, _REACH):
             return False  # the motion passes near a saddle
         if not self._known(orbit.point, EQUAL):
             self.attractors.append(describe_orbit(self.osc, orbit, stepper))
-        return True
+        return same_point(self.osc, point, points, _NEAR)
 
     def _add_cycles(self, states: Array) -> None:
         """Add the limit cycles that states lie on."""
@@ -180,7 +181,7 @@ class Search:
             return
         osc, finer = self.osc, self.stepper.refined()
         clouds = list(_section_path(osc, survivors, finer, _VISITS - 1).transpose(1, 0, 2))
-        for group in separate(clouds, _OVERLAP * self.tolerance):
+        for group in separate([cloud[:, :2] / self.distances for cloud in clouds], _OVERLAP):
             periods = _measuring_time(osc)
             few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
             stepper = self.orbit_stepper if osc.barriers else finer  # without contacts fixed steps are as accurate
@@ -219,20 +220,21 @@ def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: in
 
 def _is_on(orbit: Array, point: Array) -> bool:
     """Whether a point lies on a closed curve, within the spacing of its samples."""
-    spacing = np.linalg.norm(np.diff(orbit, axis=0), axis=1).max()
-    return bool(np.linalg.norm(orbit - point[:2], axis=1).min() <= spacing)
+    extent = np.ptp(orbit, axis=0)
+    spacing = np.linalg.norm(np.diff(orbit, axis=0) / extent, axis=1).max()
+    return bool(np.linalg.norm((orbit - point[:2]) / extent, axis=1).min() <= spacing)
 
 
-def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, tolerance: float) -> Stepper:
-    """Return a stepper, refined until every attractor persists with it, at most four times."""
+def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> Stepper:
+    """Return a stepper, refined until every attractor persists with it within some distances, at most four times."""
     for _ in range(_REFINEMENTS):
-        if all(_persists(osc, attractor, stepper, tolerance) for attractor in attractors):
+        if all(_persists(osc, attractor, stepper, distances) for attractor in attractors):
             break
         stepper = stepper.refined()
     return stepper
 
 
-def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, tolerance: float) -> bool:
+def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, distances: Array) -> bool:
     """Whether motion that starts on an attractor is on it after a long time."""
     states, periods = attractor.points[:1], 2000
     if attractor.kind == "limit cycle":
@@ -243,5 +245,5 @@ def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, tolerance
     else:
         known, states = attractor.points, attractor.points[:: max(1, len(attractor.points) // _WATCHED)]
     ends = run_ensemble(osc, Flow.STATE, stepper, states, periods).states[:, :2]
-    distance = np.linalg.norm(ends[:, None] - known[None, :, :2], axis=2).min(axis=1)
-    return bool(np.mean(distance <= 2 * tolerance) > 0.9)
+    distance = np.linalg.norm((ends[:, None] - known[None, :, :2]) / distances, axis=2).min(axis=1)
+    return bool(np.mean(distance <= 2.0) > 0.9)

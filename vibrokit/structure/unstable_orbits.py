@@ -21,18 +21,18 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_equations
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
-from vibrokit.structure.newton import Evaluation, newton
+from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, section_equations, visited
-from vibrokit.structure.scales import search_region, size_of, states_at
+from vibrokit.structure.scales import search_region, states_at, units_of
 from vibrokit.structure.validation import check_means, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 8  # times as many cells on a side as starts, in which turning points of the map are searched for
 _ITERATIONS = 60
 _LEAST_FRACTION = 1e-3  # of a Newton step, below which a start has failed
-_LONGEST_STEP = 0.25  # of the region's size
+_LONGEST_STEP = 0.25  # of the region's widths
 _CONVERGED = 1e-9
-_APART = 1e-5  # of the region's size: largest distance between an orbit of the coarser map and the refined one
+_APART = 1e-5  # of the region's widths: largest distance between an orbit of the coarser map and the refined one
 _LONGEST_PERIOD = 10_000
 _MOST_STARTS = 10**6
 
@@ -111,8 +111,8 @@ def unstable_orbits(
         if not osc.autonomous:
             many = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
             equations = section_equations(osc, period, many, executor)
-        roots = _roots(osc, equations, guesses, where.size)
-        for orbit, points in _distinct(osc, roots, period, orbit_stepper, _APART * where.size):
+        roots = _roots(osc, equations, guesses, where)
+        for orbit, points in _distinct(osc, roots, period, orbit_stepper, where):
             if where.contains(points).any() and np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1:
                 limits = () if classifier is None else branch_limits(classifier, orbit)
                 found.append(describe_unstable(osc, orbit, orbit_stepper, limits))
@@ -143,29 +143,38 @@ def _turning_cells(
     return region.cell_centres(cells)[both.ravel()]
 
 
-def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Array, reach: float) -> Array:
+def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Array, region: Region) -> Array:
     """Return the places that damped Newton steps of limited length converge to, one for each start that does."""
 
     def limited(places: Array, steps: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
-            longest = _LONGEST_STEP * reach / np.linalg.norm(steps, axis=1, keepdims=True)
+            longest = _LONGEST_STEP / np.linalg.norm(region.scaled(steps), axis=1, keepdims=True)
         return steps * np.minimum(1.0, longest)
 
     def converged(places: Array, sizes: Array) -> NDArray[np.bool_]:
-        return np.asarray(sizes < _CONVERGED * (size_of(osc) + np.linalg.norm(places, axis=1)))
+        return np.asarray(sizes < _CONVERGED * (1.0 + np.linalg.norm(places / units, axis=1)))
+
+    units = units_of(osc)
 
     places, sizes, _ = newton(
-        equations, starts, iterations=_ITERATIONS, least_fraction=_LEAST_FRACTION, limited=limited, converged=converged
+        scaled(equations, units),
+        starts,
+        iterations=_ITERATIONS,
+        least_fraction=_LEAST_FRACTION,
+        limited=limited,
+        converged=converged,
     )
     return places[converged(places, sizes)]
 
 
-def _distinct(osc: Oscillator, roots: Array, period: int, stepper: Stepper, apart: float) -> list[tuple[Orbit, Array]]:
+def _distinct(
+    osc: Oscillator, roots: Array, period: int, stepper: Stepper, region: Region
+) -> list[tuple[Orbit, Array]]:
     """Refine roots; return each orbit of the period once, with its points."""
     known: list[tuple[Orbit, Array]] = []
     seen = np.empty((0, roots.shape[1]))
     for root in roots[np.lexsort(roots.T[::-1])]:
-        if len(seen) and np.linalg.norm(seen - root, axis=1).min() < apart:
+        if len(seen) and region.apart(seen, root).min() < _APART:
             continue
         seen = np.vstack([seen, root])
         try:

@@ -44,7 +44,7 @@ class Request:
         settling = self.settling
         if isinstance(settling, bool) or not isinstance(settling, Real) or not 0 < float(settling) <= 0.5:
             raise StructureError(
-                f"settling must be a fraction of the region's size, above 0 and at most 0.5, got {shown(settling)}."
+                f"settling must be a fraction of the region's widths, above 0 and at most 0.5, got {shown(settling)}."
             )
         for name in ("saddles", "manifolds"):
             if not isinstance(getattr(self, name), bool):

@@ -38,7 +38,7 @@ Whole = NDArray[np.int64]
 class BasinClassifier:
     """Finds the attractor that a state of the section leads to.
 
-    A periodic orbit or an equilibrium is reached within `tolerance` of one of its points. An attractor that meets the
+    A periodic orbit or an equilibrium is reached within `settling` of one of its points. An attractor that meets the
     section in a curve or a cloud (a limit cycle, quasiperiodic and chaotic motion) is marked on a fine grid; a
     trajectory that enters a marked cell must stay near the attractor for 64 more sections, or is followed further.
 
@@ -49,8 +49,8 @@ class BasinClassifier:
         A label is a place in this sequence.
     region : Region
         Distinguishes trajectories that left it from those that did not settle. A trajectory may leave it and return.
-    tolerance : float
-        Distance in (x, v) at which a point counts as reached.
+    settling : float
+        Distance at which a point counts as reached, as a fraction of the region's widths in x and v.
     budget : int
         Largest number of sections; those that confirm an extended attractor may come on top.
     stepper : Stepper
@@ -62,7 +62,7 @@ class BasinClassifier:
     osc: Oscillator
     attractors: Sequence[Attractor]
     region: Region
-    tolerance: float
+    settling: float
     budget: int
     stepper: Stepper
     executor: concurrent.futures.Executor | None = None
@@ -106,7 +106,7 @@ class BasinClassifier:
     def points(self) -> Stop:
         """The test for having reached an orbit or an equilibrium."""
         orbits = {place: a.points for place, a in enumerate(self.attractors) if not is_extended(a)}
-        return arrival_at(orbits, self.tolerance)
+        return arrival_at(orbits, self.settling * self.region.widths)
 
     @cached_property
     def entering(self) -> Stop:
@@ -128,7 +128,7 @@ class BasinClassifier:
 
     @cached_property
     def _mask(self) -> AttractorMask | None:
-        return mask_of(self.attractors, self.region, self.tolerance)
+        return mask_of(self.attractors, self.region, self.settling * self.region.widths)
 
 
 class _Trajectories:

@@ -27,7 +27,7 @@ DEFAULT_CELLS = (200, 200)
 """Of the finest grid."""
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
-_SETTLING = 1e-3  # of the region's size, the default of `find_structure`
+_SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
     UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
 }  # fmt: skip
@@ -51,7 +51,7 @@ class BasinGrid:
 
     The first grid is followed to the attractors. On each finer one a trajectory ends, after one section at least, in a
     cell of the grid before whose whole neighbourhood agrees; see `vibrokit.structure.basins.stop_cells`.
-    `cells` are those of the last grid; None: 200 × 200, or the finest before it that takes no more than 5 · 10⁶ sections.
+    `cells` are those of the last grid; None: 200 × 200, or the finest before it that takes at most 5 · 10⁶ sections.
     `margin` is how far cells must agree to classify a trajectory; None: every cell is followed to an attractor. The
     cells near a boundary are split in four `refine` times; the others keep their labels.
     """
@@ -176,7 +176,8 @@ def basin_fractions(
     stepper: Stepper | None,
 ) -> tuple[tuple[Attractor, ...], tuple[Finding, ...]]:
     """Find the basin fraction of each attractor in a region, and findings about the cells that lead to none."""
-    tolerance = _SETTLING * region.size
-    chosen = stepper or persistent_stepper(osc, attractors, ensemble_stepper(osc, Flow.STATE), tolerance)
-    basins = classify_grid(BasinClassifier(osc, attractors, region, tolerance, budget, chosen), cells)
+    chosen = stepper or persistent_stepper(
+        osc, attractors, ensemble_stepper(osc, Flow.STATE), _SETTLING * region.widths
+    )
+    basins = classify_grid(BasinClassifier(osc, attractors, region, _SETTLING, budget, chosen), cells)
     return with_fractions(attractors, basins), cell_findings(basins)

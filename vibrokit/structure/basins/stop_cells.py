@@ -97,7 +97,7 @@ def is_extended(attractor: Attractor) -> bool:
     return attractor.kind == "limit cycle" or not attractor.repeats
 
 
-def mask_of(attractors: Sequence[Attractor], region: Region, spacing: float) -> AttractorMask | None:
+def mask_of(attractors: Sequence[Attractor], region: Region, spacing: Array) -> AttractorMask | None:
     """Mark the extended attractors on a grid whose cells are about as wide as `spacing`; None if there are none."""
     samples = {place: _sample(a, spacing) for place, a in enumerate(attractors) if is_extended(a)}
     if not samples:
@@ -113,13 +113,13 @@ def mask_of(attractors: Sequence[Attractor], region: Region, spacing: float) -> 
     return AttractorMask(frame, cells, entered, near)
 
 
-def _sample(attractor: Attractor, spacing: float) -> Array:
+def _sample(attractor: Attractor, spacing: Array) -> Array:
     """Points of an extended attractor; those of a limit cycle closer together than `spacing`."""
     if attractor.kind != "limit cycle":
         return attractor.points[:, :2]
-    steps = np.linalg.norm(np.diff(attractor.orbit, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(attractor.orbit, axis=0) / spacing, axis=1)
     lengths = np.concatenate([[0.0], np.cumsum(steps)])
-    even = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / (0.5 * spacing)))
+    even = np.linspace(0.0, lengths[-1], 2 + int(2 * lengths[-1]))
     return np.stack([np.interp(even, lengths, column) for column in attractor.orbit.T], axis=1)
 
 

@@ -23,14 +23,14 @@ from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
 """Points for each 2π/ω_n in an autonomous scene, where any time step is a section."""
-_WIDTH = 1e-10  # of the region's size: target distance of two ends
+_WIDTH = 1e-10  # of the region's widths: target distance of two ends
 _SEPARATED, _TOGETHER = 60.0, 2.0  # times that: distances at which ends are brought together, and count as together
 _FEWEST_PIECES, _MOST_PIECES = 3, 63  # of a line between two ends, all corners classified at once
 _AT_ONCE = 512  # states to classify, about: fewer take as long
 _MOST_CUTS = 60
 _FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label; the third choice is random
-_RECURRENCE = 1e-6  # of the region's size: a motion has returned
-_CLOSE = 1e-3  # of the region's size: a motion that returns within this distance
+_RECURRENCE = 1e-6  # of the region's widths: a motion has returned
+_CLOSE = 1e-3  # of the region's widths: a motion that returns within this distance
 _STAY = 48  # times in a row converges to an orbit
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class Straddles:
         rng: np.random.Generator,
         only: Container[tuple[int, int]] | None = None,
     ) -> None:
-        self.classifier, self.rng, self.width = classifier, rng, _WIDTH * basins.region.size
+        self.classifier, self.rng = classifier, rng
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
         for pair, cells in meeting_cells(basins).items():
@@ -103,9 +103,9 @@ class Straddles:
         after = self._widths()
         with np.errstate(divide="ignore", invalid="ignore"):
             self._stretches.append(np.log(after / before))
-        separated = ~(after <= _SEPARATED * self.width)
+        separated = ~(after <= _SEPARATED * _WIDTH)
         if separated.any():  # the others are included: a call takes as long as its longest trajectory
-            separated |= after > _TOGETHER * self.width
+            separated |= after > _TOGETHER * _WIDTH
         self._bring_together(np.flatnonzero(separated))
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
@@ -134,7 +134,7 @@ class Straddles:
                 break
             shrunk = self._cut(wide)
             straddling[wide[~shrunk]] = False
-            wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * self.width)]
+            wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * _WIDTH)]
         straddling[wide] = False
         self.keep(straddling)
         self._points.append(self.ends.mean(axis=1))
@@ -164,7 +164,7 @@ class Straddles:
         return found
 
     def _widths(self) -> Array:
-        return np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        return self.classifier.region.apart(self.ends[:, 1], self.ends[:, 0])
 
 
 def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -209,19 +209,20 @@ def spread(lines: Array, most: int, rng: np.random.Generator) -> Array:
 
 
 def same_place(points: Array, places: Array, distance: float) -> bool:
-    """Whether each point (count, n) is within a distance of one of some places."""
+    """Whether each point (count, 2) is within a distance of one of some places."""
     return bool(np.linalg.norm(points[:, None] - places, axis=2).min(axis=1).max() < distance)
 
 
-def recurrence(points: Array, size: float, longest: int) -> int:
+def recurrence(points: Array, longest: int) -> int:
     """Return the number of sections after which a motion recurs for good; 0 if it does not.
 
-    On a chaotic set a motion passes near periodic orbits at any distance, the smaller the rarer.
+    Its points (count, 2) are in units of the region's widths. On a chaotic set a motion passes near periodic orbits at
+    any distance, the smaller the rarer.
     """
     for period in range(1, min(longest, len(points) - 1) + 1):
         apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
-        staying = len(apart) >= _STAY and apart[-_STAY:].max() < _CLOSE * size
-        if apart[-period:].max() < _RECURRENCE * size or staying:
+        staying = len(apart) >= _STAY and apart[-_STAY:].max() < _CLOSE
+        if apart[-period:].max() < _RECURRENCE or staying:
             return period
     return 0
 
@@ -234,15 +235,18 @@ def almost_repeats(points: Array, last: int, longest: int, near: float) -> bool:
     )
 
 
-def closing(points: Array, size: float, interval: float) -> tuple[Array, float] | None:
-    """Estimate the turning point of greatest x and the duration of a cycle from a motion, if it closes at its end."""
+def closing(points: Array, width: float, interval: float) -> tuple[Array, float] | None:
+    """Estimate the turning point of greatest x and the duration of a cycle from a motion, if it closes at its end.
+
+    `width` is that of the region in x.
+    """
     motion = CubicHermiteSpline(interval * np.arange(len(points)), points[:, 0], points[:, 1])
     turns = motion.derivative().roots(extrapolate=False)
     turns = turns[motion.derivative(2)(turns) < 0]
     heights = motion(turns)
     for back in range(1, len(turns)):
         highest = len(turns) - back + int(np.argmax(heights[-back:]))
-        if highest >= back and abs(heights[highest] - heights[highest - back]) < _CLOSE * size:
+        if highest >= back and abs(heights[highest] - heights[highest - back]) < _CLOSE * width:
             state = points[int(turns[highest] / interval)].copy()
             state[0], state[1] = heights[highest], 0.0
             return state, float(turns[highest] - turns[highest - back])

@@ -33,8 +33,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _LONGEST_PERIOD = 16
 _CHECKED_EVERY = 4  # sections
-_FARTHEST = 1e-2  # of the region's size: largest distance from a motion to the orbit that it converges to
-_NEAR = 1e-3  # of the region's size: distance from a saddle within which a motion on the boundary converges to it
+_FARTHEST = 1e-2  # of the region's widths: largest distance from a motion to the orbit that it converges to
+_NEAR = 1e-3  # of the region's widths: distance from a saddle within which a motion on the boundary converges to it
 _MOST_TRIES = 4
 _FEW_POINTS = 12  # last points of a motion that must all be within that distance
 _SAMPLES = 8192  # of a cycle
@@ -70,9 +70,9 @@ class SaddleSearch:
 
     def __post_init__(self) -> None:
         self.osc = self.classifier.osc
-        self.near = _NEAR * self.classifier.region.size
+        self.region = self.classifier.region
         self._found: list[Saddle] = []
-        self._places: list[Array] = []
+        self._places: list[Array] = []  # in units of the region's widths, as all points that are compared
         self._explained: set[Pair] = set()
         self._lost: tuple[Pair, ...] = ()
         self._findings: list[Finding] = []
@@ -152,12 +152,13 @@ class SaddleSearch:
     def _arrived(self, straddles: Straddles, index: int, tries: NDArray[np.int64]) -> bool:
         """Whether a motion has converged to a saddle, known or new."""
         track, number = straddles.track(index), straddles.numbers[index]
-        if any(same_place(track.points[-_FEW_POINTS:], places, self.near) for places in self._places):
+        points = self.region.scaled(track.points)
+        if any(same_place(points[-_FEW_POINTS:], places, _NEAR) for places in self._places):
             return True
         autonomous = self.osc.autonomous
         if tries[number] == _MOST_TRIES and not autonomous:
             return False
-        period = recurrence(track.points, self.classifier.region.size, 1 if autonomous else _LONGEST_PERIOD)
+        period = recurrence(points, 1 if autonomous else _LONGEST_PERIOD)
         try:
             if period:
                 tries[number] += 1
@@ -170,9 +171,9 @@ class SaddleSearch:
         here = track.points[-1]
         orbit = refine_unstable(self.osc, here, period, self.orbit_stepper)
         unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1
-        if not unstable or np.linalg.norm(orbit.point - here) > _FARTHEST * self.classifier.region.size:
+        if not unstable or self.region.apart(orbit.point, here) > _FARTHEST:
             return False
-        if any(same_place(orbit.point[None], places, EQUAL * self.classifier.region.size) for places in self._places):
+        if any(same_place(self.region.scaled(orbit.point[None]), places, EQUAL) for places in self._places):
             return True
         limits = branch_limits(self.classifier, orbit)
         if len(set(limits)) < 2:
@@ -181,23 +182,23 @@ class SaddleSearch:
         return True
 
     def _reached_cycle(self, track: EdgeTrack, interval: float) -> bool:
-        size = self.classifier.region.size
-        guess = closing(track.points, size, interval)
+        guess = closing(track.points, self.region.widths[0], interval)
         if guess is None:
             return False
         cycle = refine_cycle(self.osc, guess[0], guess[1], self.orbit_stepper)
-        if np.linalg.norm(cycle.point - guess[0]) > _FARTHEST * size:
+        if self.region.apart(cycle.point, guess[0]) > _FARTHEST:
             return False
-        if any(same_place(cycle.point[None], places, self.near) for places in self._places):
+        if any(same_place(self.region.scaled(cycle.point[None]), places, _NEAR) for places in self._places):
             return True
         self._add(describe_unstable(self.osc, cycle, self.orbit_stepper, track.labels))
         spacing = cycle.duration / _SAMPLES
-        self._places[-1] = record(self.osc, Flow.STATE, self.orbit_stepper, cycle.point, 0.0, spacing, _SAMPLES)
+        cycle_points = record(self.osc, Flow.STATE, self.orbit_stepper, cycle.point, 0.0, spacing, _SAMPLES)
+        self._places[-1] = self.region.scaled(cycle_points)
         return True
 
     def _add(self, saddle: Saddle) -> None:
         self._found.append(saddle)
-        self._places.append(saddle.points)
+        self._places.append(self.region.scaled(saddle.points))
 
     def _describe_wandering(self, straddles: Straddles) -> None:
         """Describe the motions that converged to no orbit, those of each pair of labels together."""
@@ -220,7 +221,7 @@ class SaddleSearch:
                 self._findings.append(_on_boundary(Code.EDGE_NOT_CONVERGED, pair))
 
     def _repeats(self, points: Array) -> bool:
-        return almost_repeats(points, _FEW_POINTS, _LONGEST_PERIOD, self.near)
+        return almost_repeats(self.region.scaled(points), _FEW_POINTS, _LONGEST_PERIOD, _NEAR)
 
 
 def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:

@@ -18,7 +18,7 @@ from vibrokit.structure.orbits import Orbit, exponents_of, least_period, refine_
 from vibrokit.symbolic.flow_kind import Flow
 
 _RESIDUAL = 1e-10
-_DEPARTURE = 1e-5  # of the region's size: distance from a saddle at which its branches are followed
+_DEPARTURE = 1e-5  # of the region's widths: distance from a saddle at which its branches are followed
 _CLEAR = 100.0  # times the error of the stepper at the saddle, if that is larger
 _LARGEST_DEPARTURE = 1e-2
 _ON_A_BRANCH = 16
@@ -94,28 +94,28 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
         orbit = orbit.refined(classifier.osc, classifier.stepper)
     values, vectors = np.linalg.eig(orbit.monodromy)
-    reach = classifier.region.size
-    away = min(_LARGEST_DEPARTURE * reach, max(_DEPARTURE * reach, _CLEAR * _mismatch(classifier, orbit)))
+    widths = classifier.region.widths
+    away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
     if np.sum(np.abs(values) > 1) > 1:
         angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
         ring = np.zeros((_ROUND, len(orbit.point)))
-        ring[:, 0], ring[:, 1] = np.cos(angles), np.sin(angles)
+        ring[:, 0], ring[:, 1] = widths[0] * np.cos(angles), widths[1] * np.sin(angles)
         return tuple(int(label) for label in np.unique(classifier.labels(orbit.point + away * ring)))
     largest = int(np.argmax(np.abs(values)))
-    direction = vectors[:, largest].real / np.linalg.norm(vectors[:, largest].real)
+    direction = vectors[:, largest].real / np.linalg.norm(vectors[:2, largest].real / widths)
     direction *= np.copysign(1.0, direction[np.flatnonzero(direction)[0]])
-    growth = np.clip(np.abs(values[largest]), 2.0, _LARGEST_DEPARTURE * reach / away)
+    growth = np.clip(np.abs(values[largest]), 2.0, _LARGEST_DEPARTURE / away)
     distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
     sides = [classifier.labels(orbit.point + side * distances[:, None] * direction) for side in (-1, 1)]
     return _label_of_each(*sides)
 
 
 def _mismatch(classifier: BasinClassifier, orbit: Orbit) -> float:
-    """Return the distance between the point of an orbit and its image under the classifier's map."""
+    """Return the distance between the point of an orbit and its image under the classifier's map, in widths."""
     if classifier.osc.autonomous:
         return orbit.residual
     ended = run_ensemble(classifier.osc, Flow.STATE, classifier.stepper, orbit.point[None], orbit.period)
-    return float(np.linalg.norm(ended.states[0] - orbit.point))
+    return float(classifier.region.apart(ended.states[0], orbit.point))
 
 
 def _label_of_each(low: NDArray[np.int64], high: NDArray[np.int64]) -> tuple[int, int]:

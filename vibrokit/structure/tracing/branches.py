@@ -115,8 +115,9 @@ class Tracing:
         if other is None and followed.stable:
             other = self._add(attractor, end, to)
         if other is None:
-            orbit = Orbit(end.point, attractor.period, end.duration, end.derivative, end.residual)
-            self._led_to[at, index, to] = visited(self.at(end.value), orbit, self.stepper)
+            osc = self.at(end.value)
+            orbit = Orbit(end.point, attractor.period, end.duration, end.derivative, end.residual(osc))
+            self._led_to[at, index, to] = visited(osc, orbit, self.stepper)
             return
         first, second, pair = (index, other, at) if to > at else (other, index, to)
         if first not in self.links[pair] and second not in self.links[pair].values():
@@ -136,10 +137,10 @@ class Tracing:
         osc, period = self.at(self.values[at]), origin.period
         try:
             if origin.kind == "limit cycle":
-                orbit: Orbit = Cycle(member.point, 1, member.duration, member.derivative, member.residual)
+                orbit: Orbit = Cycle(member.point, 1, member.duration, member.derivative, member.residual(osc))
             else:
                 (monodromy,) = linear_map(osc, member.point[None], self.stepper, intervals=period).derivatives
-                orbit = Orbit(member.point, period, period * osc.section_interval, monodromy, member.residual)
+                orbit = Orbit(member.point, period, period * osc.section_interval, monodromy, member.residual(osc))
             attractor = describe_orbit(osc, orbit, self.stepper)
         except VibrokitError:
             return None

@@ -17,6 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.autonomous import cycle_equations, equilibrium_equations, turning_point
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import section_equations
+from vibrokit.structure.scales import units_of
 
 _ITERATIONS = 12
 _CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
@@ -39,10 +40,9 @@ class Member:
     defect: Array  # (n,), image less point; at an equilibrium, the rate of change times a sixteenth of 2π/ω_n
     jacobian: Array  # (n, n), derivative of the defect in the unknowns, each in units of its size
 
-    @property
-    def residual(self) -> float:
-        """Size of the defect."""
-        return float(np.linalg.norm(self.defect))
+    def residual(self, osc: Oscillator) -> float:
+        """Size of the defect in units of the scene."""
+        return float(np.linalg.norm(self.defect / units_of(osc)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
