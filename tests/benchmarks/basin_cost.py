@@ -90,7 +90,7 @@ def tightened(osc, structure, limit: int) -> vk.Structure:
 
 def renamed(structure, reference) -> NDArray[np.int64]:
     """Labels by the places of the reference's attractors, matched by the nearest point."""
-    scale = SAME * reference.basins.region.size
+    scale = SAME * float(reference.basins.region.widths.min())
     labels = structure.basins.labels.astype(np.int64)
     renamed = labels.copy()
     for attractor in structure.attractors:

@@ -34,7 +34,7 @@ def attractor(points, kind="periodic", orbit=None):
 
 def classifier(osc, points, bounds, **changes):
     region = Region.of(bounds)
-    settings = {"tolerance": 1e-3 * float(np.ptp(region.bounds, axis=1).min()), "budget": 700, "stepper": vk.RK4(256)}
+    settings = {"settling": 1e-3, "budget": 700, "stepper": vk.RK4(256)}
     return BasinClassifier(osc, [attractor(p) for p in points], region, **settings | changes)
 
 
@@ -104,7 +104,7 @@ def circles():
     angles = np.linspace(0, 2 * np.pi, 401)
     circle = attractor((2.0, 0.0), "limit cycle", 2 * np.stack([np.cos(angles), -np.sin(angles)], axis=1))
     rest = attractor((0.0, 0.0), "equilibrium")
-    return BasinClassifier(osc, [rest, circle], Region((-2.5, 2.5), (-2.5, 2.5)), 5e-3, 300, vk.RK4(256))
+    return BasinClassifier(osc, [rest, circle], Region((-2.5, 2.5), (-2.5, 2.5)), 1e-3, 300, vk.RK4(256))
 
 
 @pytest.mark.parametrize("margin", [None, 2])
@@ -125,7 +125,7 @@ def test_chaos_is_told_from_the_orbit_beside_it():
     many = many[np.linalg.norm(many - orbit.point, axis=1) > 1e-3][:128]
     points = np.concatenate([many := osc.section_map(many) for _ in range(32)])
     region = Region((0.5, 4.5), (-7.0, 7.0))
-    found = BasinClassifier(osc, [attractor(orbit.point), attractor(points, "chaotic")], region, 4e-3, 500, vk.RK4(256))
+    found = BasinClassifier(osc, [attractor(orbit.point), attractor(points, "chaotic")], region, 1e-3, 500, vk.RK4(256))
     for labels in (found.labels(region.cell_centres((40, 40))), classify_grid(found, (40, 40)).labels.ravel()):
         ends = osc.section_map(region.cell_centres((40, 40)), 1000)
         np.testing.assert_array_equal(labels, np.linalg.norm(ends - orbit.point, axis=1) > 1e-3)
@@ -138,7 +138,7 @@ def test_a_curve_that_is_crossed_is_not_reached():
     angles = np.random.default_rng(0).uniform(0, 2 * np.pi, 4096)
     circle = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     records = [attractor((0.0, 0.0), "equilibrium"), attractor(circle, "quasiperiodic")]
-    rest = BasinClassifier(osc, records, Region((-1, 1), (-1, 1)), 5e-3, 1000, vk.RK4(256))
+    rest = BasinClassifier(osc, records, Region((-1, 1), (-1, 1)), 2.5e-3, 1000, vk.RK4(256))
     assert (rest.labels(rest.region.cell_centres((20, 20))) == 0).all()
 
 
@@ -174,7 +174,7 @@ def test_refined_cells_agree_with_a_fine_grid(duffing):
 
 
 def test_leaving_the_region_on_the_way_is_no_end(wells):
-    small = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.3, 1.3), (-0.3, 0.3)), tolerance=wells.tolerance)
+    small = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.3, 1.3), (-0.3, 0.3)), settling=4e-3)
     gone = wells.osc.section_map(small.region.cell_centres((30, 30)))
     assert np.mean(np.abs(gone[:, 1]) > 0.3) > 0.05  # some do leave
     states = small.region.cell_centres((30, 30))
@@ -184,7 +184,7 @@ def test_leaving_the_region_on_the_way_is_no_end(wells):
 
 
 def test_an_attractor_outside_the_region_is_found(wells):
-    left_only = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.6, -0.4), (-0.5, 0.5)), tolerance=wells.tolerance)
+    left_only = classifier(wells.osc, [(-1.0, 0.0), (1.0, 0.0)], ((-1.6, -0.4), (-0.5, 0.5)), settling=4e-3)
     labels = classify_grid(left_only, (40, 40)).labels
     states = left_only.region.cell_centres((40, 40))
     np.testing.assert_array_equal(labels.ravel(), wells.labels(states))

@@ -205,7 +205,7 @@ def test_no_decay_is_seen_where_none_settled():
 
 
 def arrival(orbits):
-    return arrival_at(dict(enumerate(orbits)), 1e-3)
+    return arrival_at(dict(enumerate(orbits)), np.array([1e-3, 1e-3]))
 
 
 def test_watching_an_orbit_and_what_runs_away():

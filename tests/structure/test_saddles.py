@@ -27,7 +27,7 @@ def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
     """Return a classifier that uses a grid of basins, and the grid."""
     region = Region.of(bounds)
     chosen = stepper or ensemble_stepper(osc, Flow.STATE)
-    classifier = BasinClassifier(osc, attractors, region, 1e-3 * region.size, budget, chosen)
+    classifier = BasinClassifier(osc, attractors, region, 1e-3, budget, chosen)
     basins = classify_grid(classifier, cells)
     return classifier.sharing(basins, 2), basins
 

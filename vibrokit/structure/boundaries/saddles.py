@@ -44,7 +44,6 @@ _FEW, _FEWEST = 6, 2
 _MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer go on
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they need longer
 _QUICK = 2000
-_LONGEST = 128  # sections
 _LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
 _RESIDUAL = 1e-10
@@ -60,13 +59,14 @@ class SaddleSearch:
     The classifier finds where states lead, and integrates those on the boundaries. One that uses a finished grid is
     fast; a boundary on which it finds no saddle is followed again without the grid. There are at most `trackers`
     motions for each pair of basins that meet, six after 32 sections, and two when classifying states has taken 10⁶
-    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after 128 sections.
+    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after `sections`.
     """
 
     classifier: BasinClassifier
     basins: Basins
     orbit_stepper: Stepper
     trackers: int = 9
+    sections: int = 128
 
     def __post_init__(self) -> None:
         self.osc = self.classifier.osc
@@ -129,7 +129,7 @@ class SaddleSearch:
         motions = len(straddles.origins)
         tries = np.zeros(motions, dtype=np.int64)
         parts = PARTS_OF_A_TURN if self.osc.autonomous else 1
-        for step in range(1, _LONGEST * parts + 1):
+        for step in range(1, self.sections * parts + 1):
             if not len(straddles):
                 break
             straddles.advance()
