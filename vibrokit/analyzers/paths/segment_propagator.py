@@ -15,6 +15,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import GaussianMap, HamiltonianMap, Map, gaussian_map, hamiltonian_map, joined
 from vibrokit.symbolic.flow_kind import Flow
 
+_BESIDE = 0.02  # of a piece
 Array = NDArray[np.float64]
 
 
@@ -47,6 +48,14 @@ class SegmentPropagator:
     def grain(self) -> int:
         """Nodes from section to section; without forcing, every node is on the section."""
         return 1 if self.osc.autonomous else self.pieces
+
+    def touching(self, states: Array) -> NDArray[np.bool_]:
+        """Return which states (count, n or more) touch a stop, or may do so within a small part of a piece."""
+        x, close = states[:, 0], _BESIDE * self.piece * np.abs(states[:, 1])
+        touching = np.zeros(len(states), dtype=bool)
+        for barrier in self.osc.barriers:
+            touching |= barrier.sign * (x - barrier.position) > -close
+        return touching
 
     def linear(self, states: Array, first: int, last: float | None = None) -> GaussianMap:
         """Map consecutive nodes (count, n) over one piece each without noise, with the covariance that noise adds.

@@ -17,7 +17,8 @@ from vibrokit.errors import StructureError
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
 
-_EVALUATIONS = 200  # of the misfits; a path that converges at all needs 10 to 60
+MOST_EVALUATIONS = 200
+"""Of the misfits; a path that converges at all needs 10 to 60."""
 _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may grow without bound
@@ -88,7 +89,7 @@ def extremal_path(
     points: Array,  # (nodes, 2n): guess of (q, p), a piece apart
     last: float,  # duration of the last piece (s); a guess where it is free
     *,
-    evaluations: int = _EVALUATIONS,  # of the misfits, at most
+    evaluations: int = MOST_EVALUATIONS,  # of the misfits, at most
     accepted: float = ACCEPTED,  # misfit
 ) -> ExtremalPath:
     """Solve for a path: continuity, n conditions at the source, the conditions of the ending.
@@ -111,6 +112,7 @@ def extremal_path(
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Evaluation:
     carried: HamiltonianMap
+    unknown: NDArray[np.intp]  # nodes
     misfits: Array
     largest: float
 
@@ -122,7 +124,6 @@ class _Pin:
         if len(points) < 3:
             raise StructureError("the guessed path is shorter than three pieces.")
         self.node = 1 + int(np.argmax(np.linalg.norm((points[2:] - points[:-2]) / scale, axis=1)))
-        self.jump = slice((self.node - 1) * len(scale), self.node * len(scale))  # misfits of the piece that ends there
         self.point = points[self.node] / scale
         n, rate = len(scale) // 2, propagator.rate(points[self.node], 0.0)
         normal = np.concatenate([-rate[n:], rate[:n]]) * scale  # ∇H = (−p′, q′)
@@ -172,7 +173,9 @@ class _Soft:
 class _Matching:
     """The equations, their derivatives, and Newton's method on them.
 
-    Unknown are the points and at most one number: the duration of the last piece where it is free, or the slack.
+    Unknown are the points and at most one number: the duration of the last piece where it is free, or the slack. A
+    point in a short contact is no unknown but the image of the point before it: there a state changes within a fraction
+    of the contact's duration, so that Newton's steps would have to be tiny.
     """
 
     def __init__(
@@ -186,37 +189,59 @@ class _Matching:
     ) -> None:
         self.propagator, self.source, self.first, self.ending, self.last = propagator, source, first, ending, last
         self.origin = source.point(first)
-        self.scale = _sizes(guess, self.origin)
+        self.pin: _Pin | None = None
+        self.scale = _sizes(guess[self._unknown(guess)], self.origin)
         self.normals = normals_of(source.unstable[source.node(first)], self.scale)
-        shiftable = propagator.osc.autonomous and ending.period_nodes > 0
-        self.pin = _Pin(propagator, guess, self.scale) if shiftable else None
+        if propagator.osc.autonomous and ending.period_nodes > 0:
+            self.pin = _Pin(propagator, guess, self.scale)
         self.start_of_last = float((first + len(guess) - 2) % propagator.pieces) * propagator.piece
 
-    def evaluate(self, points: Array, number: Array) -> _Evaluation:
+    def _unknown(self, points: Array) -> NDArray[np.intp]:
+        """Return the nodes whose points are unknown: all but those in a contact that neither neighbour lies in."""
+        touching = self.propagator.touching(points)
+        short = np.zeros(len(points), dtype=bool)
+        short[1:-1] = touching[1:-1] & ~touching[:-2] & ~touching[2:]
+        if self.pin is not None:
+            short[self.pin.node] = False
+        return np.flatnonzero(~short)
+
+    def _joined(self, points: Array, unknown: NDArray[np.intp]) -> Array:
+        """Return the points with those that are no unknowns replaced by the images of the points before them."""
+        short = np.setdiff1d(np.arange(len(points)), unknown)
+        if short.size:
+            points = points.copy()
+            points[short] = self.propagator.extremal_from(points[short - 1], self.first + short - 1, None).images
+        return points
+
+    def evaluate(self, points: Array, number: Array, unknown: NDArray[np.intp]) -> _Evaluation:
         """Carry all pieces and compare."""
         last = self._last(number)
         if not 0 < last < _LONGEST_LAST * self.propagator.piece:
-            return _Evaluation(HamiltonianMap(points, points, points), points, math.inf)
+            return _Evaluation(HamiltonianMap(points, points, points), unknown, points, math.inf)
         carried = self.propagator.extremal(points[:-1], self.first, last)
         parts = [
             self.normals @ ((points[0] - self.origin) / self.scale),
-            ((points[1:] - carried.images) / self.scale).ravel(),
+            ((points[1:] - carried.images) / self.scale)[unknown[1:] - 1].ravel(),
             self.ending.misfit(points[-1], self.start_of_last + last, self.scale),
         ]
         if self.pin is not None:
-            parts[1][self.pin.jump] -= number[0] * self.pin.normal
+            parts[1][self._jump(unknown)] -= number[0] * self.pin.normal
             parts.append(np.array([self.pin.rate @ (points[self.pin.node] / self.scale - self.pin.point)]))
         misfits = np.concatenate(parts)
         largest = float(np.abs(misfits).max())
-        return _Evaluation(carried, misfits, largest if math.isfinite(largest) else math.inf)
+        return _Evaluation(carried, unknown, misfits, largest if math.isfinite(largest) else math.inf)
 
     def derivatives(self, points: Array, number: Array, current: _Evaluation) -> scipy.sparse.csc_array:
         """Derivatives of the misfits in the scaled points and the number."""
-        pieces, double = points.shape[0] - 1, points.shape[1]
+        unknown, double = current.unknown, points.shape[1]
+        pieces = len(unknown) - 1
         size, ahead = double * (pieces + 1), len(self.normals)
         below, end = ahead + pieces * double, self.start_of_last + self._last(number)
         at_end, in_time = self.ending.derivatives(points[-1], end, self.scale)
-        steps = current.carried.derivatives * self.scale / self.scale[:, None]
+        over_one = current.carried.derivatives * self.scale / self.scale[:, None]
+        steps = over_one[unknown[:-1]]
+        double_steps = np.flatnonzero(np.diff(unknown) == 2)
+        steps[double_steps] = over_one[unknown[double_steps] + 1] @ steps[double_steps]
         starts, ones = double * np.arange(pieces), np.arange(pieces * double)
         table = [
             (self.normals, 0, 0),
@@ -228,8 +253,9 @@ class _Matching:
             rate = self.propagator.rate(current.carried.images[-1], end) / self.scale
             table += [(in_time, below, size), (-rate[:, None], below - double, size)]
         if self.pin is not None:
-            table.append((self.pin.rate[None], below + len(at_end), self.pin.node * double))
-            table.append((-self.pin.normal[:, None], ahead + self.pin.jump.start, size))
+            jump = self._jump(unknown).start
+            table.append((self.pin.rate[None], below + len(at_end), jump + double))
+            table.append((-self.pin.normal[:, None], ahead + jump, size))
         side = size + len(number)
         return sparse_blocks(table, (side, side))
 
@@ -241,7 +267,9 @@ class _Matching:
         may be small enough already. If not, the path moves along the family, a short step at a time.
         """
         number = np.array([self.last] if self.ending.free_time else [0.0] if self.pin is not None else [])
-        current, flat = self.evaluate(points, number), False
+        unknown = self._unknown(points)
+        points = self._joined(points, unknown)
+        current, flat = self.evaluate(points, number, unknown), False
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
             try:
@@ -262,8 +290,8 @@ class _Matching:
             length = float(np.linalg.norm(step))
             share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), _SMALL))
             while share > _SHORTEST_STEP:
-                moved = self._moved(points, number, share * step)
-                tried = self.evaluate(*moved)
+                moved = self._moved(points, number, share * step, current.unknown)
+                tried = self.evaluate(*moved, current.unknown)
                 evaluations -= 1
                 if math.isfinite(tried.largest):
                     ahead = float(np.linalg.norm(soft.without(factors.solve(tried.misfits))))
@@ -275,6 +303,9 @@ class _Matching:
             (points, number), current = moved, tried
             if length < _SMALL * math.sqrt(len(step)):
                 break
+            if not np.array_equal(unknown := self._unknown(points), current.unknown):
+                points = self._joined(points, unknown)
+                current = self.evaluate(points, number, unknown)
         slack = 0.0 if self.pin is None else abs(float(number[0]))
         return ExtremalPath(
             self.source, self.first, self.ending, points, self._last(number),
@@ -285,8 +316,16 @@ class _Matching:
     def _last(self, number: Array) -> float:
         return float(number[0]) if self.ending.free_time else self.last
 
-    def _moved(self, points: Array, number: Array, step: Array) -> tuple[Array, Array]:
-        return points + self.scale * step[: points.size].reshape(points.shape), number + step[points.size :]
+    def _moved(self, points: Array, number: Array, step: Array, unknown: NDArray[np.intp]) -> tuple[Array, Array]:
+        moved, parted = points.copy(), len(unknown) * points.shape[1]
+        moved[unknown] += self.scale * step[:parted].reshape(-1, points.shape[1])
+        return self._joined(moved, unknown), number + step[parted:]
+
+    def _jump(self, unknown: NDArray[np.intp]) -> slice:
+        """The misfits at the node where H may jump."""
+        assert self.pin is not None
+        place, double = int(np.searchsorted(unknown, self.pin.node)), len(self.scale)
+        return slice((place - 1) * double, place * double)
 
 
 def _over_jumps(points: Array, images: Array) -> float:

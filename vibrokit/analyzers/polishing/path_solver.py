@@ -14,7 +14,7 @@ from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import ACCEPTED, ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.newton import ACCEPTED, MOST_EVALUATIONS, ExtremalPath, extremal_path
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
@@ -24,6 +24,7 @@ LONG_ENOUGH = 1e-6
 """Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
+_FROM_MOMENTA = 60  # evaluations for a candidate with momenta, which other methods follow if they are not enough
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
@@ -63,7 +64,7 @@ class PathSolver:
             first, points = _begun(propagator, self.source, cut)
             if cut.momenta is not None:
                 with contextlib.suppress(StructureError):
-                    return self._once(self._shot(first, cut, points), _give_up)
+                    return self._once(self._shot(first, cut, points, evaluations=_FROM_MOMENTA), _give_up)
             states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
         points, action, first, cut = min(fitted, key=lambda each: each[1])
@@ -115,9 +116,18 @@ class PathSolver:
         )  # fmt: skip
         return self._shot(first, cut, points, source)
 
-    def _shot(self, first: int, cut: Cut, points: Array, source: LinearizedOrbit | None = None) -> ExtremalPath:
-        source = source or self.source
-        return extremal_path(self.propagator, source, first, cut.ending, points, cut.last, accepted=ROUGHLY_ACCEPTED)
+    def _shot(
+        self,
+        first: int,
+        cut: Cut,
+        points: Array,
+        source: LinearizedOrbit | None = None,
+        evaluations: int = MOST_EVALUATIONS,
+    ) -> ExtremalPath:
+        return extremal_path(
+            self.propagator, source or self.source, first, cut.ending, points, cut.last,
+            evaluations=evaluations, accepted=ROUGHLY_ACCEPTED,
+        )  # fmt: skip
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
         """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""

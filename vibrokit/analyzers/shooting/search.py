@@ -96,13 +96,15 @@ def _branch(shooter: Shooter, outcomes: Outcomes, index: int) -> Branch:
     phase = np.zeros(len(path)) if autonomous else np.arange(len(path)) % fine
     phases = range(1 if autonomous else fine)
     kept = slice(None, None, fine // _PER_INTERVAL)
+    n = (path.shape[1] - 1) // 2
     candidate = Candidate(
         source=shooter.problem.source,
         target=int(outcomes.targets[index]),
         times=times[kept],
-        states=path[kept, : (path.shape[1] - 1) // 2].copy(),
+        states=path[kept, :n].copy(),
         action=float(outcomes.actions[index]),
         finder=FINDER,
+        momenta=path[kept, n : 2 * n].copy(),
     )
     return Branch(
         index,
