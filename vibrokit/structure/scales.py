@@ -156,7 +156,8 @@ def search_region(osc: Oscillator) -> Region:
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     """Return a region that contains the attractors' points and the stops, with a margin around them.
 
-    It is at least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
+    It contains the largest speed of each attractor at any phase, since other motions pass the section there. It is at
+    least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
     or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
     largest speed can reach.
     """
@@ -172,7 +173,8 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     least = 0.5 * gap or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
-    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()))
+    fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
+    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest)
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
