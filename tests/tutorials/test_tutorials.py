@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import vibrokit as vk
@@ -387,3 +388,47 @@ def test_exit_times_of_the_clear_state(exits):
 def test_pictures_of_the_exit_times(exits, tmp_path):
     exits.save_pictures(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(exits.PICTURES)
+
+
+# -- 07: a machine ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def machine(run):
+    return run("07_a_machine")
+
+
+def test_the_ball_runs_clear_as_a_linear_oscillator(machine):
+    rate, drive = 2 * np.pi * 40, 2 * np.pi * 50
+    amplitude = 3.0 / np.sqrt((rate**2 - drive**2) ** 2 + (2 * 0.05 * rate * drive) ** 2)
+    assert np.ptp(machine.clear.orbit[:, 0]) / 2 == pytest.approx(amplitude, rel=1e-4)
+    rates = -0.05 * rate + 1j * rate * np.sqrt(1 - 0.05**2) * np.array([1, -1])
+    found = machine.clear.multipliers
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(np.exp(rates / 50)), rtol=1e-8)
+
+
+def test_hammering_is_symmetric_and_its_impacts_are_those_of_hertz(machine):
+    """A free mass of speed v is in contact for 2 ∫ dδ/√(v² − (4/5) k δ^(5/2)), from 0 to the largest depth."""
+    force, other = (machine.hammering.peak_force[side] for side in ("right", "left"))
+    assert force == pytest.approx(other, rel=1e-6)
+    assert force == pytest.approx(machine.stiffness * machine.depth**1.5, rel=1e-9)
+    whole = 2 * quad(lambda share: 1 / np.sqrt(1 - share**2.5), 0, 1)[0]
+    assert machine.duration == pytest.approx(whole * machine.depth / machine.speed, rel=1e-4)
+    assert machine.hammering.hits == {"right": 1, "left": 1}
+
+
+def test_units_decide_two_sums_of_sensitivities(machine):
+    """ΔU is in m² s⁻³, so that Euler's theorem on homogeneous functions gives two sums exactly."""
+    assert machine.by_length == pytest.approx(2.0, abs=1e-5)
+    assert machine.by_time == pytest.approx(3.0, abs=1e-5)
+
+
+def test_simulated_exits_of_the_machine_agree_with_its_energy(machine):
+    """The factor before the exponential is some periods: neither a thousandth of one nor a thousand of them."""
+    assert machine.energy.certificate is not None
+    assert 0.1 < machine.prefactor / machine.osc.period < 100
+
+
+def test_pictures_of_the_machine(machine, tmp_path):
+    machine.save_pictures(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(machine.PICTURES)
