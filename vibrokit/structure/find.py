@@ -79,8 +79,8 @@ def find_structure(
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them.
     cells : (int, int), optional
-        Cells of the basin grid in x and v. By default 200 × 200; 100 × 100 or 50 × 50 where transients are so long that
-        the finer grid would take more than 5 · 10⁶ sections.
+        Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
+        are so long that the next finer grid would take more than 5 · 10⁶ sections.
     refine : int
         How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional

@@ -22,7 +22,8 @@ from vibrokit.structure.basins.stop_cells import agreeing, centres
 from vibrokit.structure.search import persistent_stepper
 from vibrokit.symbolic.flow_kind import Flow
 
-_COARSEST = 4096  # cells of the first grid, followed to the attractors
+_COARSEST, _FEWEST = 4096, 400  # cells of the first grid, followed to the attractors; by default where that takes long
+_MOST_FIRST = 20_000_000  # sections that the first grid may take by default
 DEFAULT_CELLS = (200, 200)
 """Of the finest grid."""
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
@@ -61,8 +62,9 @@ class BasinGrid:
     ) -> None:
         self._classifier, self._margin, self._refine = classifier, margin, refine
         self._most_sections = math.inf if cells is not None else _MOST_SECTIONS
+        coarsest = _COARSEST if cells is not None else min(_COARSEST, max(_FEWEST, _MOST_FIRST // classifier.budget))
         whole = cells or DEFAULT_CELLS
-        self._shapes = _shapes(whole) if margin is not None else [whole]
+        self._shapes = _shapes(whole, coarsest) if margin is not None else [whole]
         self._labels = np.full(whole, NOT_FOLLOWED, dtype=np.int16)
         self._sections = 0  # that the last grid took
         self._avoided = 0  # sections that the grid after the last one would take, if they are too many
@@ -139,10 +141,10 @@ class BasinGrid:
                 labels.flat[part] = found
 
 
-def _shapes(cells: tuple[int, int]) -> list[tuple[int, int]]:
-    """Grids from coarse to fine, halved down to one that is quickly followed."""
+def _shapes(cells: tuple[int, int], coarsest: int) -> list[tuple[int, int]]:
+    """Grids from coarse to fine, halved down to one of so many cells or fewer."""
     shapes = [cells]
-    while math.prod(shapes[-1]) > _COARSEST:
+    while math.prod(shapes[-1]) > coarsest:
         shapes.append((-(-shapes[-1][0] // 2), -(-shapes[-1][1] // 2)))
     return shapes[::-1]
 
