@@ -117,3 +117,26 @@ def test_steps_are_fine_enough_for_the_stability_of_an_orbit_at_a_stiff_stop():
     orbit = refine_orbit(osc, hammering.points[0], hammering.period, stepper)
     sizes = np.sort(np.abs(np.linalg.eigvals(orbit.monodromy)))
     assert sizes == pytest.approx(np.sort(np.abs(hammering.multipliers)), abs=1e-3)
+
+
+def test_a_path_with_many_short_impacts_is_certified():
+    """Hammering between two stops: a contact lasts a fifteenth of the piece between two nodes of the path.
+
+    ΔU is measured in m² s⁻³, so by Euler's theorem its derivatives in the lengths, weighted by them, sum to 2 ΔU, and
+    those in the rates to 3 ΔU.
+    """
+    law = vk.Hertz(1e5)
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.2533, 1.25),),
+        barriers=(vk.Barrier(law, 0.5, "right"), vk.Barrier(law, -0.5, "left")), noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, cells=(60, 60), manifolds=False, rng=0)
+    energy = vk.LeastAction(source="hammering", graph=None).run(osc, structure).energies[0]
+    assert energy.certificate is not None
+    assert energy.residual <= CERTIFIED
+    part = {name: osc.parameters[name] * slope / energy.value for name, slope in energy.sensitivity.items()}
+    stiffness = part["barriers.0.law.stiffness"] + part["barriers.1.law.stiffness"]
+    gap, force = part["barriers.0.position"] + part["barriers.1.position"], part["excitations.0.amplitude"]
+    assert gap + force - stiffness / 2 == pytest.approx(2.0, abs=1e-4)
+    rates = part["natural_frequency"] + part["excitations.0.frequency"]
+    assert rates + 2 * force + 2 * stiffness == pytest.approx(3.0, abs=1e-4)
