@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Ending, ResampledCandidate, resampled
+from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate, resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath
@@ -35,6 +35,9 @@ _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
 _SAMPLES = 128  # in a section interval: enough for pictures, and for quadrature to about 1e-6
 _SAME = 0.05  # of a path's extent: distance between two paths that are one, one of them at its samples
+
+
+Way = Callable[[PathSolver, Sequence[Cut], float], ExtremalPath]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -84,9 +87,10 @@ class CandidatePolisher:
             return
         failures, solved = [], False
         try:
-            for end in self._near(candidate):
+            ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
+            for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
                 try:
-                    self._add(self._solve(end, candidate, self.solved))
+                    self._add(self._solve(end, candidate, self.solved, way))
                     solved = True
                 except StructureError as error:
                     failures.append(str(error))
@@ -128,23 +132,25 @@ class CandidatePolisher:
         except StructureError:
             return False
 
-    def _solve(self, end: PathEnd, candidate: Candidate, known: Sequence[Solved]) -> Solved:
+    def _solve(
+        self, end: PathEnd, candidate: Candidate, known: Sequence[Solved], way: Way = PathSolver.solve
+    ) -> Solved:
         """Polish a candidate to an end, with finer pieces if necessary and if it is cheaper than all known paths."""
         least = min((one.found.action for one in known if one.end is end), default=np.inf)
         for pieces in PIECES:
             try:
-                return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least)
+                return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least, way)
             except StructureError as error:
                 failure = error
                 if candidate.action >= least:
                     break
         raise failure
 
-    def _solve_with(self, pieces: int, end: PathEnd, candidate: Candidate, worth: float) -> Solved:
+    def _solve_with(self, pieces: int, end: PathEnd, candidate: Candidate, worth: float, way: Way) -> Solved:
         solver: PathSolver = self._solver(end, pieces)
         ending: Ending = self._ending(end, pieces)
         for _ in range(_ROUNDS):
-            found = solver.solve(ending.cuts(self._resampled(candidate, pieces)), worth)
+            found = way(solver, ending.cuts(self._resampled(candidate, pieces)), worth)
             if not found.action > 0:
                 raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
             path = _dense_path(solver.propagator, found)
@@ -153,7 +159,10 @@ class CandidatePolisher:
             left = ending.crossing(path)
             if left is None:
                 return Solved(end, solver.propagator, found, path)
-            candidate = dataclasses.replace(candidate, times=path.t[: left + 1], states=path.q[: left + 1])
+            inside = slice(left + 1)
+            candidate = dataclasses.replace(
+                candidate, times=path.t[inside], states=path.q[inside], momenta=path.p[inside]
+            )  # fmt: skip
         raise StructureError(f"after {_ROUNDS} cuts where it has already left, the path still leaves before its end.")
 
 

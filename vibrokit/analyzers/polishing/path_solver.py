@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
@@ -24,7 +24,7 @@ LONG_ENOUGH = 1e-6
 """Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
-_FROM_MOMENTA = 60  # evaluations for a candidate with momenta, which other methods follow if they are not enough
+_FROM_MOMENTA = 60  # evaluations for a candidate with momenta: paths that converge need no more
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
@@ -53,18 +53,14 @@ class PathSolver:
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate: by the Gauss–Newton method, by descent of the action, and by multiple shooting.
 
-        A candidate with momenta goes to multiple shooting at once; the others follow if that fails. Of several ways to
-        cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be joined to its
-        source by the linearized equations is solved for as one that starts on the orbit itself, if its action is below
-        `worth`; one that costs more descends in few iterations only. Raises StructureError if no extremal path is found
-        near the candidate.
+        Of several ways to cut the candidate, the cheapest after the Gauss–Newton method is taken. A path that cannot be
+        joined to its source by the linearized equations is solved for as one that starts on the orbit itself, if its
+        action is below `worth`; one that costs more descends in few iterations only. Raises StructureError if no
+        extremal path is found near the candidate.
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
-            first, points = _begun(propagator, self.source, cut)
-            if cut.momenta is not None:
-                with contextlib.suppress(StructureError):
-                    return self._once(self._shot(first, cut, points, evaluations=_FROM_MOMENTA), _give_up)
+            first, points = _begun(propagator, self.source, dataclasses.replace(cut, momenta=None))
             states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
         points, action, first, cut = min(fitted, key=lambda each: each[1])
@@ -87,6 +83,23 @@ class PathSolver:
         except StructureError as error:
             return from_orbit(error, action)
         return self._once(found, from_orbit)
+
+    def solve_at_once(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
+        """Polish a candidate with momenta by multiple shooting alone, by the first way to cut it that converges.
+
+        It stays at the candidate, while descent may end at a cheaper path; between stiff stops descent often fails.
+        Raises StructureError if no way converges.
+        """
+        failure = StructureError("the momenta of the candidate are not known.")
+        for cut in cuts:
+            if cut.momenta is None:
+                continue
+            try:
+                found = self._shot(*_begun(self.propagator, self.source, cut), cut, evaluations=_FROM_MOMENTA)
+                return self._once(found, _give_up)
+            except StructureError as error:
+                failure = error
+        raise failure
 
     def _once(self, found: ExtremalPath, from_orbit: Fallback) -> ExtremalPath:
         """Complete a path, unless that was done, or failed, before."""
@@ -114,13 +127,13 @@ class PathSolver:
             self.propagator, first, points,
             last=cut.last, free=cut.ending.free, closing=cut.ending.closing, iterations=iterations,
         )  # fmt: skip
-        return self._shot(first, cut, points, source)
+        return self._shot(first, points, cut, source)
 
     def _shot(
         self,
         first: int,
-        cut: Cut,
         points: Array,
+        cut: Cut,
         source: LinearizedOrbit | None = None,
         evaluations: int = MOST_EVALUATIONS,
     ) -> ExtremalPath:
