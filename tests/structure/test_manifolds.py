@@ -83,6 +83,19 @@ def test_a_linear_saddle_has_straight_lines_to_the_edge(ratio):
         assert branch.end is ManifoldEnd.LEAVES_REGION
 
 
+def test_a_branch_ends_before_it_takes_too_many_sections():
+    osc, region = vk.load_scene("duffing"), ((-3.0, 3.0), (-3.0, 3.0))
+    (found,) = vk.find_structure(osc, cells=(20, 20), manifolds=False).saddles
+    given = {"region": region, "stepper": vk.RK4(128), "stable": (False,)}
+    whole = list(grow_manifolds(osc, 0, found, **given))
+    short = list(grow_manifolds(osc, 0, found, most_sections=2000, **given))
+    for one, other in zip(whole, short, strict=True):
+        assert other.end in (ManifoldEnd.MOST_SECTIONS, one.end)
+        np.testing.assert_array_equal(other.curve, one.curve[: len(other.curve)])
+    assert any(branch.end is ManifoldEnd.MOST_SECTIONS for branch in short)
+    assert min(len(branch.curve) for branch in short) > 10
+
+
 @pytest.mark.parametrize(("growth", "turn"), [(1.5, 0.3), (40.0, 0.1)])
 def test_a_map_with_a_curve_in_closed_form(growth, turn):
     """(x, y) → (λx, μy + x³) has the unstable manifold y = x³/(λ³ − μ)."""

@@ -24,6 +24,7 @@ class ManifoldEnd(StrEnum):
     AT_REST = "at-rest", "The branch converges to a point."
     ARC_LENGTH = "arc-length", "The branch reaches its arc length."
     MOST_VERTICES = "most-vertices", "The branch has as many vertices as are kept; give a larger spacing or bend."
+    MOST_SECTIONS = "most-sections", "Growing the branch took as many sections as it may; grow it alone for more."
     TOO_SLOW = "too-slow", "The branch grows too slowly."
     SADDLE_OUTSIDE = "saddle-outside", "The saddle lies outside the region, widened by its own size on every side."
     TOO_EXTREME = "too-extreme", "The multiplier of the saddle is too extreme to follow the branch over one period."

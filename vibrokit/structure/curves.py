@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -33,6 +34,7 @@ class Limits:
     spacing: float
     bend: float
     arc_length: float
+    applications: float = math.inf  # of the map to a state, all together
 
     def inside(self, states: Array) -> NDArray[np.bool_]:
         """Whether states lie in the widened region; False for NaN."""
@@ -143,10 +145,12 @@ def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, Manifol
     vertices, remaining = len(states), limits.arc_length - _length(np.concatenate(curve))
     if remaining <= 0.0:
         return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_VERTICES)
-    extent = 0.0
+    extent, left = 0.0, limits.applications
     for count in range(1, _MOST_IMAGES + 1):
-        before = curve[-1][-2]
-        fractions, states = _image(domain, images, count, (fractions, images(states, 1)), before, remaining, limits)
+        before, known = curve[-1][-2], (fractions, images(states, 1))
+        fractions, states, left = _image(domain, images, count, known, before, remaining, limits, left - len(states))
+        if left < 0:
+            return np.concatenate(curve), ManifoldEnd.MOST_SECTIONS
         kept = limits.thinned(states)
         fractions, states = fractions[kept], states[kept]
         joined = np.concatenate([curve[-1][-1:], states[limits.same(states[0], curve[-1][-1]) :]])
@@ -170,18 +174,22 @@ def _image(
     before: Array,
     remaining: float,
     limits: Limits,
-) -> tuple[Array, Array]:
+    left: float,
+) -> tuple[Array, Array, float]:
     """Insert vertices into an image of the domain until it is fine enough, as far as it is needed.
 
     Every new vertex is an image of a point of the domain; `before` is the point of the curve before the image begins.
+    `left` is the number of times that the map may still be applied to a state; what remains of it is returned too,
+    below 0 if it was too small.
     """
     fractions, states = known
     while True:
         needed = limits.needed(states, _THINNING * remaining)
         fractions, states = fractions[:needed], states[:needed]
         coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(fractions) > domain.resolution)
-        if not coarse.any() or len(states) > _MOST_VERTICES:
-            return fractions, states
+        left -= count * int(coarse.sum())
+        if not coarse.any() or len(states) > _MOST_VERTICES or left < 0:
+            return fractions, states, left
         middle = 0.5 * (fractions[:-1] + fractions[1:])[coarse]
         places = 1 + np.flatnonzero(coarse)
         fractions = np.insert(fractions, places, middle)

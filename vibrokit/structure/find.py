@@ -39,6 +39,7 @@ _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
 _SEARCH_SETTLING = 1e-3
+_MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
 _MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
 
 Array = NDArray[np.float64]
@@ -237,7 +238,8 @@ class _Finder:
                 try:
                     for branch in grow_manifolds(
                         self.osc, index, saddle,
-                        region=self.frame, arc_length=length, stepper=self.request.stepper, executor=self.executor,
+                        region=self.frame, arc_length=length, most_sections=_MANIFOLD_SECTIONS / count,
+                        stepper=self.request.stepper, executor=self.executor,
                     ):  # fmt: skip
                         self.manifolds += (branch,)
                 except StructureError as error:

@@ -92,6 +92,7 @@ def grow_manifolds(
     spacing: float = 0.01,
     bend: float = 0.2,
     stable: Sequence[bool] = (True, False),
+    most_sections: float = math.inf,
     executor: concurrent.futures.Executor | None = None,
 ) -> Iterator[Manifold]:
     """Grow both branches of the stable and the unstable manifold from each point of a saddle, one after another.
@@ -100,7 +101,8 @@ def grow_manifolds(
     eigenvector, which points to larger x. A branch is cut at `arc_length`, by default 10 diagonals of the region, and
     where it leaves the region widened by its own size on every side. Neighbouring points are at most `spacing` apart,
     in units of the region's width and height; the angle between neighbouring chords longer than a hundredth of that is
-    at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``.
+    at most `bend` (rad), and its product with the longer chord below half of ``spacing * bend``. A branch ends, too,
+    before the image that would need more than `most_sections` in all, each state counted.
 
     The saddle is refined with the stepper too, because a coarse stepper moves the saddle. By default, with stops it is
     `Order8(1e-6)`, or a finer one where that loses the saddle. On the bundled scenes it takes no longer than RK4(1024),
@@ -118,7 +120,7 @@ def grow_manifolds(
         arc_length=arc_length or default_arc_length(frame),
     )  # fmt: skip
     tasks = [
-        (osc, saddle_index, saddle, point, backwards, side, limits, stepper)
+        (osc, saddle_index, saddle, point, backwards, side, limits, most_sections, stepper)
         for point in range(len(saddle.points))
         for backwards in stable
         for side in (-1, 1)
@@ -156,6 +158,7 @@ def _branch(
     backwards: bool,
     side: int,
     limits: Limits,
+    most_sections: float,
     stepper: Stepper | None,
 ) -> Manifold:
     """Grow one branch; a unit of work that an executor may carry."""
@@ -174,6 +177,7 @@ def _branch(
     repeats = math.ceil(math.log(_LEAST_GROWTH) / (rate * interval * periods))
     repeats += repeats % 2 if multiplier < 0 else 0
     images = dataclasses.replace(once, periods=periods * repeats)
+    limits = dataclasses.replace(limits, applications=most_sections / images.periods)
     domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
     return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
 
