@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels.contact_time import contact_times
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
@@ -16,6 +19,7 @@ from vibrokit.structure.linear_map import GaussianMap, HamiltonianMap, Map, gaus
 from vibrokit.symbolic.flow_kind import Flow
 
 _BESIDE = 0.02  # of a piece
+_SHORT = 0.25  # of a piece: shorter contacts are short
 Array = NDArray[np.float64]
 
 
@@ -48,6 +52,12 @@ class SegmentPropagator:
     def grain(self) -> int:
         """Nodes from section to section; without forcing, every node is on the section."""
         return 1 if self.osc.autonomous else self.pieces
+
+    @cached_property
+    def has_short_contacts(self) -> bool:
+        """Whether contacts are so short that the state changes much in a small part of a piece."""
+        durations = (contact.duration for contact in contact_times(self.osc, Flow.STATE))
+        return min(durations, default=math.inf) < _SHORT * self.piece
 
     def touching(self, states: Array) -> NDArray[np.bool_]:
         """Return which states (count, n or more) touch a stop, or may do so within a small part of a piece."""

@@ -197,7 +197,9 @@ class _Matching:
         self.start_of_last = float((first + len(guess) - 2) % propagator.pieces) * propagator.piece
 
     def _unknown(self, points: Array) -> NDArray[np.intp]:
-        """Return the nodes whose points are unknown: all but those in a contact that neither neighbour lies in."""
+        """Return the nodes whose points are unknown: all but those in a short contact."""
+        if not self.propagator.has_short_contacts:
+            return np.arange(len(points))
         touching = self.propagator.touching(points)
         short = np.zeros(len(points), dtype=bool)
         short[1:-1] = touching[1:-1] & ~touching[:-2] & ~touching[2:]
