@@ -103,9 +103,11 @@ for name, value in relative.items():
     print(f"1 % more {name:<18} {value:+.2f} % of energy")
 
 # The two frequencies matter most: what counts is the distance from resonance. The stiffness hardly matters, so plates
-# of brass would do as well. Two checks follow from the units alone, since ΔU is measured in m² s⁻³. If all lengths grow
-# by one percent (the gap, the shaking, and the stiffness by minus half a percent), ΔU must grow by 2 %. If all rates do
-# (both frequencies; the shaking and the stiffness by two percent), ΔU must grow by 3 %.
+# of brass would do as well.
+#
+# ΔU is measured in m² s⁻³. This gives two checks. Longer lengths: one percent more gap and shaking, and half a percent
+# less stiffness, must give 2 % more energy. Faster rates: one percent more of both frequencies, and two percent more
+# shaking and stiffness, must give 3 % more.
 
 by_length = relative["gap"] + relative["shaking"] - relative["contact stiffness"] / 2
 by_time = relative["natural frequency"] + relative["frequency"]

@@ -129,10 +129,11 @@ class Search:
             orbit = least_period(self.osc, refine_orbit(self.osc, point, period, stepper), stepper)
         except StructureError:
             return False
-        points = visited(self.osc, orbit, stepper)
-        unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1
-        if unstable or not same_point(self.osc, point, points, _REACH):
+        if np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1:
             return False  # the motion passes near a saddle
+        points = visited(self.osc, orbit, stepper)
+        if not same_point(self.osc, point, points, _REACH):
+            return False
         if not self._known(orbit.point, EQUAL):
             self.attractors.append(describe_orbit(self.osc, orbit, stepper))
         return same_point(self.osc, point, points, _NEAR)

@@ -19,8 +19,9 @@ from vibrokit.oscillator import Oscillator, generator_from
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.basins.grid import DEFAULT_CELLS
 
+DEFAULT_CELLS = (200, 200)
+"""Of the finest basin grid."""
 _MOST_CELLS = 10**9
 
 

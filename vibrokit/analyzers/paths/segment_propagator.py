@@ -18,8 +18,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import GaussianMap, HamiltonianMap, Map, gaussian_map, hamiltonian_map, joined
 from vibrokit.symbolic.flow_kind import Flow
 
-_BESIDE = 0.02  # of a piece
-_SHORT = 0.25  # of a piece: shorter contacts are short
+_SHORT = 0.25  # of a piece: contacts shorter than that
+_BESIDE = 0.02  # of a piece: a state that may touch a stop within that time counts as in contact
+
 Array = NDArray[np.float64]
 
 
@@ -54,18 +55,22 @@ class SegmentPropagator:
         return 1 if self.osc.autonomous else self.pieces
 
     @cached_property
-    def has_short_contacts(self) -> bool:
-        """Whether contacts are so short that the state changes much in a small part of a piece."""
+    def _has_short_contacts(self) -> bool:
         durations = (contact.duration for contact in contact_times(self.osc, Flow.STATE))
         return min(durations, default=math.inf) < _SHORT * self.piece
 
-    def touching(self, states: Array) -> NDArray[np.bool_]:
-        """Return which states (count, n or more) touch a stop, or may do so within a small part of a piece."""
-        x, close = states[:, 0], _BESIDE * self.piece * np.abs(states[:, 1])
-        touching = np.zeros(len(states), dtype=bool)
-        for barrier in self.osc.barriers:
-            touching |= barrier.sign * (x - barrier.position) > -close
-        return touching
+    def in_short_contact(self, nodes: Array) -> NDArray[np.bool_]:
+        """Return which inner nodes of a path (count, n or more) lie in a contact that is much shorter than a piece.
+
+        Neither neighbour lies in it. A node just beside a contact counts as one in it.
+        """
+        touching, short = np.zeros(len(nodes), dtype=bool), np.zeros(len(nodes), dtype=bool)
+        if self._has_short_contacts:
+            x, close = nodes[:, 0], _BESIDE * self.piece * np.abs(nodes[:, 1])
+            for barrier in self.osc.barriers:
+                touching |= barrier.sign * (x - barrier.position) > -close
+            short[1:-1] = touching[1:-1] & ~touching[:-2] & ~touching[2:]
+        return short
 
     def linear(self, states: Array, first: int, last: float | None = None) -> GaussianMap:
         """Map consecutive nodes (count, n) over one piece each without noise, with the covariance that noise adds.

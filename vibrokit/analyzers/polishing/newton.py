@@ -198,11 +198,7 @@ class _Matching:
 
     def _unknown(self, points: Array) -> NDArray[np.intp]:
         """Return the nodes whose points are unknown: all but those in a short contact."""
-        if not self.propagator.has_short_contacts:
-            return np.arange(len(points))
-        touching = self.propagator.touching(points)
-        short = np.zeros(len(points), dtype=bool)
-        short[1:-1] = touching[1:-1] & ~touching[:-2] & ~touching[2:]
+        short = self.propagator.in_short_contact(points)
         if self.pin is not None:
             short[self.pin.node] = False
         return np.flatnonzero(~short)
@@ -214,6 +210,12 @@ class _Matching:
             points = points.copy()
             points[short] = self.propagator.extremal_from(points[short - 1], self.first + short - 1, None).images
         return points
+
+    def _arranged(self, points: Array, number: Array) -> tuple[Array, _Evaluation]:
+        """Choose what is unknown by where the points are, and evaluate them."""
+        unknown = self._unknown(points)
+        points = self._joined(points, unknown)
+        return points, self.evaluate(points, number, unknown)
 
     def evaluate(self, points: Array, number: Array, unknown: NDArray[np.intp]) -> _Evaluation:
         """Carry all pieces and compare."""
@@ -242,8 +244,8 @@ class _Matching:
         at_end, in_time = self.ending.derivatives(points[-1], end, self.scale)
         over_one = current.carried.derivatives * self.scale / self.scale[:, None]
         steps = over_one[unknown[:-1]]
-        double_steps = np.flatnonzero(np.diff(unknown) == 2)
-        steps[double_steps] = over_one[unknown[double_steps] + 1] @ steps[double_steps]
+        over_two = np.flatnonzero(np.diff(unknown) == 2)
+        steps[over_two] = over_one[unknown[over_two] + 1] @ steps[over_two]
         starts, ones = double * np.arange(pieces), np.arange(pieces * double)
         table = [
             (self.normals, 0, 0),
@@ -269,9 +271,7 @@ class _Matching:
         may be small enough already. If not, the path moves along the family, a short step at a time.
         """
         number = np.array([self.last] if self.ending.free_time else [0.0] if self.pin is not None else [])
-        unknown = self._unknown(points)
-        points = self._joined(points, unknown)
-        current, flat = self.evaluate(points, number, unknown), False
+        (points, current), flat = self._arranged(points, number), False
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
             try:
@@ -305,9 +305,8 @@ class _Matching:
             (points, number), current = moved, tried
             if length < _SMALL * math.sqrt(len(step)):
                 break
-            if not np.array_equal(unknown := self._unknown(points), current.unknown):
-                points = self._joined(points, unknown)
-                current = self.evaluate(points, number, unknown)
+            if not np.array_equal(self._unknown(points), current.unknown):
+                points, current = self._arranged(points, number)
         slack = 0.0 if self.pin is None else abs(float(number[0]))
         return ExtremalPath(
             self.source, self.first, self.ending, points, self._last(number),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
@@ -60,7 +59,7 @@ class PathSolver:
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
-            first, points = _begun(propagator, self.source, dataclasses.replace(cut, momenta=None))
+            first, points = _begun(propagator, self.source, cut)
             states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
         points, action, first, cut = min(fitted, key=lambda each: each[1])
@@ -90,12 +89,12 @@ class PathSolver:
         It stays at the candidate, while descent may end at a cheaper path; between stiff stops descent often fails.
         Raises StructureError if no way converges.
         """
-        failure = StructureError("the momenta of the candidate are not known.")
         for cut in cuts:
-            if cut.momenta is None:
-                continue
+            assert cut.momenta is not None
+            phases, _ = _nearest(self.propagator, self.source, cut.states[:1])
+            points = np.hstack([cut.states, cut.momenta])
             try:
-                found = self._shot(*_begun(self.propagator, self.source, cut), cut, evaluations=_FROM_MOMENTA)
+                found = self._shot(int(phases[0]), points, cut, evaluations=_FROM_MOMENTA)
                 return self._once(found, _give_up)
             except StructureError as error:
                 failure = error
@@ -256,21 +255,22 @@ def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -
         found, share = longer, share // 2
 
 
+def _nearest(propagator: SegmentPropagator, source: LinearizedOrbit, states: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return the phase of the orbit on the section that each state is nearest to, and how near."""
+    phases = np.arange(0, len(source.states), propagator.pieces)
+    distances = np.linalg.norm((states[:, None] - source.states[phases]) / propagator.units, axis=2)
+    return phases[np.argmin(distances, axis=1)], distances.min(axis=1)
+
+
 def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[int, Array]:
     """Points (q, p) of a candidate that starts on its source, where it last is near or long before its first state.
-
-    A candidate with momenta begins where it does.
 
     The start stays on the orbit until multiple shooting: the linearized equations do not hold for a start far from the
     orbit, and would give it much too small an action.
     """
     states = cut.states
     nodes = np.arange(0, len(states) - 1, propagator.grain)
-    phases = np.arange(0, len(source.states), propagator.pieces)
-    distances = np.linalg.norm((states[nodes][:, None] - source.states[phases]) / propagator.units, axis=2)
-    nearest, closest = phases[np.argmin(distances, axis=1)], distances.min(axis=1)
-    if cut.momenta is not None:
-        return int(nearest[0]), np.hstack([states, cut.momenta])
+    nearest, closest = _nearest(propagator, source, states[nodes])
     wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
     near = np.flatnonzero(closest <= wanted)
     entered = int(near[-1]) if near.size else 0

@@ -20,12 +20,11 @@ from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
 from vibrokit.structure.basins.stop_cells import agreeing, centres
 from vibrokit.structure.search import persistent_stepper
+from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
 
 _COARSEST, _FEWEST = 4096, 400  # cells of the first grid, followed to the attractors; by default where that takes long
 _MOST_FIRST = 20_000_000  # sections that the first grid may take by default
-DEFAULT_CELLS = (200, 200)
-"""Of the finest grid."""
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
 _SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
