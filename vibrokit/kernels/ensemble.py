@@ -6,7 +6,10 @@ import concurrent.futures as futures
 import contextlib
 import contextvars
 import dataclasses
+import functools
 import os
+import sys
+import threading
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any
 
@@ -232,12 +235,17 @@ def _plain(array: Array, kind: type) -> Array:
 def carry(
     work: Callable[..., Any], tasks: list[tuple[Any, ...]], executor: futures.Executor | None = None
 ) -> Generator[Any, None, None]:
-    """Yield ``work(*task)`` for each task, in order. Closing the generator starts no more tasks."""
-    if executor is None and len(tasks) == 1:  # starting a thread takes longer than most single tasks
-        yield work(*tasks[0])
+    """Yield ``work(*task)`` for each task, in order. Closing the generator starts no more tasks.
+
+    Without an executor the threads of this process do the tasks. A single task, and those of a task that a thread
+    already does, are done by the caller: handing over costs more than most of them, and a thread that waited for others
+    could wait for itself.
+    """
+    if executor is None and (len(tasks) == 1 or _inside.thread):
+        for task in tasks:
+            yield work(*task)
         return
-    pool = executor or futures.ThreadPoolExecutor(max_workers=os.cpu_count())
-    pending = [pool.submit(_counted_apart, work, task) for task in tasks]
+    pending = [(executor or _threads()).submit(_counted_apart, work, task) for task in tasks]
     try:
         for future in pending:
             result, counts = future.result()
@@ -247,7 +255,26 @@ def carry(
         for future in pending:
             future.cancel()
         if executor is None:
-            pool.shutdown()
+            futures.wait(pending)
+
+
+class _Inside(threading.local):
+    """Whether this thread is one of those that do tasks."""
+
+    thread = False
+
+
+_inside = _Inside()
+
+
+@functools.cache
+def _threads() -> futures.ThreadPoolExecutor:
+    """Return the threads of this process, which are kept: starting them would take longer than most ensembles."""
+    return futures.ThreadPoolExecutor(os.cpu_count(), initializer=lambda: setattr(_inside, "thread", True))
+
+
+if sys.platform != "win32":
+    os.register_at_fork(after_in_child=_threads.cache_clear)  # a child has none of its parent's threads
 
 
 def _counted_apart(work: Callable[..., Any], task: tuple[Any, ...]) -> tuple[Any, Mapping[str, int]]:

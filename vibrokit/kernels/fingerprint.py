@@ -29,7 +29,7 @@ def scene_fingerprint(scene: Scene) -> str:
     rows += [f"{barrier.side} {barrier.adhesive} {_part(barrier.law)}" for barrier in scene.barriers]
     rows += [_part(excitation) for excitation in scene.excitations]
     rows += ["" if scene.noise is None else _part(scene.noise)]
-    rows += [entry.path for entry in scene.entries()]
+    rows += [entry.path for entry in scene.entries]
     return "\n".join(rows)
 
 

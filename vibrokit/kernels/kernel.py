@@ -159,4 +159,4 @@ def _fitting(text: str, conditions: dict[str, bool]) -> str:
 
 def theta_of(scene: Scene) -> NDArray[np.float64]:
     """Return the parameters of a scene in the order in which kernels read them."""
-    return np.array([entry.value for entry in scene.entries() if not entry.declared.structural], dtype=float)
+    return np.array([entry.value for entry in scene.entries if not entry.declared.structural], dtype=float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
@@ -98,6 +99,7 @@ class Scene:
                     f"for a constant force, or math.inf for one that never repeats, got {shown(period)}."
                 )
 
+    @functools.cached_property
     def entries(self) -> tuple[Entry, ...]:
         """Every parameter with its path, in the order of the parameter array of compiled code."""
         found = [Entry(declared.name, declared, getattr(self, declared.name)) for declared in _OWN]
@@ -116,7 +118,7 @@ class Scene:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every parameter by its path, such as ``"excitations.0.frequency"``."""
-        return {entry.path: entry.value for entry in self.entries()}
+        return {entry.path: entry.value for entry in self.entries}
 
     def entry(self, path: str) -> Entry:
         """Return the parameter at a path.
@@ -132,7 +134,7 @@ class Scene:
         ParameterError
             The path matches no parameter, or several.
         """
-        entries = {entry.path: entry for entry in self.entries()}
+        entries = {entry.path: entry for entry in self.entries}
         name = path if isinstance(path, str) else ""
         found = [full for full in entries if full == name] or [full for full in entries if full.endswith(f".{name}")]
         if not found:
@@ -179,7 +181,7 @@ class Scene:
                 changed[head] = _replaced(changed.get(head, getattr(scene, head)), rest, value)
         return dataclasses.replace(scene, **changed)
 
-    @property
+    @functools.cached_property
     def period(self) -> float | None:
         """Common period of the excitations (s); None without periodic excitation.
 

@@ -26,7 +26,7 @@ def parameter_symbols(scene: Scene) -> dict[str, sympy.Symbol]:
 
     A symbol that several parts declare gets the index of the part or the side of its stop: k_r, k_l; f_0, f_1.
     """
-    entries = [entry for entry in scene.entries() if not entry.declared.structural]
+    entries = [entry for entry in scene.entries if not entry.declared.structural]
     letters = Counter(entry.declared.symbol for entry in entries)
     taken = set(scene.noise.extra_states if scene.noise else ())
     symbols = {}

@@ -59,7 +59,7 @@ def sensitivities(
     """
     change = _ActionChange(problem, end, propagator, found)
     given = {}
-    for entry in problem.osc.entries():
+    for entry in problem.osc.entries:
         if not entry.declared.structural and (names is None or entry.path in names):
             derivative = _derivative(change, entry)
             if derivative is not None:

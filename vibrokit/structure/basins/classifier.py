@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, LEFT_REGION, REACHED, STALLED
+from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
@@ -26,9 +26,10 @@ CELLS = "cells"
 """Unit of stages that classify cells: a classifier advances them."""
 
 _FIRST_STRETCH = 8  # sections after which the trajectories still under way are packed together again
+_LONGEST_STRETCH = 64  # with an extended attractor: the sections of a stretch are kept in memory
+_PART = 2**15  # trajectories whose sections are kept at a time
 _CONFIRMED = 64  # sections that a trajectory must stay near an extended attractor
 _MISSES = 6  # of these sections that may fall into gaps of the attractor's sample
-_LONGEST_DETOUR = 6  # as a power of 2
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -39,8 +40,8 @@ class BasinClassifier:
     """Finds the attractor that a state of the section leads to.
 
     A periodic orbit or an equilibrium is reached within `settling` of one of its points. An attractor that meets the
-    section in a curve or a cloud (a limit cycle, quasiperiodic and chaotic motion) is marked on a fine grid; a
-    trajectory that enters a marked cell must stay near the attractor for 64 more sections, or is followed further.
+    section in a curve or a cloud (a limit cycle, quasiperiodic and chaotic motion) is marked on a fine grid; it is
+    reached by a trajectory that enters a marked cell and stays near the attractor for 64 more sections.
 
     Attributes
     ----------
@@ -87,13 +88,14 @@ class BasinClassifier:
         trajectories.to_section(start_time)
         stretch, known = _FIRST_STRETCH, 0
         while (active := trajectories.active()).size:
-            ended = trajectories.integrate(active, stretch, self.entering)
-            entered = np.where((ended.status == LEFT_BASIN) & (found[active] == NOT_FOLLOWED), ended.label, -1)
-            for place, stop in self.leaving.items():
-                trajectories.confirm(active[entered == place + len(self.attractors)], place, stop)
-            trajectories.wander(active[(entered >= 0) | (ended.status == LEFT_REGION)])
+            if self._mask is None:
+                trajectories.integrate(active, stretch)
+                stretch = min(4 * stretch, self.budget)
+            else:
+                for first in range(0, active.size, _PART):
+                    trajectories.stay(active[first : first + _PART], stretch, self._mask)
+                stretch = min(4 * stretch, _LONGEST_STRETCH)
             trajectories.close()
-            stretch = min(4 * stretch, self.budget)
             known, before = int(np.sum(found != NOT_FOLLOWED)), known
             advance(known - before, CELLS)
         return trajectories.sections
@@ -109,22 +111,11 @@ class BasinClassifier:
         return arrival_at(orbits, self.settling * self.region.widths)
 
     @cached_property
-    def entering(self) -> Stop:
-        """The test for points, for cells of the core, and for marked cells, whose labels follow the attractors'."""
-        if self._mask is not None:
-            labels = self._mask.labels(self.core, len(self.attractors))
-            return self.points.with_cells(self._mask.frame.bounds, labels)
-        if self.core is not None:
-            return self.points.with_cells(self.core.region.bounds, self.core.labels)
-        return self.points
-
-    @cached_property
-    def leaving(self) -> dict[int, Stop]:
-        """For each extended attractor, by place, the test for being away from it."""
-        mask = self._mask
-        if mask is None:
-            return {}
-        return {place: self.points.with_cells(mask.frame.bounds, mask.away(place)) for place in mask.near}
+    def arriving(self) -> Stop:
+        """The test for points and for cells of the core."""
+        if self.core is None:
+            return self.points
+        return dataclasses.replace(self.points, area=self.core.region.bounds, labels=self.core.labels)
 
     @cached_property
     def _mask(self) -> AttractorMask | None:
@@ -137,9 +128,11 @@ class _Trajectories:
     def __init__(self, classifier: BasinClassifier, states: Array, found: Whole) -> None:
         self.classifier = classifier
         self.states = np.array(states, dtype=float)
-        self.remaining = np.full(len(states), classifier.budget, dtype=np.int64)
+        extended = sum(is_extended(attractor) for attractor in classifier.attractors)
+        self.remaining = np.full(len(states), classifier.budget + _CONFIRMED * bool(extended), dtype=np.int64)
         self.found = found
-        self.detours = np.zeros(len(states), dtype=np.int64)
+        # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
+        self.stayed, self.missed = np.zeros((2, extended, len(states)), dtype=np.int64)
         self.sections = 0  # of all together
 
     def active(self) -> Whole:
@@ -158,45 +151,37 @@ class _Trajectories:
             self.states = ended.states
             self.found[ended.status == DIVERGED] = ESCAPED
 
-    def integrate(self, which: Whole, most: int | Whole, stop: Stop) -> Ensemble:
-        """Integrate some trajectories by at most so many sections, and note what they reach for certain."""
+    def integrate(self, which: Whole, most: int, visits: int = 0) -> Ensemble:
+        """Integrate some trajectories by at most so many sections, and note which points and cells they reach."""
         classifier = self.classifier
         budget = np.minimum(self.remaining[which], most)
         ended = run_ensemble(
             classifier.osc, Flow.STATE, classifier.stepper, self.states[which], budget,
-            stop=stop, executor=classifier.executor,
+            stop=classifier.arriving, visits=visits, executor=classifier.executor,
         )  # fmt: skip
         self.states[which] = ended.states
         self.sections += int(ended.intervals.sum())
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
         self.found[which[ended.status == DIVERGED]] = ESCAPED
-        in_core = (ended.status == LEFT_BASIN) & (ended.label < len(classifier.attractors))
-        certain = (ended.status == REACHED) | (in_core & (stop is classifier.entering))
-        self.found[which[certain]] = ended.label[certain]
+        reached = np.isin(ended.status, (REACHED, LEFT_BASIN))
+        self.found[which[reached]] = ended.label[reached]
         return ended
 
-    def confirm(self, which: Whole, place: int, stop: Stop) -> None:
-        """Give the label of an extended attractor to trajectories that stay near it."""
-        self.remaining[which] += _CONFIRMED
-        stayed, misses = np.zeros(len(which), dtype=np.int64), np.zeros(len(which), dtype=np.int64)
-        undecided = np.arange(len(which))
-        while undecided.size:
-            ended = self.integrate(which[undecided], _CONFIRMED - stayed[undecided], stop)
-            stayed[undecided] += ended.intervals
-            misses[undecided] += (ended.status == LEFT_BASIN) | (ended.status == LEFT_REGION)
-            still = (self.found[which] == NOT_FOLLOWED) & (stayed < _CONFIRMED) & (misses <= _MISSES)
-            undecided = undecided[still[undecided] & (ended.intervals > 0)]
-        certain = (self.found[which] == NOT_FOLLOWED) & (stayed >= _CONFIRMED) & (misses <= _MISSES)
-        self.found[which[certain]] = place
-        self.remaining[which] -= _CONFIRMED
-
-    def wander(self, which: Whole) -> None:
-        """Integrate trajectories outside, or near no attractor after all, for a while that doubles each time."""
-        which = which[(self.found[which] == NOT_FOLLOWED) & (self.remaining[which] > 0)]
-        if which.size:
-            self.integrate(which, 2 ** np.minimum(self.detours[which], _LONGEST_DETOUR), self.classifier.points)
-            self.detours[which] += 1
+    def stay(self, which: Whole, most: int, mask: AttractorMask) -> None:
+        """Integrate some trajectories, and note which of them stay near an extended attractor."""
+        ended = self.integrate(which, most, visits=most)
+        entered, near = mask.at(ended.visits[:, :, :2])
+        for number, place in enumerate(mask.places):
+            stayed, missed = self.stayed[number, which], self.missed[number, which]
+            confirmed = np.zeros(len(which), dtype=bool)
+            for section in range(most):
+                missed += (stayed > 0) & ~near[number, :, section]
+                stayed[:] = np.where(missed > _MISSES, 0, stayed + ((stayed > 0) | entered[number, :, section]))
+                missed[stayed == 0] = 0
+                confirmed |= (stayed > _CONFIRMED) & (section < ended.intervals)
+            self.stayed[number, which], self.missed[number, which] = stayed, missed
+            self.found[which[confirmed & (self.found[which] == NOT_FOLLOWED)]] = place
 
     def close(self) -> None:
         """Label the trajectories whose budget is spent."""

@@ -1,4 +1,4 @@
-"""Cells that end a trajectory which enters them: those of a finished grid, and those around an extended attractor."""
+"""Cells that classify trajectories: those of a finished grid, and those around an extended attractor."""
 
 from __future__ import annotations
 
@@ -71,25 +71,18 @@ def centres(osc: Oscillator, region: Region, shape: tuple[int, ...], cells: Whol
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AttractorMask:
-    """The cells that contain extended attractors, and those around them; attractors are given by their index."""
+    """The cells that contain extended attractors, and those around them."""
 
     frame: Region  # the region of the basins, and all of the attractors
-    cells: tuple[int, int]
-    entered: dict[int, Mask]  # cells that contain points of the attractor's sample, and their neighbours
-    near: dict[int, Mask]  # these, and a border as wide as the gaps of the sample
+    places: tuple[int, ...]  # of these attractors among all
+    entered: Mask  # (attractors, nx, nv): cells that contain points of the attractor's sample, and their neighbours
+    near: Mask  # (attractors, nx, nv): these, and a border as wide as the gaps of the sample
 
-    def labels(self, core: Basins | None, first: int) -> Labels:
-        """Return labels that end a trajectory: those of the core, and `first` + place in marked cells."""
-        labels = np.full(self.cells, UNSETTLED, dtype=np.int16)
-        if core is not None:
-            _embed(core, self.frame, labels)
-        for place, mask in self.entered.items():
-            labels[mask] = first + place
-        return labels
-
-    def away(self, place: int) -> Labels:
-        """Return labels that end a trajectory which is not near an attractor."""
-        return np.where(self.near[place], UNSETTLED, 0).astype(np.int16)
+    def at(self, points: Array) -> tuple[Mask, Mask]:
+        """Return whether points (..., 2) are in `entered` and in `near` cells of each attractor, (attractors, ...)."""
+        cells, inside = self.frame.cells_at(points, self.near.shape[1:])
+        x, v = cells[..., 0], cells[..., 1]
+        return inside & self.entered[:, x, v], inside & self.near[:, x, v]
 
 
 def is_extended(attractor: Attractor) -> bool:
@@ -105,12 +98,12 @@ def mask_of(attractors: Sequence[Attractor], region: Region, spacing: Array) -> 
     frame = Region.around(np.concatenate([region.bounds.T, *samples.values()]), margin=0.01)
     nx, nv = np.clip(np.ceil(np.ptp(frame.bounds, axis=1) / spacing), 1, _FINEST).astype(int)
     cells = (int(nx), int(nv))
-    entered, near = {}, {}
+    entered, near = [], []
     for place, sample in samples.items():
         width = 1 if attractors[place].kind == "limit cycle" else _gaps(sample, frame, cells)
-        entered[place] = ndimage.binary_dilation(_cells_with(sample, frame, cells), _SQUARE)
-        near[place] = ndimage.binary_dilation(entered[place], _SQUARE, width)
-    return AttractorMask(frame, cells, entered, near)
+        entered.append(ndimage.binary_dilation(_cells_with(sample, frame, cells), _SQUARE))
+        near.append(ndimage.binary_dilation(entered[-1], _SQUARE, width))
+    return AttractorMask(frame, tuple(samples), np.array(entered), np.array(near))
 
 
 def _sample(attractor: Attractor, spacing: Array) -> Array:
@@ -140,14 +133,3 @@ def _gaps(sample: Array, frame: Region, cells: tuple[int, int]) -> int:
         if early[late].mean() >= _COVERED:
             return width
     return _WIDEST
-
-
-def _embed(core: Basins, frame: Region, labels: Labels) -> None:
-    """Copy the core's labels to the cells of a finer grid whose centres they contain."""
-    axes = []
-    for side, count in enumerate(labels.shape):
-        (low, high), (first, last) = frame.bounds[side], core.region.bounds[side]
-        centres = low + (high - low) * (np.arange(count) + 0.5) / count
-        axes.append(np.floor((centres - first) / (last - first) * core.labels.shape[side]).astype(np.int64))
-    inside = [(axis >= 0) & (axis < own) for axis, own in zip(axes, core.labels.shape, strict=True)]
-    labels[np.ix_(*inside)] = core.labels[np.ix_(axes[0][inside[0]], axes[1][inside[1]])]
