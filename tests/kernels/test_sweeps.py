@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from vibrokit.kernels.sweeps import best_node, descend, descend_all, interpolate, interpolate_all, sweep_rows
+from vibrokit.kernels.sweeps import (
+    best_node,
+    descend,
+    descend_all,
+    evaluate_rows,
+    interpolate,
+    interpolate_all,
+    sweep_rows,
+)
 
 N = 24
 HIGH = 1e6
@@ -36,10 +44,18 @@ class Step:
         self.changed = np.zeros((n, m), dtype=np.uint8)
 
     def sweep(self, first=0, last=None, order=1, reach=0, tolerance=1e-9):
-        arrays = (self.before, self.after, self.centres, self.roots, self.predecessors, self.uphill)
-        flags = (self.ceilings, self.fixed, self.active, self.changed)
-        sweep_rows(*arrays, *flags, first, len(self.before) if last is None else last, order, reach, tolerance)
+        rows = (first, len(self.before) if last is None else last)
+        sweep_rows(*self.arrays, *rows, tolerance, self.uphill, order, reach)
         return self
+
+    def evaluate(self):
+        evaluate_rows(*self.arrays, 0, len(self.before), 1e-9)
+        return self
+
+    @property
+    def arrays(self):
+        steps = (self.before, self.after, self.centres, self.roots, self.predecessors)
+        return (*steps, self.ceilings, self.fixed, self.active, self.changed)
 
 
 def inner(values, margin=5):
@@ -167,13 +183,25 @@ def test_a_wide_search_finds_a_cheap_place_that_known_predecessors_miss():
     assert wide.after[12, 6] == pytest.approx(0.125 * 6**2, rel=1e-6)
 
 
-def test_what_is_fixed_asleep_capped_or_unreachable():
+def test_evaluation_keeps_predecessors_and_errs_by_the_square_of_their_error():
+    """½ |R (x − b)|² + V(x) grows by ½ dᵀ (A + RᵀR) d at a distance d from the best x."""
+    best = Step(quadratic(nodes())).sweep()
+    step, miss = Step(quadratic(nodes())), np.array([0.03, -0.02])
+    step.predecessors = np.clip(best.predecessors + miss, 1.0, N - 2.0)
+    kept = step.predecessors.copy()
+    step.evaluate()
+    np.testing.assert_array_equal(step.predecessors, kept)
+    np.testing.assert_allclose(inner(step.after - best.after), 0.5 * miss @ (FORM + np.eye(2)) @ miss, rtol=0.05)
+
+
+@pytest.mark.parametrize("work", [Step.sweep, Step.evaluate])
+def test_what_is_fixed_asleep_capped_or_unreachable(work):
     step = Step(quadratic(nodes()))
     step.fixed[8, 8], step.after[8, 8] = 1, 7.0
     step.active[10, 10] = 0
     step.ceilings[9, 9] = 0.01
     step.centres[7, 7] = np.nan
-    step.sweep()
+    work(step)
     assert step.after[8, 8] == 7.0
     assert step.after[10, 10] == step.after[7, 7] == HIGH
     assert step.after[9, 9] == 0.01

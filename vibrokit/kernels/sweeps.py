@@ -127,16 +127,16 @@ def sweep_rows(
     centres: Array,  # (n, m, 2): b of each node of the grid after; NaN where there is none
     roots: Array,  # (n, m, 3): R as (ss, st, tt)
     predecessors: Array,  # (n, m, 2): best x known of each node; improved
-    uphill: Array,  # (n, m, 2): points that are always tried
     ceilings: Array,  # (n, m): upper bounds of V
     fixed: Flags,  # (n, m): nodes whose V is given
     active: Flags,  # (n, m): nodes of the grid before near which V has changed
     changed: Flags,  # (n, m): set for nodes of the grid after whose V changed by more than the tolerance, else cleared
     first: int,
     last: int,  # rows to do: first ≤ i < last
+    tolerance: float,  # relative
+    uphill: Array,  # (n, m, 2): points that are always tried
     order: int,  # 1 from the first row and column to the last, −1 the other way round
     reach: int,  # nodes to each side of b among which a cheaper predecessor is searched; 0 to improve known ones only
-    tolerance: float,  # relative
 ) -> None:
     """Improve some rows of nodes of the grid after, in place.
 
@@ -178,6 +178,39 @@ def sweep_rows(
                 found, s, t = descend(before, s, t, centre, root)
             predecessors[i, j, 0], predecessors[i, j, 1] = s, t
             found = min(found, ceiling)
+            if abs(found - after[i, j]) > tolerance * after[i, j]:
+                changed[i, j] = 1
+            after[i, j] = found
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def evaluate_rows(
+    before: Array,
+    after: Array,
+    centres: Array,
+    roots: Array,
+    predecessors: Array,
+    ceilings: Array,
+    fixed: Flags,
+    active: Flags,
+    changed: Flags,
+    first: int,
+    last: int,
+    tolerance: float,
+) -> None:
+    """Recompute V on some rows of nodes of the grid after, in place, from predecessors that are kept.
+
+    Arguments as of `sweep_rows`. It costs one interpolation, and V hardly depends on a predecessor that is nearly best.
+    """
+    for i in range(first, last):
+        for j in range(before.shape[1]):
+            changed[i, j] = 0
+            if fixed[i, j] or math.isnan(centres[i, j, 0]):
+                continue
+            s, t = predecessors[i, j, 0], predecessors[i, j, 1]
+            if not active[int(s + 0.5), int(t + 0.5)]:
+                continue
+            found = min(_total_cost(before, s, t, centres[i, j], roots[i, j]), ceilings[i, j])
             if abs(found - after[i, j]) > tolerance * after[i, j]:
                 changed[i, j] = 1
             after[i, j] = found

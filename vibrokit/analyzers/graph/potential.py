@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import dataclasses
-import os
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.kernels.ensemble import carry
-from vibrokit.kernels.sweeps import interpolate_all, sweep_rows
+from vibrokit.kernels.sweeps import evaluate_rows, interpolate_all, sweep_rows
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
@@ -25,10 +25,14 @@ _ANGLES = 24  # directions in which linearity is tested
 _NONLINEAR = 0.02  # relative to the distance from the orbit: deviation of an image from the linear one that is accepted
 _LOWER, _LOWERINGS = 0.25, 40  # factor and number of trials for a smaller ellipse
 _ROWS = 16  # of one task; fixed, so that the result is the same on any number of processors
+_ROWS_EVALUATED = 64  # of one task that only evaluates V
 _NEIGHBOURHOOD = 7  # nodes across in which a change is felt: interpolation reaches 2 to each side, predecessors move 1
 _TOLERANCE = 1e-5  # relative change of V that is not passed on; far below the error of interpolation
 _REACH = 8  # nodes to each side among which a sweep looks for cheaper predecessors
 _CYCLE = 4  # periods from one wide search for predecessors, and one test of convergence, to the next
+# Cycles in which every period improves the predecessors; later only the first of a cycle does. On ten scenes that took
+# half to four fifths of the time, and V was the same within a tenth of its error.
+_IMPROVING = 3
 _WIDE_SEARCHES = 8  # each evaluates up to (2 · 8 + 1)² nodes for every node, many times what following costs
 _CONVERGED = 2e-5  # relative change of the mean of √V over a cycle; 10 times less changes V by at most 0.1 %
 _MOST_PERIODS = 400
@@ -169,8 +173,7 @@ def quasi_potential(model: StepModel, attractor: Attractor, grids: Grids, ceilin
 
     Raises StructureError if the attractor is not hyperbolic.
     """
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as executor:
-        return _Iteration(model, attractor, grids, ceiling, executor).run()
+    return _Iteration(model, attractor, grids, ceiling).run()
 
 
 class _Iteration:
@@ -182,9 +185,8 @@ class _Iteration:
         attractor: Attractor,
         grids: Grids,
         ceiling: float,
-        executor: concurrent.futures.Executor,
     ) -> None:
-        self.grids, self.ceiling, self.executor = grids, ceiling, executor
+        self.grids, self.ceiling = grids, ceiling
         self.sweeps = round(model.scene.section_interval / grids.step)
         known = seeds(model, attractor, grids)
         self.orbit = known.orbit
@@ -206,10 +208,12 @@ class _Iteration:
 
     def run(self) -> Potential:
         """Sweep, period by period, until V stays the same even after every node was evaluated once more."""
-        active = self._all()
+        active, risen = self._all(), False
         before, at_rest = self._level(), np.inf
         for period in range(_MOST_PERIODS):
-            changes = self._period(period, active)
+            # V falls, except where it changes between predecessors that cost almost the same: then all must improve.
+            improving = risen or period < _CYCLE * _IMPROVING or period % _CYCLE == 0
+            changes = self._period(period, active, improving=improving)
             advance(self.sweeps)
             if period % _CYCLE == _CYCLE - 1:
                 level = self._level()
@@ -217,13 +221,13 @@ class _Iteration:
                     if abs(at_rest - level) <= _CONVERGED * level:
                         break
                     at_rest, active = level, self._all()
-                before = level
+                risen, before = risen or level > before, level
         return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, self.ceiling)
 
     def _all(self) -> list[Flags]:
         return [np.ones(self.grids.shape, dtype=np.uint8) for _ in range(self.grids.phases)]
 
-    def _period(self, period: int, active: list[Flags]) -> int:
+    def _period(self, period: int, active: list[Flags], *, improving: bool) -> int:
         """Sweep over all phases; return the number of nodes that changed.
 
         A node takes over predecessors from neighbours that the same task has evaluated before it. The order of the
@@ -233,10 +237,25 @@ class _Iteration:
         order, begin = (1, -1)[turn % 2], -(turn // 2) * _ROWS // 2
         wide = period % _CYCLE == 0 and period < _CYCLE * _WIDE_SEARCHES
         reach = _REACH if wide else 0
-        return sum(self._sweep(sweep % self.grids.phases, active, order, begin, reach) for sweep in range(self.sweeps))
+        changes = 0
+        for sweep in range(self.sweeps):
+            phase = sweep % self.grids.phases
+            if improving:
+                changes += self._sweep(sweep_rows, _ROWS, begin, phase, active, (self.uphill[phase], order, reach))
+            else:
+                changes += self._sweep(evaluate_rows, _ROWS_EVALUATED, 0, phase, active, ())
+        return changes
 
-    def _sweep(self, phase: int, active: list[Flags], order: int, begin: int, reach: int) -> int:
-        """Advance V by one step of time; return the number of nodes that changed."""
+    def _sweep(
+        self,
+        work: Callable[..., None],
+        rows: int,
+        begin: int,
+        phase: int,
+        active: list[Flags],
+        more: tuple[Any, ...],
+    ) -> int:
+        """Advance V by one step of time, so many rows in a task; return the number of nodes that changed."""
         after = (phase + 1) % self.grids.phases
         before = self.values[phase] if after != phase else self.values[phase].copy()
         changed = np.zeros(self.grids.shape, dtype=np.uint8)
@@ -246,18 +265,16 @@ class _Iteration:
             self.centres[phase],
             self.roots[phase],
             self.predecessors[phase],
-            self.uphill[phase],
             self.ceilings[after],
             self.fixed[after].view(np.uint8),
             active[phase],
             changed,
         )
-        rows = len(before)
+        last = len(before)
         tasks = [
-            (*arrays, max(0, first), min(first + _ROWS, rows), order, reach, _TOLERANCE)
-            for first in range(begin, rows, _ROWS)
+            (*arrays, max(0, first), min(first + rows, last), _TOLERANCE, *more) for first in range(begin, last, rows)
         ]
-        for _ in carry(sweep_rows, tasks, self.executor):
+        for _ in carry(work, tasks):
             pass
         active[after] = ndimage.maximum_filter(changed, size=_NEIGHBOURHOOD)
         return int(changed.sum())
