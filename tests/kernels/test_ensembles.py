@@ -1,6 +1,9 @@
 """Ensembles: paused and continued, at parts of the period, sections kept, and the tests that end a trajectory."""
 
+import concurrent.futures
 import functools
+import multiprocessing
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -8,7 +11,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.kernels import ensemble
-from vibrokit.kernels.ensemble import Stop, run_ensemble
+from vibrokit.kernels.ensemble import Stop, carry, run_ensemble
 from vibrokit.kernels.kernel import _fitting
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, LEFT_REGION, REACHED
 from vibrokit.kernels.streams import streams_of
@@ -354,3 +357,21 @@ def test_states_of_another_flow_are_refused(flow):
     """A kernel would read and write beyond them."""
     with pytest.raises(ValueError, match=r"shape \(count, \d+\), got \(3, 5\)"):
         run_ensemble(impacting(), flow, RK, np.zeros((3, 5)))
+
+
+def _nested(number):
+    return sum(carry(abs, [(-number,), (-1,)]))
+
+
+def test_tasks_of_tasks_do_not_wait_for_themselves():
+    """More tasks than threads, each of which has tasks of its own."""
+    assert list(carry(_nested, [(number,) for number in range(50)])) == [number + 1 for number in range(50)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own():
+    tasks = [(-1,), (-2,)]
+    assert list(carry(abs, tasks)) == [1, 2]  # starts the threads
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
+        assert pool.submit(_nested, 3).result(timeout=60) == 4

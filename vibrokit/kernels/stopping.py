@@ -47,8 +47,8 @@ def stop_status(
         return REACHED, int(point_labels[nearest])
     if labels.size > 0 and area[0, 0] <= x <= area[0, 1] and area[1, 0] <= v <= area[1, 1]:
         label = labels[
-            _cell(x, area[0, 0], area[0, 1], labels.shape[0]),
-            _cell(v, area[1, 0], area[1, 1], labels.shape[1]),
+            cell_of(x, area[0, 0], area[0, 1], labels.shape[0]),
+            cell_of(v, area[1, 0], area[1, 1], labels.shape[1]),
         ]
         if label >= 0 and label != home:
             return LEFT_BASIN, int(label)
@@ -66,5 +66,6 @@ def turned_outside(x0: float, v0: float, x1: float, v1: float, interval: float, 
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _cell(value: float, low: float, high: float, count: int) -> int:
+def cell_of(value: float, low: float, high: float, count: int) -> int:
+    """Return in which of some cells between two bounds a value lies."""
     return min(int((value - low) / (high - low) * count), count - 1)

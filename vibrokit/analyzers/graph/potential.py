@@ -33,7 +33,7 @@ _CYCLE = 4  # periods from one wide search for predecessors, and one test of con
 # Cycles in which every period improves the predecessors; later only the first of a cycle does. On ten scenes that took
 # half to four fifths of the time, and V was the same within a tenth of its error.
 _IMPROVING = 3
-_WIDE_SEARCHES = 8  # each evaluates up to (2 · 8 + 1)² nodes for every node, many times what following costs
+_WIDE_SEARCHES = 4  # each evaluates up to (2 · 8 + 1)² nodes for every node, many times what following costs
 _CONVERGED = 2e-5  # relative change of the mean of √V over a cycle; 10 times less changes V by at most 0.1 %
 _MOST_PERIODS = 400
 _BLUR = 2  # nodes within which a grid does not resolve V

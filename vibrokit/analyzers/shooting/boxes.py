@@ -109,5 +109,5 @@ def nearest(centres: Array, first: Array) -> Whole:
     around[0] = 1 / first[0]
     scaled[:, 0] %= around[0]
     scaled[:, 0] = np.where(scaled[:, 0] < around[0], scaled[:, 0], 0.0)  # the remainder may round up
-    _, near = cKDTree(scaled, boxsize=around).query(scaled, k=min(3 ** len(first), len(scaled)))
+    _, near = cKDTree(scaled, boxsize=around).query(scaled, k=min(3 ** len(first), len(scaled)), workers=-1)
     return np.reshape(near, (len(scaled), -1))

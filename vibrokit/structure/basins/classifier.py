@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
+from vibrokit.kernels.staying import staying
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
@@ -132,7 +133,7 @@ class _Trajectories:
         self.remaining = np.full(len(states), classifier.budget + _CONFIRMED * bool(extended), dtype=np.int64)
         self.found = found
         # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
-        self.stayed, self.missed = np.zeros((2, extended, len(states)), dtype=np.int64)
+        self.stayed, self.missed = np.zeros((2, len(states), extended), dtype=np.int64)
         self.sections = 0  # of all together
 
     def active(self) -> Whole:
@@ -171,17 +172,14 @@ class _Trajectories:
     def stay(self, which: Whole, most: int, mask: AttractorMask) -> None:
         """Integrate some trajectories, and note which of them stay near an extended attractor."""
         ended = self.integrate(which, most, visits=most)
-        entered, near = mask.at(ended.visits[:, :, :2])
-        for number, place in enumerate(mask.places):
-            stayed, missed = self.stayed[number, which], self.missed[number, which]
-            confirmed = np.zeros(len(which), dtype=bool)
-            for section in range(most):
-                missed += (stayed > 0) & ~near[number, :, section]
-                stayed[:] = np.where(missed > _MISSES, 0, stayed + ((stayed > 0) | entered[number, :, section]))
-                missed[stayed == 0] = 0
-                confirmed |= (stayed > _CONFIRMED) & (section < ended.intervals)
-            self.stayed[number, which], self.missed[number, which] = stayed, missed
-            self.found[which[confirmed & (self.found[which] == NOT_FOLLOWED)]] = place
+        stayed, missed = self.stayed[which], self.missed[which]
+        found = staying(
+            ended.visits, ended.intervals, mask.frame.bounds, mask.entered, mask.near, _CONFIRMED, _MISSES,
+            stayed, missed,
+        )  # fmt: skip
+        self.stayed[which], self.missed[which] = stayed, missed
+        confirmed = (found >= 0) & (self.found[which] == NOT_FOLLOWED)
+        self.found[which[confirmed]] = mask.places[found[confirmed]]
 
     def close(self) -> None:
         """Label the trajectories whose budget is spent."""

@@ -74,15 +74,9 @@ class AttractorMask:
     """The cells that contain extended attractors, and those around them."""
 
     frame: Region  # the region of the basins, and all of the attractors
-    places: tuple[int, ...]  # of these attractors among all
+    places: Whole  # of these attractors among all
     entered: Mask  # (attractors, nx, nv): cells that contain points of the attractor's sample, and their neighbours
     near: Mask  # (attractors, nx, nv): these, and a border as wide as the gaps of the sample
-
-    def at(self, points: Array) -> tuple[Mask, Mask]:
-        """Return whether points (..., 2) are in `entered` and in `near` cells of each attractor, (attractors, ...)."""
-        cells, inside = self.frame.cells_at(points, self.near.shape[1:])
-        x, v = cells[..., 0], cells[..., 1]
-        return inside & self.entered[:, x, v], inside & self.near[:, x, v]
 
 
 def is_extended(attractor: Attractor) -> bool:
@@ -103,7 +97,7 @@ def mask_of(attractors: Sequence[Attractor], region: Region, spacing: Array) -> 
         width = 1 if attractors[place].kind == "limit cycle" else _gaps(sample, frame, cells)
         entered.append(ndimage.binary_dilation(_cells_with(sample, frame, cells), _SQUARE))
         near.append(ndimage.binary_dilation(entered[-1], _SQUARE, width))
-    return AttractorMask(frame, tuple(samples), np.array(entered), np.array(near))
+    return AttractorMask(frame, np.array(list(samples)), np.array(entered), np.array(near))
 
 
 def _sample(attractor: Attractor, spacing: Array) -> Array:
