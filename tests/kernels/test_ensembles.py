@@ -3,7 +3,7 @@
 import concurrent.futures
 import functools
 import multiprocessing
-import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -368,7 +368,7 @@ def test_tasks_of_tasks_do_not_wait_for_themselves():
     assert list(carry(_nested, [(number,) for number in range(50)])) == [number + 1 for number in range(50)]
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.skipif(sys.platform == "win32", reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_forked_process_has_threads_of_its_own():
     tasks = [(-1,), (-2,)]
