@@ -19,7 +19,7 @@ def staying(
     stayed: NDArray[np.int64],  # (count, attractors): sections since it began to stay, 0 before; kept between calls
     missed: NDArray[np.int64],  # (count, attractors): how many of these were elsewhere; kept between calls
 ) -> NDArray[np.int64]:
-    """Return the number of the attractor that each trajectory has stayed near for long enough, −1 if there is none."""
+    """Return for each trajectory the number of the attractor that it has stayed near, −1 if there is none."""
     found = np.full(len(visits), -1, dtype=np.int64)
     for k in range(len(visits)):
         for section in range(passed[k]):

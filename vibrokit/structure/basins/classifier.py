@@ -28,7 +28,6 @@ CELLS = "cells"
 
 _FIRST_STRETCH = 8  # sections after which the trajectories still under way are packed together again
 _LONGEST_STRETCH = 64  # with an extended attractor: the sections of a stretch are kept in memory
-_PART = 2**15  # trajectories whose sections are kept at a time
 _CONFIRMED = 64  # sections that a trajectory must stay near an extended attractor
 _MISSES = 6  # of these sections that may fall into gaps of the attractor's sample
 
@@ -87,15 +86,11 @@ class BasinClassifier:
         """
         trajectories = _Trajectories(self, states, found)
         trajectories.to_section(start_time)
+        longest = self.budget if self.mask is None else _LONGEST_STRETCH
         stretch, known = _FIRST_STRETCH, 0
         while (active := trajectories.active()).size:
-            if self._mask is None:
-                trajectories.integrate(active, stretch)
-                stretch = min(4 * stretch, self.budget)
-            else:
-                for first in range(0, active.size, _PART):
-                    trajectories.stay(active[first : first + _PART], stretch, self._mask)
-                stretch = min(4 * stretch, _LONGEST_STRETCH)
+            trajectories.follow(active, stretch)
+            stretch = min(4 * stretch, longest)
             trajectories.close()
             known, before = int(np.sum(found != NOT_FOLLOWED)), known
             advance(known - before, CELLS)
@@ -119,7 +114,8 @@ class BasinClassifier:
         return dataclasses.replace(self.points, area=self.core.region.bounds, labels=self.core.labels)
 
     @cached_property
-    def _mask(self) -> AttractorMask | None:
+    def mask(self) -> AttractorMask | None:
+        """The cells around extended attractors; None if there are none."""
         return mask_of(self.attractors, self.region, self.settling * self.region.widths)
 
 
@@ -129,7 +125,7 @@ class _Trajectories:
     def __init__(self, classifier: BasinClassifier, states: Array, found: Whole) -> None:
         self.classifier = classifier
         self.states = np.array(states, dtype=float)
-        extended = sum(is_extended(attractor) for attractor in classifier.attractors)
+        extended = 0 if classifier.mask is None else len(classifier.mask.places)
         self.remaining = np.full(len(states), classifier.budget + _CONFIRMED * bool(extended), dtype=np.int64)
         self.found = found
         # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
@@ -152,13 +148,13 @@ class _Trajectories:
             self.states = ended.states
             self.found[ended.status == DIVERGED] = ESCAPED
 
-    def integrate(self, which: Whole, most: int, visits: int = 0) -> Ensemble:
-        """Integrate some trajectories by at most so many sections, and note which points and cells they reach."""
-        classifier = self.classifier
+    def follow(self, which: Whole, most: int) -> None:
+        """Integrate some trajectories by at most so many sections, and note what they reach."""
+        classifier, mask = self.classifier, self.classifier.mask
         budget = np.minimum(self.remaining[which], most)
         ended = run_ensemble(
             classifier.osc, Flow.STATE, classifier.stepper, self.states[which], budget,
-            stop=classifier.arriving, visits=visits, executor=classifier.executor,
+            stop=classifier.arriving, visits=0 if mask is None else most, executor=classifier.executor,
         )  # fmt: skip
         self.states[which] = ended.states
         self.sections += int(ended.intervals.sum())
@@ -167,11 +163,11 @@ class _Trajectories:
         self.found[which[ended.status == DIVERGED]] = ESCAPED
         reached = np.isin(ended.status, (REACHED, LEFT_BASIN))
         self.found[which[reached]] = ended.label[reached]
-        return ended
+        if mask is not None:
+            self._stay(which, ended, mask)
 
-    def stay(self, which: Whole, most: int, mask: AttractorMask) -> None:
-        """Integrate some trajectories, and note which of them stay near an extended attractor."""
-        ended = self.integrate(which, most, visits=most)
+    def _stay(self, which: Whole, ended: Ensemble, mask: AttractorMask) -> None:
+        """Note which trajectories have stayed near an extended attractor, by the sections that they passed."""
         stayed, missed = self.stayed[which], self.missed[which]
         found = staying(
             ended.visits, ended.intervals, mask.frame.bounds, mask.entered, mask.near, _CONFIRMED, _MISSES,
