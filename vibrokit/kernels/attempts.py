@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
 _LANES = 8  # those of one register; more were not faster, and fewer trajectories would fill them
+_ASSUMED = "    keep_apart(), use_widest_registers()"
 _EACH_NUMBER = "    for _k in range((EQUATIONS + 1)*LANES):"
 _IMPORTS = (
-    "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers",
+    "from vibrokit.kernels.registers import keep_apart, promise_no_overlap, use_widest_registers",
     "from vibrokit.kernels.pointers import offset_by",
     "from vibrokit.kernels.waves import cos, sin",
 )
@@ -77,7 +78,7 @@ class AttemptWriter:
         """Function `slopes_lanes(node, lanes, slopes, theta)`: the slopes at POINT along each course."""
         names = (*self._text.variables, "_now")
         lines = ["@njit(**CONTRACTED)", "def slopes_lanes(node, lanes, slopes, theta):"]
-        lines += ["    use_widest_registers()", "    promise_no_overlap()"]
+        lines += [_ASSUMED, "    promise_no_overlap()"]
         lines += [f"    {name} = theta[{place}]" for name, place in self._text.parameters.items()]
         lines += ["    for lane in range(LANES):"]
         lines += [f"        {name} = {self._at('POINT', row)}" for row, name in enumerate(names)]
@@ -116,7 +117,7 @@ class AttemptWriter:
         return [f"        {line}" for line in lines]
 
     def _attempt(self) -> list[str]:
-        lines = ["@njit(**CONTRACTED)", "def attempt_lanes(lanes, theta, pushing, room):", "    use_widest_registers()"]
+        lines = ["@njit(**CONTRACTED)", "def attempt_lanes(lanes, theta, pushing, room):", _ASSUMED]
         lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
         lines += ["            lanes[LENGTHS + _e*LANES + lane] = lanes[LENGTH + lane]"]
         for stage in range(STAGES):
@@ -136,7 +137,7 @@ class AttemptWriter:
     def _misfit(self) -> list[str]:
         text, clock = self._text, self._count
         blocks = error_blocks(text.states, text.states * text.flow.has_momenta, clock)
-        lines = ["@njit(**CONTRACTED)", "def misfit_lanes(lanes, tolerance, span):", "    use_widest_registers()"]
+        lines = ["@njit(**CONTRACTED)", "def misfit_lanes(lanes, tolerance, span):", _ASSUMED]
         values = self._each("STATE"), self._each("TRIAL"), f"{self._each('LENGTHS')}*{self._each('SLOPES')}"
         lines += [_EACH_NUMBER, f"        _one, _two, _three = {', '.join(f'abs({value})' for value in values)}"]
         lines += ["        _one = _one if _one > _two else _two"]

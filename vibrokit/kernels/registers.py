@@ -34,3 +34,18 @@ def promise_no_overlap(_context: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+@intrinsic
+def keep_apart(_context: Any) -> Any:
+    """Never compile the function that calls this into its callers.
+
+    Where the compiler may contract a product and a sum, it decides by the operations around them. So a copy within
+    another function could round differently.
+    """
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate

@@ -30,10 +30,12 @@ from math import acos, asin, atan, copysign, cos, cosh, exp, log, sin, sinh, sqr
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.registers import keep_apart
+
 # Each operation rounds by itself, so that the bits do not depend on which functions the compiler inlines.
 OPTIONS = {{"nogil": True, "cache": True, "error_model": "numpy"}}
 # In lanes, contraction of a product and a sum saves a quarter of the time. A function that is compiled both inline and
-# on its own may then round differently in the two versions, so all functions of lanes are inlined.
+# on its own may then round differently in the two versions, so functions of lanes are either inlined or kept apart.
 CONTRACTED = {{**OPTIONS, "fastmath": {{"contract", "nsz", "arcp"}}}}
 INLINED = {{**CONTRACTED, "forceinline": True}}
 '''
@@ -147,7 +149,7 @@ class SceneText:
         values = [*(f"z[{place}]" for place in places), *(["forcing(t, theta)"] if self.forced else [])]
         values += [f"pushing[{stop}]" for stop in range(len(self._model.contacts))]
         values += [f"theta[{place}]" for place in self.parameters.values()]
-        lines = ["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):"]
+        lines = ["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", "    keep_apart()"]
         lines += [f"    {', '.join(f'out[{place}]' for place in places)} = rates({', '.join(values)})", ""]
         return "\n".join([self._rates_function("rates", switched=True), "", *lines])
 
