@@ -1,8 +1,11 @@
 """Periods of conservative motion against one stop, by quadrature at 50 digits: independent of every stepper."""
 
+import math
+
 import mpmath
 
 DIGITS = 50
+STEPS = 8  # about those of one contact, in each of which the position is rounded
 
 
 def exact_period(stiffness: float, power: float, place: float, speed: float) -> float:
@@ -35,3 +38,18 @@ def exact_period(stiffness: float, power: float, place: float, speed: float) -> 
         pieces = [0, *(1 - mpmath.mpf(2) ** -n for n in range(1, 25)), 1]
         contact = mpmath.quad(integrand, pieces, method="gauss-legendre")
         return float(mpmath.pi + 2 * (free + contact))
+
+
+def rounding_after(cycles: int, stiffness: float, power: float, place: float, speed: float) -> float:
+    """Error in x after whole periods if each step in contact rounds the position by half a unit in the same direction.
+
+    The force times the error in position is one in energy, which changes every later period.
+    """
+    energy = (speed**2 - place**2) / 2
+    force = stiffness ** (1 / (power + 1)) * ((power + 1) * energy) ** (power / (power + 1))
+    slower = place + (speed - place) * 0.999
+    by_speed = (exact_period(stiffness, power, place, speed) - exact_period(stiffness, power, place, slower)) / (
+        speed - slower
+    )
+    lost = STEPS * force * math.ulp(place) / 2 / speed  # of the speed, in each contact
+    return speed * abs(by_speed) * lost * cycles**2 / 2

@@ -22,6 +22,7 @@ from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
     COUNT,
+    DEEP,
     END,
     FIRST_STEP,
     FREE_STEP,
@@ -54,7 +55,7 @@ def begin(y, interval, lane, memory, pushing, theta, settings, lanes, room):
     memory[FREE_STEP] = min(interval, 6.0 * settings[0] ** 0.125 * settings[3])
     memory[FIRST_STEP] = memory[FREE_STEP] / 64.0
     memory[CONTACT_STEP] = memory[FIRST_STEP]
-    memory[TOUCHED] = -1.0
+    memory[TOUCHED], memory[DEEP] = -1.0, 0.0
     if BARRIERS > 0:
         settle(y, memory, pushing, theta, offset_by(room, ROW))
         face(lane, memory, pushing, theta, lanes)

@@ -44,15 +44,17 @@ CLOCK = EQUATIONS  # place of the time in y
 UNDERWAY = -1  # the status of a lane that waits for an attempt
 # Memory of a lane between attempts. Durations of the next step in free flight, in contact and at the next touch, the
 # stop that is touched (−1: none), since when (nan: unknown), whether its law would pull, whether the next step must run
-# in time, the number of attempts, the time to integrate over, and its end.
+# in time, the number of attempts, the time to integrate over, and its end; whether the last step in a contact ran in
+# the root of the depth.
 FREE_STEP, CONTACT_STEP, FIRST_STEP, TOUCHED, SINCE, PULLED, TIMED, COUNT, SPAN, END = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+DEEP = 25
 # Of a step: the length it was begun with, whether it is to reach the end, the error before, and how often shortening
 # the step did not reduce it.
 FIRST, LAST, BEFORE, MISSES = 10, 11, 12, 13
 # Of a step that is shortened to end on an event: its task, the goal and its stop, the full length and its error, the
 # bracket, the length and the value before, whether the value rises, and the number of attempts.
 TASK, GOAL, AIM, WHOLE, TAKEN, LOW, HIGH, SHORTER, VALUE, RISING, TRIES = 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24
-MEMORY = 25
+MEMORY = 26
 # The tasks: to take steps, or to land on an event, which says what follows.
 STEPS, TOUCHES, TURNS, FLIPS, RELEASES = 0.0, 1.0, 2.0, 3.0, 4.0
 # Room beside the numbers of the lanes: a state, rows for slopes that events work in, the memories, and a series.
@@ -134,7 +136,7 @@ def shortened(error, factor, tiny, lane, memory, settings, lanes):
     stuck = error > 0.8 * memory[BEFORE] and error * settings[0] < 1e-6
     memory[MISSES] = memory[MISSES] + 1.0 if stuck else 0.0
     memory[BEFORE] = error
-    return lanes[LENGTH + lane] * min(0.7, factor)
+    return lanes[LENGTH + lane] * min(0.8, factor)
 
 
 @njit(**INNER)
