@@ -248,6 +248,20 @@ def test_the_bounds_contain_a_path_that_a_coarse_graph_misses(paper):
     assert finding.values["path"] == energy.value
 
 
+def test_both_wells_of_a_symmetric_scene_have_one_energy():
+    """Half a period later the scene is its own mirror image. Few steps gave the graph no path out of one well."""
+    wells = vk.CubicSpring(linear=-1.0, cubic=1.0)
+    stops = tuple(vk.Barrier(vk.Linear(30.0), side * 1.2, name) for side, name in ((1, "right"), (-1, "left")))
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.15, spring=wells, barriers=stops,
+        excitations=(vk.Harmonic(amplitude=0.15, frequency=0.9),), noise=vk.WhiteNoise(intensity=1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False)
+    left, right = vk.LeastAction().run(osc, structure).energies
+    assert (left.bound, right.bound) == (Bound.CERTIFIED, Bound.CERTIFIED)
+    assert left.value == pytest.approx(right.value, rel=1e-8)
+
+
 @pytest.mark.parametrize("source", NAMES)
 def test_minimised_once_more_it_stays(polished, source):
     """∫ ½ (x″ + 2ζx′ + …)² dt brought to its minimum, with a grid and ends of its own, from the polished path."""

@@ -8,13 +8,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
-from tests.scenes import Coloured, double_well
+from tests.scenes import Coloured, double_well, scene
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.basins import ESCAPED, Basins
 from vibrokit.results.finding import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.attractors.describe import describe_orbit
-from vibrokit.structure.autonomous import find_cycle
+from vibrokit.structure.autonomous import equilibria, find_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import classify_grid
 from vibrokit.structure.boundaries.edges import Straddles, meeting_cells, spread
@@ -157,7 +157,7 @@ def derivative_by_scipy(force, state, duration, stop=None, step=1e-6):
 
 
 def check_against_scipy(osc, saddle, force, stop=None):
-    duration = osc.section_interval
+    duration = saddle.period * osc.section_interval
     point = saddle.points[0]
     np.testing.assert_allclose(mapped_by_scipy(force, point, duration, stop), point, atol=1e-9)
     multipliers = np.linalg.eigvals(derivative_by_scipy(force, point, duration, stop))
@@ -176,6 +176,29 @@ def test_the_duffing_oscillator_has_one_boundary_saddle():
     assert len(found) == 1, findings
     assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
     check_against_scipy(osc, found[0], lambda t, x, v: 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3)
+
+
+def test_a_weakly_damped_boundary_takes_long_to_reach_its_saddle():
+    # An island of period 3 beside the small oscillation: its boundary closes in by exp(−0.02 · 2π/3.3) in a period.
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(linear=1.0, cubic=0.2),
+        excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False)
+    assert [attractor.period for attractor in structure.attractors] == [1, 1, 3]
+    assert [(saddle.kind, saddle.period, set(saddle.leads_to)) for saddle in structure.saddles] == [
+        ("saddle", 1, {0, 1}), ("saddle", 3, {0, 2}),
+    ]  # fmt: skip
+    for saddle in structure.saddles:
+        check_against_scipy(osc, saddle, lambda t, x, v: 3 * np.cos(3.3 * t) - 0.02 * v - x - 0.2 * x**3)
+
+
+def test_equilibria_are_counted_once_where_the_force_is_exactly_0_between_two_places():
+    # x (x² − 1) (x² − 4): the places that are looked at include 0, and in the second range ±1.
+    osc = scene(spring=vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)"), damping_ratio=0.1)
+    for edge in (2.5, 3.0, 2.0):
+        found = [float(orbit.point[0]) for orbit in equilibria(osc, -edge, edge)]
+        np.testing.assert_allclose(found, [-2, -1, 0, 1, 2], atol=1e-12)
 
 
 def paper_force(t, x, v):

@@ -95,8 +95,9 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     places = np.linspace(low, high, _PLACES)
     forces = np.array([force(x) for x in places])
     found = []
-    for at in np.flatnonzero(forces[:-1] * forces[1:] <= 0):
-        guess = float(brentq(force, places[at], places[at + 1]))
+    crossed = np.flatnonzero(forces[:-1] * forces[1:] < 0)
+    guesses = [*places[forces == 0], *(float(brentq(force, places[at], places[at + 1])) for at in crossed)]
+    for guess in sorted(guesses):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
             found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
     return found

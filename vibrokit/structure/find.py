@@ -38,6 +38,7 @@ _FOLDS = 30  # e-foldings of the linear damping for a transient
 _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
+_EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a motion on a boundary converges to its saddle
 _SEARCH_SETTLING = 1e-3
 _MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
 _MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
@@ -223,7 +224,8 @@ class _Finder:
         assert self.grid is not None
         basins = self.grid.basins
         classifier = self.classifier.sharing(basins, self.request.margin or 2)
-        self.saddle_search = SaddleSearch(classifier, basins, self.orbit_stepper)
+        sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
+        self.saddle_search = SaddleSearch(classifier, basins, self.orbit_stepper, sections=sections)
         self.saddle_search.run(self.rng)
 
     def _grow_manifolds(self) -> None:

@@ -125,13 +125,13 @@ class HierarchySearch:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
 
         Each step adds an error of interpolation. So steps are not shortened where a rougher grid changes a cost by more
-        than linearization does, nor beyond where that takes V farther from the actions of its paths.
+        than linearization does, nor beyond where that takes V farther from the actions of its paths, or gives no path
+        to one of the exits.
         """
         half = _halved(shape)
-        first, *shorter = self.steps_per_period
+        first, *shorter = (count for count in self.steps_per_period if before is None or count >= before.fine.steps)
         if before is not None and before.refined_by(shape):
             whole, rougher, coarse = before.whole, before.coarse, self._closer(before.fine, targets, _WORTHWHILE)
-            shorter = [count for count in shorter if count > coarse.steps]
         else:
             whole, coarse = self._coarser(first, targets, half)
             rougher = whole
@@ -139,7 +139,8 @@ class HierarchySearch:
             if coarse.linearization_error(targets) <= max(_STEP_TOLERANCE, coarse.change(rougher, targets)):
                 break
             tried = self._coarser(count, targets, half)
-            if tried[1].excess(targets) > max(coarse.excess(targets), _STEP_TOLERANCE):
+            excess = tried[1].excess(targets)
+            if not np.isfinite(excess) or excess > max(coarse.excess(targets), _STEP_TOLERANCE):
                 break
             whole, coarse = tried
             rougher = whole

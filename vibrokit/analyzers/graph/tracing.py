@@ -72,8 +72,12 @@ class SolvedGrid:
         return max((value for value in values if np.isfinite(value)), default=np.inf)
 
     def linearization_error(self, targets: Iterable[ExitTarget]) -> float:
-        """Return the largest relative change of an exit's cost by linearization over a step."""
-        return max((path.linearization_error for target in targets for path in self.paths(target)), default=0.0)
+        """Return the largest relative change of a reached exit's cost by linearization over a step.
+
+        Infinite if no path to one of them could be traced.
+        """
+        traced = [self.paths(target) for target in targets if np.isfinite(self.arrival(target).value)]
+        return max((max((path.linearization_error for path in paths), default=np.inf) for paths in traced), default=0.0)
 
     def change(self, rougher: SolvedGrid, targets: Iterable[ExitTarget]) -> float:
         """Return the largest relative change of an exit's cost from another grid."""
@@ -82,9 +86,13 @@ class SolvedGrid:
         return max((abs(rough / value - 1) for value, rough in known), default=0.0)
 
     def excess(self, targets: Iterable[ExitTarget]) -> float:
-        """Return the largest relative difference between V at a target and the action of the path to it."""
-        found = [(self.arrival(target).value, self.paths(target)) for target in targets]
-        return max((abs(value / paths[0].candidate.action - 1) for value, paths in found if paths), default=0.0)
+        """Return the largest relative difference between V at a reached exit and the action of the path to it.
+
+        Infinite if no path to one of them could be traced.
+        """
+        found = [(self.arrival(target).value, target) for target in targets]
+        traced = [(value, self.paths(target)) for value, target in found if np.isfinite(value)]
+        return max((abs(v / paths[0].candidate.action - 1) if paths else np.inf for v, paths in traced), default=0.0)
 
     def paths(self, target: ExitTarget) -> list[TracedPath]:
         """Return the distinct paths to a target, the cheapest first."""

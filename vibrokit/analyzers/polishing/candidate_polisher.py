@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -80,9 +80,8 @@ class CandidatePolisher:
         self._resampled = functools.cache(lambda candidate, pieces: resampled(propagators[pieces], candidate))
 
     def polish(self, candidate: Candidate) -> None:
-        """Polish a candidate to each end that it comes near, unless a far cheaper path to its target is known."""
-        known = [one.found.action for one in self.solved if candidate.target in one.end.targets]
-        if known and candidate.action > WORTH * min(known):
+        """Polish a candidate to each end that it comes near, unless a far cheaper path is known."""
+        if candidate.action > WORTH * self._known(candidate):
             self.skipped += 1
             return
         failures, solved = [], False
@@ -90,7 +89,7 @@ class CandidatePolisher:
             ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
             for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
                 try:
-                    self._add(self._solve(end, candidate, self.solved, way))
+                    self._add(self._solve(end, candidate, way))
                     solved = True
                 except StructureError as error:
                     failures.append(str(error))
@@ -111,13 +110,27 @@ class CandidatePolisher:
         near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
         for candidate in itertools.chain(near, ranked[:1]):
             try:
-                return self._add(self._solve(end, candidate, ()))
+                return self._add(self._solve(end, candidate))
             except StructureError:
                 continue
 
     def _add(self, one: Solved) -> None:
         if not any(one.is_same(other) for other in self.solved):
             self.solved.append(one)
+
+    def _known(self, candidate: Candidate) -> float:
+        """The least action of a known path to the candidate's target, or, if less, to any end that it comes near."""
+        try:
+            near = self._near(candidate)
+        except StructureError:
+            near = []
+        to_target = self._least(end for end in self.ends if candidate.target in end.targets)
+        return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
+
+    def _least(self, ends: Iterable[PathEnd]) -> float:
+        """The least action of the known paths to some ends; infinite if there is none."""
+        among = tuple(ends)
+        return min((one.found.action for one in self.solved if one.end in among), default=np.inf)
 
     def _near(self, candidate: Candidate) -> list[PathEnd]:
         """The ends that a candidate comes near, the nearest first."""
@@ -132,11 +145,9 @@ class CandidatePolisher:
         except StructureError:
             return False
 
-    def _solve(
-        self, end: PathEnd, candidate: Candidate, known: Sequence[Solved], way: Way = PathSolver.solve
-    ) -> Solved:
+    def _solve(self, end: PathEnd, candidate: Candidate, way: Way = PathSolver.solve) -> Solved:
         """Polish a candidate to an end, with finer pieces if necessary and if it is cheaper than all known paths."""
-        least = min((one.found.action for one in known if one.end is end), default=np.inf)
+        least = self._least((end,))
         for pieces in PIECES:
             try:
                 return self._solve_with(pieces, end, candidate, (1 - _CHEAPER) * least, way)

@@ -60,10 +60,16 @@ class Polishing:
             self._polisher = CandidatePolisher(problem, self._ends, *_start(problem, orbit))
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
+        self._known = set[tuple[int, bytes]]()
 
     def add(self, candidates: Sequence[Candidate]) -> None:
-        """Polish candidates, the cheapest first, and certify the paths that they lead to."""
-        ranked = sorted(candidates, key=lambda each: each.action)
+        """Polish candidates, the cheapest first, and certify the paths that they lead to.
+
+        Those that came before are left out: finer graphs give some paths again.
+        """
+        new = {(each.target, each.states.tobytes()): each for each in candidates}
+        ranked = sorted((new[key] for key in new if key not in self._known), key=lambda each: each.action)
+        self._known |= new.keys()
         self._tried += len(ranked)
         try:
             with stage("polishing", unit="candidates", total=len(ranked)):

@@ -41,7 +41,8 @@ _SAMPLES = 8192  # of a cycle
 _APPROACH = 0.25  # fraction of a motion that does not recur which is its transient
 _SEVERAL = 32  # sections after which only a few motions go on for each pair of labels
 _FEW, _FEWEST = 6, 2
-_MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer go on
+_MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer go on; as many again after _SOON
+_SOON = 128  # sections within which motions on most boundaries converge
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they need longer
 _QUICK = 2000
 _LEAST_MOTIONS = 16
@@ -59,14 +60,15 @@ class SaddleSearch:
     The classifier finds where states lead, and integrates those on the boundaries. One that uses a finished grid is
     fast; a boundary on which it finds no saddle is followed again without the grid. There are at most `trackers`
     motions for each pair of basins that meet, six after 32 sections, and two when classifying states has taken 10⁶
-    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after `sections`.
+    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after `sections`, or
+    earlier if classifying states has taken 10⁶ more since the 128th.
     """
 
     classifier: BasinClassifier
     basins: Basins
     orbit_stepper: Stepper
     trackers: int = 9
-    sections: int = 128
+    sections: int = _SOON
 
     def __post_init__(self) -> None:
         self.osc = self.classifier.osc
@@ -128,11 +130,13 @@ class SaddleSearch:
         """Follow motions until each has converged to a saddle, or for the largest number of sections."""
         motions = len(straddles.origins)
         tries = np.zeros(motions, dtype=np.int64)
-        parts = PARTS_OF_A_TURN if self.osc.autonomous else 1
+        parts, most_sections = PARTS_OF_A_TURN if self.osc.autonomous else 1, np.inf
         for step in range(1, self.sections * parts + 1):
-            if not len(straddles):
+            if not len(straddles) or straddles.sections > most_sections:
                 break
             straddles.advance()
+            if step == _SOON * parts:
+                most_sections = straddles.sections + _MANY_SECTIONS
             if step % (_CHECKED_EVERY * parts) == 0:
                 arrived = np.array([self._arrived(straddles, n, tries) for n in range(len(straddles))], dtype=bool)
                 self._explain(straddles, arrived)
