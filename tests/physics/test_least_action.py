@@ -262,6 +262,21 @@ def test_both_wells_of_a_symmetric_scene_have_one_energy():
     assert left.value == pytest.approx(right.value, rel=1e-8)
 
 
+def test_the_graph_resolves_small_islands_around_an_orbit_of_period_3():
+    """They lie apart: one grid around all three covers several times the area, and its error was as large as V."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(linear=1.0, cubic=0.2),
+        excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),), noise=vk.WhiteNoise(intensity=1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False)
+    (polished,) = vk.LeastAction(graph=None, source="oscillation-period-3").run(osc, structure).energies
+    result = vk.ActionGraph(nodes=(90, 90), source="oscillation-period-3").run(osc, structure)
+    energy = min(result.energies, key=lambda energy: energy.value)
+    assert (energy.target, polished.target) == (0, 0)
+    assert energy.lower <= polished.value <= energy.upper
+    assert energy.numerical_error < 0.1 * energy.value
+
+
 @pytest.mark.parametrize("source", NAMES)
 def test_minimised_once_more_it_stays(polished, source):
     """∫ ½ (x″ + 2ζx′ + …)² dt brought to its minimum, with a grid and ends of its own, from the polished path."""

@@ -127,7 +127,7 @@ class _Work:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
-        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem)
+        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
         self._searched = False  # whether there are no more solutions
         self.findings: list[Finding] = []
 
@@ -188,6 +188,17 @@ class _Work:
         for branch in least.values():
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
                 self._polish(self.analyzer.graph.beginnings(self.problem, branch, self.graph))
+
+    def _settled(self) -> set[int]:
+        """Labels of the attractors to which a path and the graph agree within the accuracy."""
+        branches = self._polished()[0]
+        if self.graph is None or not self.problem.attractor.is_fixed:
+            return set()
+        estimates = self._estimates(self.graph, branches)
+        _, compared = combined(self.problem.attractor, branches, estimates)
+        agreed = {finding.target for finding in compared if finding.code is Code.AGREEMENT}
+        accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
+        return accurate & agreed
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates; infinite where they disagree with the paths."""

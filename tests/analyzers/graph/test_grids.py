@@ -6,7 +6,7 @@ import pytest
 from vibrokit.analyzers.graph.grids import Grids
 
 BOXES = np.array([[[-1.0, 1.0], [-2.0, 4.0]], [[0.0, 0.5], [-1.0, 1.0]], [[-1.0, 0.0], [2.0, 3.0]], [[0, 1], [0, 1]]])
-GRIDS = Grids(BOXES, (5, 13), 0.25)
+GRIDS = Grids(BOXES, (5, 13), 0.25, 2)
 
 
 def mask(*where):
@@ -54,14 +54,14 @@ def test_only_the_sides_with_needed_nodes_are_widened():
 
 
 def test_grids_wide_enough_stay_the_same():
-    tall = Grids(BOXES, (13, 13), 0.25)
+    tall = Grids(BOXES, (13, 13), 0.25, 2)
     middle = np.zeros((13, 13), dtype=bool)
     middle[4:9, 4:9] = True
     assert tall.widened([middle] * 4) is tall
 
 
 def test_zoomed_grids_cover_the_needed_nodes_with_a_margin_and_nothing_outside():
-    tall = Grids(BOXES, (41, 41), 0.25)
+    tall = Grids(BOXES, (41, 41), 0.25, 2)
     wanted = np.zeros((41, 41), dtype=bool)
     wanted[20:25, 0:3] = True
     closer = tall.zoomed([wanted, *[np.zeros_like(wanted)] * 3])
@@ -75,8 +75,16 @@ def test_zoomed_grids_cover_the_needed_nodes_with_a_margin_and_nothing_outside()
 
 def test_double_steps_take_every_second_grid():
     doubled = GRIDS.with_double_step()
-    assert (doubled.phases, doubled.step) == (2, 0.5)
+    assert (doubled.phases, doubled.step, doubled.steps) == (2, 0.5, 1)
     np.testing.assert_array_equal(doubled.boxes, BOXES[::2])
-    alone = Grids(BOXES[:1], (5, 13), 0.25).with_double_step()
+    alone = Grids(BOXES[:1], (5, 13), 0.25, 2).with_double_step()
     assert (alone.phases, alone.step) == (1, 0.5)
     assert GRIDS.with_shape((7, 9)).spacing(0) == pytest.approx((2 / 6, 6 / 8))
+
+
+def test_several_section_intervals_have_sections_of_their_own():
+    assert list(GRIDS.sections) == [0, 2]
+    apart = GRIDS.unfolded(3)
+    assert (apart.phases, list(apart.sections)) == (12, [0, 2, 4, 6, 8, 10])
+    np.testing.assert_array_equal(apart.boxes, np.concatenate([BOXES] * 3))
+    assert apart.area == pytest.approx(3 * GRIDS.area)

@@ -11,7 +11,7 @@ from vibrokit.analyzers.graph.tracing import backtrack
 from vibrokit.kernels.rk4 import RK4
 
 STEP = np.pi / 4
-GRIDS = Grids(np.array([[[-1.5, 1.5], [-1.5, 1.5]]]), (61, 61), STEP)
+GRIDS = Grids(np.array([[[-1.5, 1.5], [-1.5, 1.5]]]), (61, 61), STEP, 8)
 DAMPINGS = (0.1, 0.7)
 
 

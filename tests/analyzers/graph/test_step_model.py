@@ -9,7 +9,7 @@ from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.kernels.order8 import Order8
 
 STEP = 0.7
-GRIDS = Grids(np.array([[[-2.0, 2.0], [-3.0, 3.0]]]), (41, 31), STEP)
+GRIDS = Grids(np.array([[[-2.0, 2.0], [-3.0, 3.0]]]), (41, 31), STEP, 1)
 SCENES = [(0.05, 1.0), (0.4, 1.7), (1.5, 1.0)]
 ENDS = np.array([[0.3, -0.2], [-1.1, 1.4], [0.0, 0.0]])
 STARTS = np.array([[0.1, 0.5], [-0.7, 1.9], [1.0, -1.0]])
@@ -36,7 +36,7 @@ def test_a_step_costs_half_the_squared_miss_in_units_of_the_noise(scene, duratio
     """½ eᵀ C⁻¹ e with e = y − M x, whether b lies on the grid or the step is linearized from where it starts uphill."""
     time = duration or STEP
     slope, covariance = linear.flow(*scene, time)
-    grids = GRIDS if inside else Grids(GRIDS.boxes * 1e-6, GRIDS.shape, STEP)
+    grids = GRIDS if inside else Grids(GRIDS.boxes * 1e-6, GRIDS.shape, STEP, 1)
     costs = model(*scene).into(ENDS, grids, 0, duration)
     miss = ENDS - STARTS @ slope.T
     exact = 0.5 * np.einsum("ni,ij,nj->n", miss, np.linalg.inv(covariance), miss)
@@ -56,7 +56,7 @@ def test_uphill_is_the_image_of_the_mirrored_state_mirrored_and_kept_in_the_box(
     exact = ENDS @ mirror @ slope.T @ mirror
     costs = model(0.4, 1.0).into(ENDS, GRIDS, 0)
     np.testing.assert_allclose(GRIDS.states(0, costs.uphill), exact, atol=1e-9)
-    small = Grids(GRIDS.boxes * 0.1, GRIDS.shape, STEP)
+    small = Grids(GRIDS.boxes * 0.1, GRIDS.shape, STEP, 1)
     clipped = np.clip(exact, small.boxes[0, :, 0], small.boxes[0, :, 1])
     np.testing.assert_allclose(small.states(0, model(0.4, 1.0).into(ENDS, small, 0).uphill), clipped, atol=1e-9)
 

@@ -1,4 +1,4 @@
-"""Grids: the nodes at each phase of a period, and where states lie among them."""
+"""Grids: the nodes at each phase of one section interval or several, and where states lie among them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,16 @@ Mask = NDArray[np.bool_]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Grids:
-    """A grid of nodes (x, v) for each phase, all with the same number of nodes."""
+    """A grid of nodes (x, v) for each phase, all with the same number of nodes.
+
+    The phases are those of one section interval, or of an attractor's period: its points on the section lie apart, and
+    each has a smaller grid of its own then.
+    """
 
     boxes: Array  # (phases, 2, 2): bounds of x and of v; the outermost nodes lie on them
     shape: tuple[int, int]  # nodes in x and in v
     step: float  # time from phase to phase (s)
+    steps: int  # in a section interval
 
     @property
     def phases(self) -> int:
@@ -30,12 +35,17 @@ class Grids:
         return len(self.boxes)
 
     @property
+    def sections(self) -> range:
+        """Phases that are on the section."""
+        return range(0, self.phases, self.steps)
+
+    @property
     def area(self) -> float:
         """Area of all boxes together."""
         return float(np.prod(np.diff(self.boxes, axis=2)[..., 0], axis=1).sum())
 
     def time(self, phase: int) -> float:
-        """Time of a phase since the section (s)."""
+        """Time of a phase since the first section (s)."""
         return phase * self.step
 
     def spacing(self, phase: int) -> Array:
@@ -68,8 +78,12 @@ class Grids:
         return dataclasses.replace(self, shape=shape)
 
     def with_double_step(self) -> Grids:
-        """Return every second grid, or the only one."""
-        return dataclasses.replace(self, boxes=self.boxes[::2], step=2 * self.step)
+        """Return every second grid, or the only one, with steps twice as long."""
+        return dataclasses.replace(self, boxes=self.boxes[::2], step=2 * self.step, steps=self.steps // 2)
+
+    def unfolded(self, intervals: int) -> Grids:
+        """Return grids for each of several section intervals, on the same boxes."""
+        return dataclasses.replace(self, boxes=np.tile(self.boxes, (intervals, 1, 1)))
 
     def widened(self, needed: list[Mask]) -> Grids:
         """Return grids that reach farther on each side where needed nodes lie; the same grids if there are none."""

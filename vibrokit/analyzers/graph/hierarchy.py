@@ -31,6 +31,9 @@ PATH_FACTOR = 2.0
 """Factor on the difference from a path's action: the path's fixed ends make that an upper bound."""
 _STEP_FACTOR = 0.5  # of the change by doubling the step: the error falls at least with the square of the step
 _FEWEST_NODES = 16  # along a side of the coarse grids
+# Along a side where several section intervals have grids: half as many found the islands around an orbit of period 3 of
+# a weakly damped Duffing oscillator, and 26 did not.
+_FEWEST_APART = 90
 # Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
 # linearized steps made V ten times too small.
 _FEWEST_RELIABLE = 64
@@ -62,6 +65,11 @@ class GridHierarchy:
         """Whether one with so many nodes can go on from the fine grid: twice as many, on boxes that are reliable."""
         grids = self.coarse.potential.grids
         return self.fine.potential.grids.shape == _halved(shape) and min(grids.shape) >= _FEWEST_RELIABLE
+
+    @property
+    def intervals(self) -> int:
+        """Section intervals that have grids of their own."""
+        return self.fine.intervals
 
     @cached_property
     def long(self) -> SolvedGrid:
@@ -105,7 +113,8 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: tuple[int, ...]  # to be tried in turn
     finest: Shape  # the last one, whose hierarchies are not kept
-    _solved_before: dict[tuple[ExitTarget, ...], GridHierarchy] = dataclasses.field(default_factory=dict)
+    unfolding: bool = True  # whether to try grids for each section interval of the attractor's period
+    _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
 
     def estimates(
         self, targets: Sequence[ExitTarget], shape: Shape
@@ -115,11 +124,19 @@ class HierarchySearch:
         Raises StructureError if no target was reached, or if the attractor is not hyperbolic.
         """
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
-            before = self._solved_before.get(tuple(targets))
-            hierarchy = self._hierarchy(targets, shape, before)
+            hierarchy = self._hierarchy(targets, shape, self._before(frozenset(targets), shape))
             if shape != self.finest:
-                self._solved_before[tuple(targets)] = hierarchy
+                self._solved_before[shape, frozenset(targets)] = hierarchy
             return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
+
+    def _before(self, targets: frozenset[ExitTarget], shape: Shape) -> GridHierarchy | None:
+        """The finest hierarchy on fewer nodes that was solved for the fewest other targets."""
+        known = [(len(others), -nodes[0], nodes, others) for nodes, others in self._solved_before if targets <= others]
+        earlier = [entry for entry in known if entry[2] != shape]
+        if not earlier:
+            return None
+        *_, nodes, others = min(earlier, key=lambda entry: entry[:2])
+        return self._solved_before[nodes, others]
 
     def _hierarchy(self, targets: Sequence[ExitTarget], shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
@@ -128,29 +145,43 @@ class HierarchySearch:
         than linearization does, nor beyond where that takes V farther from the actions of its paths, or gives no path
         to one of the exits.
         """
-        half = _halved(shape)
+        if before is not None and before.fine.potential.grids.shape == _shared(shape, before.intervals):
+            return before
         first, *shorter = (count for count in self.steps_per_period if before is None or count >= before.fine.steps)
-        if before is not None and before.refined_by(shape):
+        if before is not None and before.refined_by(_shared(shape, before.intervals)):
             whole, rougher, coarse = before.whole, before.coarse, self._closer(before.fine, targets, _WORTHWHILE)
         else:
-            whole, coarse = self._coarser(first, targets, half)
+            solved = [self._coarser(first, targets, shape, intervals) for intervals in self._intervals(before)]
+            whole, coarse = min(solved, key=lambda both: both[1].highest(targets))  # interpolation raises V
             rougher = whole
         for count in shorter:
             if coarse.linearization_error(targets) <= max(_STEP_TOLERANCE, coarse.change(rougher, targets)):
                 break
-            tried = self._coarser(count, targets, half)
+            tried = self._coarser(count, targets, shape, coarse.intervals)
             excess = tried[1].excess(targets)
             if not np.isfinite(excess) or excess > max(coarse.excess(targets), _STEP_TOLERANCE):
                 break
             whole, coarse = tried
             rougher = whole
         grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
-        fine = self._solved(grids.with_shape(shape), ceiling, targets)
+        fine = self._solved(grids.with_shape(_shared(shape, coarse.intervals)), ceiling, targets)
         return GridHierarchy(fine, coarse, whole, lambda: self._solved(grids.with_double_step(), ceiling, targets))
 
-    def _coarser(self, steps: int, targets: Sequence[ExitTarget], shape: Shape) -> tuple[SolvedGrid, SolvedGrid]:
-        """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit."""
-        grids = self._covering(steps, shape)
+    def _intervals(self, before: GridHierarchy | None) -> tuple[int, ...]:
+        """Numbers of section intervals to try: grids of their own for those of an attractor's period may cover less."""
+        if before is not None:
+            return (before.intervals,)
+        attractor = self.problem.attractor
+        return (1, attractor.period) if self.unfolding and attractor.is_fixed and attractor.period > 1 else (1,)
+
+    def _coarser(
+        self, steps: int, targets: Sequence[ExitTarget], shape: Shape, intervals: int
+    ) -> tuple[SolvedGrid, SolvedGrid]:
+        """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit.
+
+        They have half as many nodes along each side as the finest grid of that shape.
+        """
+        grids = self._covering(steps, _halved(_shared(shape, intervals))).unfolded(intervals)
         whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
         for _ in range(_WIDENINGS):
             wider = grids.widened(self._before_exit(whole, whole.highest(targets)))
@@ -204,7 +235,7 @@ class HierarchySearch:
             boxes.append(np.stack([low - margin, high + margin], axis=1))
             images = self.model.images(states, phase * step, step)
             states = images[np.isfinite(images).all(axis=1)]
-        return Grids(np.array(boxes), shape, step)
+        return Grids(np.array(boxes), shape, step, steps)
 
     def _before_exit(self, solved: SolvedGrid, ceiling: float) -> list[Mask]:
         """By phase: which nodes lie before the exit, with V below a ceiling."""
@@ -218,8 +249,8 @@ class HierarchySearch:
     def _in_basin(self, grids: Grids, phase: int) -> Mask:
         """Which nodes lead to the attractor, according to the cells of the section that they come to."""
         states = grids.nodes(phase).reshape(-1, 2)
-        if phase:
-            rest = self.problem.scene.section_interval - grids.time(phase)
+        if phase not in grids.sections:
+            rest = (grids.steps - phase % grids.steps) * grids.step
             states = self.model.images(states, grids.time(phase), rest)
         mask: Mask = self.problem.structure.basins.at(states) == self.problem.source
         return mask.reshape(grids.shape)
@@ -227,3 +258,9 @@ class HierarchySearch:
 
 def _halved(shape: Shape) -> Shape:
     return max(_FEWEST_NODES, shape[0] // 2), max(_FEWEST_NODES, shape[1] // 2)
+
+
+def _shared(shape: Shape, intervals: int) -> Shape:
+    """Nodes along each side where the grids of several intervals take together what one takes, unless those are few."""
+    nx, nv = (max(min(nodes, _FEWEST_APART), round(nodes / intervals**0.5)) for nodes in shape)
+    return nx, nv

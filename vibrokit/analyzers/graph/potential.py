@@ -101,7 +101,7 @@ def _visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[_Visit
     orbit = refine_orbit(model.scene, attractor.points[0], attractor.period, model.stepper)
     covariance, point = local_potential(model.scene, orbit, model.stepper).covariance, orbit.point
     visits = []
-    for number in range(attractor.period * grids.phases):
+    for number in range(attractor.period * grids.phases // len(grids.sections)):
         phase = number % grids.phases
         step = model.linear(point[None], grids.time(phase), grids.step)
         slopes = step.derivatives[0]
@@ -145,7 +145,7 @@ class Potential:
     grids: Grids
     values: list[Array]  # (nx, nv) for each phase; `ceiling` where no cheaper path is known
     predecessors: list[Array]  # (nx, nv, 2) for each phase: where the best step to a node of the next starts, as index
-    seeded: NDArray[np.bool_]  # (nx, nv): nodes of the section whose V is known beforehand
+    seeded: NDArray[np.bool_]  # (nx, nv): nodes of phase 0 whose V is known beforehand
     orbit: Array  # (count, 2): states of the attractor from phase to phase if it is an orbit; else empty
     ceiling: float  # V up to which paths are searched
 
@@ -153,6 +153,20 @@ class Potential:
         """Return V at states (count, ≥ 2); NaN outside the grid."""
         index = np.where(self.grids.inside(phase, states)[:, None], self.grids.index(phase, states), np.nan)
         return interpolate_all(self.values[phase], np.ascontiguousarray(index))
+
+    def on_section(self) -> tuple[Array, Array]:
+        """Return nodes (nx, nv, 2) on the section, and V there: the least in any section interval."""
+        grids = self.grids
+        if len(grids.sections) == 1:
+            return grids.nodes(0), self.values[0]
+        boxes = grids.boxes[list(grids.sections)]
+        whole = dataclasses.replace(
+            grids, boxes=np.stack([boxes[..., 0].min(axis=0), boxes[..., 1].max(axis=0)], -1)[None]
+        )
+        nodes = whole.nodes(0)
+        states = nodes.reshape(-1, 2)
+        values = np.fmin.reduce([self.at(phase, states) for phase in grids.sections])
+        return nodes, np.where(np.isnan(values), self.ceiling, values).reshape(nodes.shape[:2])
 
     def rise(self, phase: int, state: Array) -> float:
         """Return how much V rises within the nodes next to a state, which the grid cannot distinguish from it."""
@@ -187,7 +201,7 @@ class _Iteration:
         ceiling: float,
     ) -> None:
         self.grids, self.ceiling = grids, ceiling
-        self.sweeps = round(model.scene.section_interval / grids.step)
+        self.sweeps = max(grids.phases, grids.steps)  # over all phases, or a section interval
         known = seeds(model, attractor, grids)
         self.orbit = known.orbit
         self.fixed = [np.isfinite(values) for values in known.values]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray
@@ -77,7 +77,7 @@ class GraphSolution:
 
         The variables are those of `vibrokit.results.action_graph.ActionGraphResult`, without ``source``.
         """
-        values, nodes = self.potential.values[0], self.potential.grids.nodes(0)
+        nodes, values = self.potential.on_section()
         known = np.where(values < self.potential.ceiling, values, np.nan)
         paths = [np.column_stack([path.times, path.states]) for path in self.candidates]
         t, x, v = (paths[0] if paths else np.full((1, 3), np.nan)).T
@@ -167,11 +167,14 @@ class GraphSearch:
         *_, best = self.solutions(problem)
         return best
 
-    def solutions(self, problem: ExitProblem) -> Iterator[GraphSolution]:
+    def solutions(
+        self, problem: ExitProblem, settled: Callable[[], Container[int]] = frozenset
+    ) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
-        exit has few nodes for one that costs far less. So those that do are solved again without the others.
+        exit has few nodes for one that costs far less. So those that do are solved again without the others. `settled`
+        is called before each number of nodes, and returns labels whose energies need no more.
         """
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
@@ -188,9 +191,12 @@ class GraphSearch:
         with stage("exit targets", subject=attractor.name):
             search = self._hierarchies(problem, self.nodes)
             targets = exit_targets(problem, search.model)
+        known = _Known()
         for nodes in self._refinements():
+            done = settled()
             try:
-                yield from _solutions(problem, search, targets, nodes)
+                unsettled = [target for target in targets if target.label not in done]
+                yield from _solutions(problem, search, unsettled, nodes, known)
             except StructureError:  # on few nodes, no exit may be reached
                 if nodes == self.nodes:
                     raise
@@ -201,13 +207,13 @@ class GraphSearch:
         """Return candidates that begin otherwise than a known path, on two thirds of the nodes of a solution."""
         nx, nv = solved.potential.grids.shape
         nodes = max(_FEWEST_NODES, 2 * nx // 3), max(_FEWEST_NODES, 2 * nv // 3)
-        return beginnings(problem, self._hierarchies(problem, nodes), energy)
+        return beginnings(problem, self._hierarchies(problem, nodes, unfolding=False), energy)
 
-    def _hierarchies(self, problem: ExitProblem, finest: tuple[int, int]) -> HierarchySearch:
+    def _hierarchies(self, problem: ExitProblem, finest: tuple[int, int], *, unfolding: bool = True) -> HierarchySearch:
         """What solves hierarchies of up to so many nodes."""
         steps = self._affordable_steps(problem.scene)
         model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-        return HierarchySearch(problem, model, steps, finest)
+        return HierarchySearch(problem, model, steps, finest, unfolding)
 
     def _refinements(self) -> Iterator[tuple[int, int]]:
         """Numbers of nodes from few to those that are set, each twice the one before."""
@@ -235,31 +241,53 @@ class GraphSearch:
         return _ALL_GRIDS * self.nodes[0] * self.nodes[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
 
 
+@dataclasses.dataclass(eq=False)
+class _Known:
+    """What was found so far."""
+
+    estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
+    potential: Potential | None = None  # on the finest grid that reaches the costliest target
+
+
 def _solutions(
-    problem: ExitProblem, search: HierarchySearch, targets: Sequence[ExitTarget], nodes: tuple[int, int]
+    problem: ExitProblem,
+    search: HierarchySearch,
+    targets: Sequence[ExitTarget],
+    nodes: tuple[int, int],
+    known: _Known,
 ) -> Iterator[GraphSolution]:
-    """Solve for all targets together, then for those that cost far less without the others."""
-    known, potential = search.estimates(targets, nodes)
+    """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
+    if not targets:
+        return
+    estimates = known.estimates
+    found, potential = search.estimates(targets, nodes)
+    estimates |= found
+    if _highest(targets, estimates) == _highest(estimates, estimates):
+        known.potential = potential
     for _ in range(_CLOSER):
-        highest = max((known[target].value for target in targets if np.isfinite(known[target].value)), default=0.0)
-        targets = [target for target in targets if 0 < known[target].value < _FAR_LESS * highest]
+        highest = _highest(targets, estimates)
+        targets = [target for target in targets if 0 < estimates[target].value < _FAR_LESS * highest]
         if not targets:
             break
-        yield _solution(problem, search, known, potential, nodes, last=False)
+        yield _solution(problem, search, known, nodes, last=False)
         try:
             closer, _ = search.estimates(targets, nodes)
         except StructureError:  # too close to the attractor for any grid
             break
-        targets = [target for target in targets if closer[target].error < known[target].error]
-        known |= {target: closer[target] for target in targets}
-    yield _solution(problem, search, known, potential, nodes, last=True)
+        targets = [target for target in targets if closer[target].error < estimates[target].error]
+        estimates |= {target: closer[target] for target in targets}
+    yield _solution(problem, search, known, nodes, last=True)
+
+
+def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:
+    """The cost of the costliest of those targets that are reached; 0 if none is."""
+    return max((estimates[target].value for target in targets if np.isfinite(estimates[target].value)), default=0.0)
 
 
 def _solution(
     problem: ExitProblem,
     search: HierarchySearch,
-    known: Mapping[ExitTarget, TargetEstimate],
-    potential: Potential,
+    known: _Known,
     nodes: tuple[int, int],
     *,
     last: bool,
@@ -267,11 +295,12 @@ def _solution(
     """What is known of the targets, put together."""
     reached = [
         (target, estimate)
-        for target, estimate in sorted(known.items(), key=lambda entry: entry[1].value)
+        for target, estimate in sorted(known.estimates.items(), key=lambda entry: entry[1].value)
         if np.isfinite(estimate.value)
     ]
-    nx, nv = nodes
-    steps = round(problem.scene.section_interval / potential.grids.step)
+    potential, (nx, nv) = known.potential, nodes
+    assert potential is not None
+    steps = potential.grids.steps
     used = Finding.of(
         Code.GRAPH, problem.source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=repr(search.model.stepper)
     )  # fmt: skip

@@ -68,25 +68,27 @@ class StateTarget(ExitTarget):
         From a set, which is some nodes thick on the grid, the error is how V rises near that state; behind a boundary
         it is how V falls towards the boundary.
         """
-        values = potential.at(0, self.states)
+        values = np.array([potential.at(phase, self.states) for phase in potential.grids.sections])
         if not np.isfinite(values).any():
             return Arrival(np.inf)
-        best = int(np.nanargmin(values))
-        cheapest = self.states[best]
-        error = 0.0 if len(potential.orbit) else potential.rise(0, cheapest)
+        section, best = np.unravel_index(int(np.nanargmin(values)), values.shape)
+        phase, cheapest = potential.grids.sections[section], self.states[best]
+        error = 0.0 if len(potential.orbit) else potential.rise(phase, cheapest)
         if self.depth is not None:
-            error += max(0.0, potential.fall(0, cheapest, self.depth))
-        return Arrival(float(values[best]), error, self._starts(potential, cheapest))
+            error += max(0.0, potential.fall(phase, cheapest, self.depth))
+        if self.direction is not None and np.isfinite(values[:, 0]).any():  # the saddle's point of that direction
+            phase = potential.grids.sections[int(np.nanargmin(values[:, 0]))]
+        return Arrival(float(values[section, best]), error, self._starts(potential, phase, cheapest))
 
-    def _starts(self, potential: Potential, cheapest: Array) -> tuple[TraceStart, ...]:
+    def _starts(self, potential: Potential, phase: int, cheapest: Array) -> tuple[TraceStart, ...]:
         """The cheapest state, or some just beyond a saddle, on the side that a path from the source comes to last."""
         if self.direction is None:
-            return (TraceStart(cheapest),)
-        step = self.direction / np.max(np.abs(self.direction) / potential.grids.spacing(0))
+            return (TraceStart(cheapest, phase),)
+        step = self.direction / np.max(np.abs(self.direction) / potential.grids.spacing(phase))
         sides = np.array([step, -step])
-        values = potential.at(0, self.states[0] + _BEYOND[0] * sides)
+        values = potential.at(phase, self.states[0] + _BEYOND[0] * sides)
         side = sides[int(np.nanargmax(values))] if np.isfinite(values).any() else step
-        return tuple(TraceStart(self.states[0] + beyond * side) for beyond in _BEYOND)
+        return tuple(TraceStart(self.states[0] + beyond * side, phase) for beyond in _BEYOND)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -58,7 +58,12 @@ class SolvedGrid:
     @property
     def steps(self) -> int:
         """Steps in a section interval."""
-        return round(self.problem.scene.section_interval / self.potential.grids.step)
+        return self.potential.grids.steps
+
+    @property
+    def intervals(self) -> int:
+        """Section intervals that have grids of their own."""
+        return len(self.potential.grids.sections)
 
     def arrival(self, target: ExitTarget) -> Arrival:
         """Return what reaching a target costs."""
@@ -145,7 +150,7 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
     """
     grids = potential.grids
     states = [end]
-    per_interval = round(model.scene.section_interval / grids.step)
+    per_interval = grids.steps
     weight, level = _STEP_WEIGHT, np.inf
     for count in range(1, _LONGEST * per_interval):
         before = (phase - count) % grids.phases
