@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.kernels.choice import single_stepper
 from vibrokit.parts.functions import cos, sin, tanh
+from vibrokit.structure.attractors.describe import describe_orbit
+from vibrokit.structure.autonomous import refine_equilibrium
 from vibrokit.structure.scales import frame_of, length_of, search_region
+from vibrokit.symbolic.flow_kind import Flow
 
 
 class Square(vk.Excitation):
@@ -167,3 +171,19 @@ def test_a_region_contains_every_attractor():
     (rest,) = structure.attractors
     assert rest.points[0, 0] == pytest.approx(2.0 / 101.0)
     assert frame_of(osc, structure.attractors).contains(rest.points).all()
+
+
+def frame_of_wells(force, *rests):
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.2, spring=vk.CustomSpring(force))
+    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    points = [refine_equilibrium(osc, np.array([x, 0.0])) for x in rests]
+    return frame_of(osc, [describe_orbit(osc, point, stepper) for point in points])
+
+
+def test_wells_that_are_one_shifted_along_x_are_framed_once():
+    # A pendulum hangs at each 2π; the frame has a quarter of its width on each side of one turn.
+    pendulum = frame_of_wells("sin(x)", -4 * math.pi, 2 * math.pi, 0.0)
+    np.testing.assert_allclose(pendulum.x, [-1.5 * math.pi, 1.5 * math.pi], rtol=1e-9)
+    # Neighbours at 1 and 3 are alike, but the force is not the same around them.
+    low, high = frame_of_wells("(x - 1)*(x - 2)*(x - 3)", 1.0, 3.0).x
+    assert low < 1 < 3 < high

@@ -29,6 +29,8 @@ _LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its perio
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
 _SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
+_PLACES = 64  # in x, at which the force is compared with that of another place
+_SAME_PLACE = 1e-6  # relative: difference of two places, or forces, that are the same
 _DECADES = 12  # of deflections, above and below 1 m, at which a spring's force is compared with its linear part
 
 Array = NDArray[np.float64]
@@ -159,8 +161,10 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     It contains the largest speed of each attractor at any phase, since other motions pass the section there. It is at
     least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
     or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
-    largest speed can reach.
+    largest speed can reach. Where a shift along x leaves the motion unchanged, as of a pendulum that turns over, it
+    contains the copy of each attractor that is nearest to x = 0, and is at least as wide as the shift.
     """
+    attractors, shift = _without_copies(osc, attractors)
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
     points = np.concatenate([points, *cycles])
@@ -170,7 +174,7 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     low, high = min([x.min(), *places]), max([x.max(), *places])
     swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
     widest = max(swings)
-    least = 0.5 * gap or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
+    least = 0.5 * max(gap, shift) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
@@ -178,6 +182,32 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
+
+
+def _without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> tuple[list[Attractor], float]:
+    """Return attractors of which none is another one shifted along x, and the least such shift (m); 0 for none."""
+    kept, least = list[Attractor](), math.inf
+    for one in sorted(attractors, key=lambda each: abs(float(each.points[:, 0].mean()))):
+        shifts = [shift for other in kept if (shift := _shift(osc, other, one))]
+        least = min([least, *shifts])
+        kept += [] if shifts else [one]
+    return kept, least if math.isfinite(least) else 0.0
+
+
+def _shift(osc: Oscillator, one: Attractor, other: Attractor) -> float:
+    """Distance along x from an attractor to another one, if that shift leaves the motion unchanged; else 0."""
+    if osc.barriers or one.points.shape != other.points.shape:
+        return 0.0
+    units, moved = units_of(osc), other.points - one.points
+    shift = float(moved[0, 0])
+    moved[:, 0] -= shift
+    if not np.all(np.abs(moved) < _SAME_PLACE * units):
+        return 0.0
+    x, v = np.meshgrid(np.linspace(-shift, shift, _PLACES), [-units[1], 0.0, units[1]])
+    here = np.stack([x.ravel(), v.ravel()], axis=1)
+    rates = [VectorField(osc).rate(states_at(osc, places))[:, 1] for places in (here, here + np.array([shift, 0.0]))]
+    unchanged = np.abs(rates[1] - rates[0]).max() < _SAME_PLACE * np.abs(rates[0]).max()
+    return abs(shift) if unchanged else 0.0
 
 
 def _without_deep_contact(osc: Oscillator, region: Region, kept: tuple[float, float] = (math.inf, -math.inf)) -> Region:

@@ -198,7 +198,7 @@ class GraphSearch:
                 unsettled = [target for target in targets if target.label not in done]
                 yield from _solutions(problem, search, unsettled, nodes, known)
             except StructureError:  # on few nodes, no exit may be reached
-                if nodes == self.nodes:
+                if nodes == self.nodes and not known.estimates:
                     raise
 
     def beginnings(
