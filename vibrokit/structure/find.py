@@ -80,7 +80,7 @@ def find_structure(
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them,
-        and where a shift along x leaves the motion unchanged, as of a pendulum, one of the steady states that are alike.
+        and where a shift along x leaves the motion unchanged, as of a pendulum, one of those that are alike.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
         are so long that the next finer grid would take more than 5 · 10⁶ sections.
