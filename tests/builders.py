@@ -119,6 +119,7 @@ def full_structure() -> Structure:
         Saddle("flip saddle", 2, 22.0, circle(0.3)[:2], -two, rates, (1, 1), 1e-13, 1e-12),
         Saddle("repeller", 1, 11.0, circle(0.4)[:1], two, rates, (UNSETTLED, ESCAPED), 1e-13, 1e-12),
         Saddle("chaotic", 0, np.nan, circle(0.35), np.empty(0, complex), np.array([0.1 + 0j]), (0, 2), np.nan, np.nan),
+        Saddle("saddle", 1, 11.0, circle(0.35)[:1], two, rates, (0, 2), 1e-13, 1e-12, embedded=True),
     )
     manifolds = (
         Manifold(0, 0, True, 1, circle(0.5, 300), ManifoldEnd.LEAVES_REGION),
@@ -128,7 +129,7 @@ def full_structure() -> Structure:
     labels = np.arange(-3, 6, dtype=np.int16)[np.random.default_rng(1).integers(0, 9, (40, 30))]
     findings = (
         Finding.of(Code.STEADY_STATES, count=6, starts=100),
-        Finding.of(Code.CHAOTIC_EDGE, 0, 2, exponent=0.1 + 0.2, error=float("nan"), count=3),
+        Finding.of(Code.CHAOTIC_EDGE, 0, 2, exponent=0.1 + 0.2, error=float("nan"), count=3, orbits=1),
         Finding.of(Code.STOPPED, 1, 0, stage="manifolds", reason="time limit"),
     )
     return Structure(
@@ -140,6 +141,7 @@ def full_structure() -> Structure:
         settling=1e-3,
         budget=500,
         stepper="rk4:256",
+        shift=2.5,
         findings=findings,
         **PROVENANCE,
     )

@@ -75,7 +75,7 @@ def test_all_work_belongs_to_a_named_stage(structure):
     seconds = dict(vk.LeastAction(source=0, **SMALL).run(OSC, structure).stats.seconds)
     rest = seconds.pop("LeastAction")
     assert set(seconds) - {"compiling"} == {
-        "reversed relaxation", "exit targets", "graph", "starts of exit paths", "action plot", "ends of exit paths",
+        "first candidates", "exit targets", "graph", "starts of exit paths", "action plot", "ends of exit paths",
         "polishing", "certifying",
     }  # fmt: skip
     assert rest < 0.05 * sum(seconds.values())

@@ -153,7 +153,7 @@ LIES = {
     "points of a number": (lambda d, h: d.assign(attractor_points_x=1.0), "'attractor_points_x' has shape"),
     "a saddle to an unknown place": (put("saddle_leads_to", (0, 0), 6), "leads to .6, 1., and there are 6"),
     "a saddle that leads to a half": (put("saddle_leads_to", (0, 0), 0.5), "'saddle_leads_to' holds .* not whole"),
-    "a manifold of no saddle": (put("manifold_saddle", 0, 4), "saddle 4, which is missing"),
+    "a manifold of no saddle": (put("manifold_saddle", 0, 5), "saddle 5, which is missing"),
     "a manifold from no point": (put("manifold_point", 0, 1), "point 1 of saddle 0"),
     "a manifold without a side": (put("manifold_side", 0, 0), "on side 0"),
     "a flag that is 2": (replaced("manifold_stable", [2, 0, 1]), "'manifold_stable' goes from 0 to 2"),

@@ -309,10 +309,17 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
     chaotic = [finding for finding in findings if finding.code is Code.CHAOTIC_EDGE]
     assert [(finding.source, finding.target) for finding in chaotic] == [(0, 1)] * wound
     assert any(saddle.kind == "chaotic" for saddle in found) == wound
-    named = [saddle for saddle in found if saddle.kind != "chaotic"]
+    named = [saddle for saddle in found if saddle.kind != "chaotic" and not saddle.embedded]
     assert all(set(saddle.leads_to) == {0, 1} and saddle.residual <= 1e-10 for saddle in named)
     if wound:
-        set_ = found[-1]
+        (set_,) = (saddle for saddle in found if saddle.kind == "chaotic")
+        inside = [saddle for saddle in found if saddle.embedded]
+        assert len(inside) == chaotic[0].values["orbits"] > 0
+        for orbit in inside:  # hyperbolic, on the boundary, and visited by motions on the set
+            assert np.sum(np.abs(orbit.multipliers) > 1) == 1
+            assert (set(orbit.leads_to), orbit.residual <= 1e-10) == ({0, 1}, True)
+            apart = np.linalg.norm(orbit.points[:, None] - set_.points, axis=2).min(axis=1)
+            assert apart.max() < 0.1 * np.ptp(set_.points)
         assert (set_.period, set_.leads_to) == (0, (0, 1))
         assert len(set_.points) > 50
         assert set_.exponents[0].real == chaotic[0].values["exponent"] > 0.1  # a factor e in less than 1.5 periods

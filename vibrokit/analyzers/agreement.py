@@ -44,7 +44,7 @@ def _of_target(
         code, energy = Code.NO_POLISHED_PATH, graph
     elif graph is None:
         code, energy = Code.NOT_SEARCHED, path
-    elif not attractor.is_fixed:
+    elif not attractor.is_fixed or path.bound is Bound.BRACKET:
         code, energy = Code.BRACKET, _bracket(path, graph)
     else:
         code, energy = _compared(path, graph)
@@ -67,7 +67,7 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
 
 
 def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnergy:
-    """Between the graph and a path from an orbit inside a set: only a few of its orbits were tried.
+    """Between the graph and a path from or to an orbit inside a set: only a few of its orbits were tried.
 
     The value is the smaller one of both, and that of the path where the graph's error is as large.
     """

@@ -15,6 +15,7 @@ from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.ensemble import UNBOUNDED, Stop
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.structure import Structure
 
 _CHECKS_WITHOUT_SECTION = 16  # exit tests per unit of time where no section sets them
@@ -133,8 +134,9 @@ class LeaveBasin(Exit):
         return "commitment" if self.for_good else "basin"
 
     def check(self, osc: Oscillator, structure: Structure) -> None:
-        """Refuse a structure of one attractor."""
-        if len(structure.attractors) < 2:
+        """Refuse a structure of one attractor that no motion escapes from."""
+        escapes = any(ESCAPED in saddle.leads_to for saddle in structure.saddles)
+        if len(structure.attractors) < 2 and not escapes:
             raise StructureError(
                 "the structure has only one attractor, so there is no other basin to leave for; widen the region, "
                 "change the scene, or ask for the first contact with a stop (exit=FirstContact())."
@@ -171,9 +173,9 @@ class LeaveBasin(Exit):
                 dict.fromkeys(one for one in saddle.leads_to if one != source and (self.to is None or one in wanted))
             )
             if source in saddle.leads_to and targets:
-                own.append(AtSaddle(targets, number))
+                own.append(AtSaddle(targets, number, embedded=saddle.embedded))
             elif saddle.on_boundary:
-                others.append(AtSaddle(targets, number, on_own_boundary=False))
+                others.append(AtSaddle(targets, number, on_own_boundary=False, embedded=saddle.embedded))
         reached = {source, *(label for end in own for label in end.targets)}
         basins = [InBasin((label,)) for label in wanted if label not in reached]
         return (*own, *others, *basins)

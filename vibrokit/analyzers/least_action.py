@@ -14,8 +14,10 @@ import xarray
 from vibrokit.analyzers.agreement import combined
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
+from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.reversed_relaxation import FINDER, reversed_relaxations
+from vibrokit.analyzers.paths.closest_approach import closest_approaches
+from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import PIECES
 from vibrokit.analyzers.polishing.polish import METHOD, Polishing
@@ -27,12 +29,14 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.result import Result
-from vibrokit.structure.attractors.orbits_inside import orbits_inside
+from vibrokit.structure.boundaries.edges import meeting_cells
 from vibrokit.structure.orbits import Orbit
+from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.structure.validation import share, whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_ORBITS = 1000
+_LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 _AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)  # more nodes change no other one
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
@@ -64,7 +68,8 @@ class LeastAction(Analyzer):
     graph : GraphSearch, optional
         The other one; None to do without.
     accuracy : float
-        The graph is refined, coarse to fine up to its `nodes`, until its error is at most this part of each energy.
+        The graph is refined, coarse to fine up to its `nodes`, until its error is at most this part of each energy,
+        except of those to attractors that are reached only through other basins.
         The energies themselves are far more accurate; this is how far below them a cheaper path is not excluded.
     orbits : int
         Number of unstable orbits inside a chaotic attractor that paths are polished from.
@@ -105,7 +110,7 @@ class LeastAction(Analyzer):
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
         steps = (
-            (FINDER, work.reverse),
+            ("first candidates", work.begin),
             ("graph", work.search_graph),
             ("action plot", work.shoot),
             ("graph", work.refine_graph),
@@ -135,11 +140,12 @@ class _Work:
     def stopped(self) -> bool:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
 
-    def reverse(self) -> None:
-        """Run the relaxation to an equilibrium backwards, and polish that."""
+    def begin(self) -> None:
+        """Polish the relaxation to an equilibrium, run backwards, or where a chaotic attractor is next to a saddle."""
         stepper = self.problem.single_stepper(Flow.STATE)
-        with stage(FINDER, subject=self.problem.attractor.name):
+        with stage("first candidates", subject=self.problem.attractor.name):
             found = reversed_relaxations(self.problem, SegmentPropagator(self.problem.scene, stepper, max(PIECES)))
+            found += closest_approaches(self.problem)
         if found:
             self._polish(found)
 
@@ -189,8 +195,25 @@ class _Work:
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
                 self._polish(self.analyzer.graph.beginnings(self.problem, branch, self.graph))
 
+    @cached_property
+    def _beyond(self) -> frozenset[int]:
+        """Labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
+
+        Paths to these pass other basins. They are no first exits, and one estimate of them is enough.
+        """
+        unled = {label for end in self.problem.path_ends if isinstance(end, InBasin) for label in end.targets}
+        if not unled:
+            return frozenset()
+        touching = {
+            label
+            for pair in meeting_cells(self.problem.structure.basins)
+            if self.problem.source in pair
+            for label in pair
+        }
+        return frozenset(unled - touching)
+
     def _settled(self) -> set[int]:
-        """Labels of the attractors to which a path and the graph agree within the accuracy."""
+        """Labels of attractors to which a path and the graph agree within the accuracy, or that lie beyond others."""
         branches = self._polished()[0]
         if self.graph is None or not self.problem.attractor.is_fixed:
             return set()
@@ -198,19 +221,22 @@ class _Work:
         _, compared = combined(self.problem.attractor, branches, estimates)
         agreed = {finding.target for finding in compared if finding.code is Code.AGREEMENT}
         accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
-        return accurate & agreed
+        return accurate & agreed | self._beyond
 
     def _graph_error(self, graph: GraphSolution) -> float:
-        """The largest relative error of the graph's estimates; infinite where they disagree with the paths."""
-        estimates = self._estimates(graph, branches := self._polished()[0])
+        """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
+        branches = self._polished()[0]
+        estimates = [each for each in self._estimates(graph, branches) if each.target not in self._beyond]
         _, compared = combined(self.problem.attractor, branches, estimates)
         if any(finding.code not in _AGREED for finding in compared):
             return math.inf
         return max((each.numerical_error / each.value for each in estimates if each.value), default=math.inf)
 
     def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
-        """What the graph estimates; paths from inside a set bound its actions only and do not calibrate them."""
-        return graph.calibrated(branches) if self.problem.attractor.is_fixed else graph.estimates
+        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
+        if not self.problem.attractor.is_fixed:
+            return graph.estimates
+        return graph.calibrated([branch for branch in branches if branch.bound is not Bound.BRACKET])
 
     @cached_property
     def _polishings(self) -> list[Polishing]:
@@ -270,7 +296,7 @@ class _Work:
             return ()
         stepper = problem.single_stepper(Flow.STATE_VARIATIONAL)
         with stage("orbits inside the attractor"):
-            found = orbits_inside(problem.scene, attractor, stepper, self.analyzer.orbits)
+            found = orbits_inside(problem.scene, attractor.points, stepper, self.analyzer.orbits, _LONGEST_ORBIT)
         periods = [orbit.period for orbit in found]
         self.findings.append(
             Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods)

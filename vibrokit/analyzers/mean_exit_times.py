@@ -107,6 +107,7 @@ class MFET(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
+        problem.check_targets("MFET")
         wanted = self._intensities(problem.osc)
         bystanders = problem.has_bystanders
         if self.splitting and bystanders:

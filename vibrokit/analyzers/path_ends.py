@@ -28,6 +28,11 @@ class PathEnd(ABC):
         """Whether paths end there only where no other end can be used."""
         return False
 
+    @property
+    def one_of_many(self) -> bool:
+        """Whether it belongs to a set all of which ends exits: a path to it gives an upper bound of their energy."""
+        return False
+
 
 @dataclasses.dataclass(frozen=True)
 class AtSaddle(PathEnd):
@@ -39,10 +44,13 @@ class AtSaddle(PathEnd):
         Its place among the structure's saddles.
     on_own_boundary : bool
         Whether it lies on the boundary of the basin that is left; a saddle between two other basins is a last resort.
+    embedded : bool
+        Whether it is an orbit inside a chaotic set on the boundary, which is another of the structure's saddles.
     """
 
     number: int
     on_own_boundary: bool = True
+    embedded: bool = False
 
     @property
     def saddle(self) -> int:
@@ -53,6 +61,11 @@ class AtSaddle(PathEnd):
     def last_resort(self) -> bool:
         """A saddle between two other basins is one."""
         return not self.on_own_boundary
+
+    @property
+    def one_of_many(self) -> bool:
+        """An orbit inside a chaotic set is one."""
+        return self.embedded
 
 
 @dataclasses.dataclass(frozen=True)

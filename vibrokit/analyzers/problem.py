@@ -19,6 +19,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.structure import Structure
 from vibrokit.structure.orbits import Orbit, refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -68,6 +69,14 @@ class ExitProblem:
         """Whether there are attractors that are neither left nor may be reached."""
         return len(self.targets) + 1 < len(self.structure.attractors)
 
+    def check_targets(self, method: str) -> None:
+        """Refuse an exit for which a method has no attractor to reach; raises StructureError."""
+        if not self.targets and not self.exit.by_position:
+            raise StructureError(
+                f"{method}: {self.attractor.name} is left by escape from the region only, and {method} needs another "
+                "attractor to reach; use LeastAction, or an exit by position such as FirstContact()."
+            )
+
     @cached_property
     def scene(self) -> Oscillator:
         """The scene that paths move in until they leave."""
@@ -87,6 +96,11 @@ class ExitProblem:
     def path_ends(self) -> tuple[PathEnd, ...]:
         """Where a path of least action may end."""
         return self.exit.path_ends(self.osc, self.structure, self.source)
+
+    @cached_property
+    def ends_by_escape(self) -> bool:
+        """Whether motion that leaves the region for good has made the exit."""
+        return any(ESCAPED in end.targets for end in self.path_ends)
 
     @cached_property
     def checks(self) -> int:

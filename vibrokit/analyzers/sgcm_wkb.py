@@ -100,6 +100,7 @@ class SGCM(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
+        problem.check_targets("SGCM")
         noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))

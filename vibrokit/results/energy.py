@@ -42,7 +42,7 @@ class Bound(StrEnum):
     ESTIMATE = "estimate"
     """Both are error estimates of a grid."""
     BRACKET = "bracket"
-    """Upper: a path that starts inside a set. Lower: an error estimate of a grid."""
+    """Upper: a path that begins or ends inside a set. Lower: an error estimate of a grid."""
     CONFIDENCE = "confidence"
     """A 95 % confidence interval."""
 

@@ -65,6 +65,12 @@ class Code(StrEnum):
 
     # Structure
     STEADY_STATES = "steady-states", INFO, "Steady states: {count}, from {starts} starts."
+    SHIFTED_COPIES = (
+        "shifted-copies", INFO,
+        "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, the "
+        "one nearest to x = 0 is kept; motion that ends at a copy of it has left the region.",
+        "Give a region to keep all of them.",
+    )  # fmt: skip
     STARTS_DIVERGED = (
         "starts-diverged", WARNING, "{count} of {starts} starts diverged.",
         "Narrow the region, or check the signs of the forces.",
@@ -116,8 +122,8 @@ class Code(StrEnum):
     CHAOTIC_EDGE = (
         "chaotic-edge", INFO,
         "The edge state between {state} and {goal} is chaotic: largest Lyapunov exponent {exponent:.3g} ± {error:.1g} "
-        "s⁻¹, from {count} motions.",
-        "Exit paths are not polished to a chaotic edge state; the graph gives an estimate.",
+        "s⁻¹, from {count} motions. Unstable orbits found inside it: {orbits}.",
+        "Exit paths are polished to these orbits; without one the graph gives an estimate.",
     )  # fmt: skip
     EDGE_NOT_CONVERGED = (
         "edge-not-converged", WARNING, "Edge tracking between {state} and {goal} did not converge within the budget.",
@@ -282,6 +288,11 @@ class Code(StrEnum):
         "Saddle {saddle} on the basin boundary of {state} is {kind}; no path is polished to it.",
         "Use the graph's estimate for this exit.",
     )  # fmt: skip
+    CHAOTIC_BOUNDARY = (
+        "chaotic-boundary", INFO,
+        "The basin boundary of {state} contains a chaotic set. Paths were polished to unstable orbits inside it, which "
+        "are saddles {saddles}; their actions are upper bounds.",
+    )  # fmt: skip
     SADDLES_OF_OTHERS = (
         "saddles-of-others", WARNING,
         "No usable orbit on the basin boundary of {state} is known; paths were polished to saddles between other "
@@ -351,7 +362,7 @@ class Code(StrEnum):
     )  # fmt: skip
     BRACKET = (
         "bracket", INFO,
-        "From {state} to {goal}: at most {path:.6g}, by a path from an orbit inside the set; the graph estimates "
+        "From {state} to {goal}: at most {path:.6g}, by a path that begins or ends inside a set; the graph estimates "
         "{graph:.4g} ± {error:.1g}.",
     )  # fmt: skip
 

@@ -7,11 +7,17 @@ from numbers import Integral
 from typing import Any
 
 from vibrokit.errors import StructureError, nearest, shown
+from vibrokit.results.basins import ESCAPED
 
 
 def exit_between(names: Sequence[str], source: int, target: int) -> str:
-    """Return the names of the attractors between which an exit leads, such as ``"hammering → clear"``."""
-    return f"{names[source]} → {names[target] if target >= 0 else 'exit'}"
+    """Return the names of the attractors between which an exit leads, such as ``"hammering → clear"``.
+
+    The goal is ``"escape"`` for motion that leaves the region for good, and ``"exit"`` for another end that is no
+    attractor.
+    """
+    goal = names[target] if target >= 0 else "escape" if target == ESCAPED else "exit"
+    return f"{names[source]} → {goal}"
 
 
 def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:

@@ -37,6 +37,8 @@ class Saddle:
         length and ω_n times it); NaN for a chaotic set.
     error : float
         How far the first point moves when the integration is tightened; NaN for a chaotic set.
+    embedded : bool
+        Whether it is one of the orbits inside a chaotic set, which is a saddle of its own.
     """
 
     kind: str
@@ -48,6 +50,7 @@ class Saddle:
     leads_to: tuple[int, ...]
     residual: float
     error: float
+    embedded: bool = False
 
     @property
     def on_boundary(self) -> bool:

@@ -38,6 +38,7 @@ _SADDLES = Table(
             whole=True, low=NOT_FOLLOWED,
         ),
         **{name: ATTRACTOR_FIELDS[name] for name in ("residual", "error")},
+        "embedded": Flag("whether the orbit lies inside a chaotic set on the boundary"),
     },
 )  # fmt: skip
 _MANIFOLDS = Table(
@@ -73,6 +74,8 @@ class Structure(Record):
         Largest number of periods for which a trajectory was followed.
     stepper : str
         Stepper of the basin grid, as `vibrokit run --stepper` reads it: ``"rk4:256"``.
+    shift : float
+        Distance along x (m) by which a state may be moved without a change of its motion; 0 for none.
     """
 
     kind: ClassVar[str] = "structure"
@@ -85,6 +88,7 @@ class Structure(Record):
     settling: float
     budget: int
     stepper: str
+    shift: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -154,6 +158,11 @@ class Structure(Record):
                 "settling": ((), self.settling, about),
                 "budget": ((), self.budget, longest),
                 "stepper": ((), self.stepper, {"long_name": "stepper of the basin grid"}),
+                "shift": (
+                    (),
+                    self.shift,
+                    {"long_name": "shift along x that changes no motion; 0 for none", "units": "m"},
+                ),
             }
         ).set_coords("attractor_name")
 
@@ -175,6 +184,7 @@ class Structure(Record):
             settling=float(arrays.numbers("settling", (), 0.0, 1e300)),
             budget=int(arrays.wholes("budget", ())),
             stepper=arrays.words("stepper", ())[0],
+            shift=float(arrays.numbers("shift", (), 0.0, 1e300)),
             **provenance,
         )
 

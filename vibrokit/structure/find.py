@@ -29,7 +29,14 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
-from vibrokit.structure.scales import frame_of, lies_in, search_region, states_at
+from vibrokit.structure.scales import (
+    frame_of,
+    lies_in,
+    search_region,
+    states_at,
+    with_barrier_tops,
+    without_copies,
+)
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -80,7 +87,8 @@ def find_structure(
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them,
-        and where a shift along x leaves the motion unchanged, as of a pendulum, one of those that are alike.
+        and where a shift along x leaves the motion unchanged, as of a pendulum, one of those that are alike. Motion
+        that ends at a copy of an attractor elsewhere has then left the region.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
         are so long that the next finer grid would take more than 5 · 10⁶ sections.
@@ -147,6 +155,7 @@ class _Finder:
             osc, _SEARCH_SETTLING * self.searched.widths, self._search_stepper(), self.orbit_stepper, executor
         )
         self.attractors: tuple[Attractor, ...] = ()
+        self.shift = 0.0  # along x, between copies of the attractors (m); 0 for none
         self.grid: BasinGrid | None = None
         self.saddle_search: SaddleSearch | None = None
         self.manifolds: tuple[Manifold, ...] = ()
@@ -177,7 +186,9 @@ class _Finder:
 
     def _find_attractors(self) -> None:
         """Search from a grid of starts, and choose a stepper with which every attractor persists."""
-        starts = _starts(self.osc, self.searched, self.request.starts, self.rng)
+        starts = np.concatenate(
+            [_starts(self.osc, each, self.request.starts, self.rng) for each in self._start_regions()]
+        )
         self.search.run(starts, self.budget, self.budget >= self.wait)
         if not self.search.attractors:
             raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
@@ -192,24 +203,37 @@ class _Finder:
         if self.request.budget is None and lifetimes:
             self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
 
+    def _start_regions(self) -> list[Region]:
+        """Regions of starts: that of the expected motion, and one that contains the tops of barriers around it."""
+        narrow = self.searched
+        if self.region is not None or self.osc.barriers:
+            return [narrow]
+        wide = with_barrier_tops(self.osc, *narrow.x)
+        reach = self.osc.natural_frequency * max(-wide[0], wide[1])
+        return [narrow] if wide == narrow.x else [narrow, Region(wide, (-reach, reach))]
+
     def _order(self) -> None:
         """Sort the attractors and name them, unless that was done."""
         if self.attractors:
             return
-        found = sorted(self.search.attractors, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
+        kept, self.shift = (
+            (self.search.attractors, 0.0) if self.region else without_copies(self.osc, self.search.attractors)
+        )
+        found = sorted(kept, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
         self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
 
     @property
     def frame(self) -> Region:
         """Region of the basin grid."""
-        return self.region or frame_of(self.osc, self.attractors)
+        return self.region or frame_of(self.osc, self.search.attractors)
 
     @property
     def classifier(self) -> BasinClassifier:
         """Finds the attractor that a state leads to."""
         return BasinClassifier(
-            self.osc, self.attractors, self.frame, self.request.settling, self.budget, self.stepper, self.executor
-        )
+            self.osc, self.attractors, self.frame, self.request.settling, self.budget, self.stepper, self.executor,
+            shift=self.shift,
+        )  # fmt: skip
 
     def _find_basins(self) -> None:
         """Classify every cell of the grid, and set the basin fraction of each attractor."""
@@ -232,7 +256,11 @@ class _Finder:
     def _grow_manifolds(self) -> None:
         """Grow the manifolds of each saddle that is an orbit."""
         assert self.saddle_search is not None
-        saddles = {n: s for n, s in enumerate(self.saddle_search.saddles) if s.kind in ("saddle", "flip saddle")}
+        saddles = {
+            n: s
+            for n, s in enumerate(self.saddle_search.saddles)
+            if s.kind in ("saddle", "flip saddle") and not s.embedded
+        }
         count = sum(map(branch_count, saddles.values()))
         length = default_arc_length(self.frame, max(count, 1))
         with stage("manifolds", unit=BRANCHES, total=count):
@@ -262,6 +290,7 @@ class _Finder:
             settling=self.request.settling,
             budget=self.budget,
             stepper=name_of(self.stepper),
+            shift=self.shift,
             complete=self.stopped is None,
             scene=scene_data(self.osc),
             settings=self.request.settings,
@@ -274,6 +303,8 @@ class _Finder:
     def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
         search, saddles = self.search, self.saddle_search
         found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
+        if self.shift:
+            found.append(Finding.of(Code.SHIFTED_COPIES, shift=self.shift))
         if search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
         found += search.findings

@@ -31,6 +31,7 @@ _RESTING = 1e-3
 _SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
 _PLACES = 64  # in x, at which the force is compared with that of another place
 _SAME_PLACE = 1e-6  # relative: difference of two places, or forces, that are the same
+_FARTHEST, _TRIED = 30.0, 600  # sizes of a motion within which tops of barriers are searched for, and places tried
 _DECADES = 12  # of deflections, above and below 1 m, at which a spring's force is compared with its linear part
 
 Array = NDArray[np.float64]
@@ -162,9 +163,10 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
     or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
     largest speed can reach. Where a shift along x leaves the motion unchanged, as of a pendulum that turns over, it
-    contains the copy of each attractor that is nearest to x = 0, and is at least as wide as the shift.
+    contains the copy of each attractor that is nearest to x = 0, and is at least as wide as the shift. Without stops it
+    contains the tops of the potential barriers around the attractors.
     """
-    attractors, shift = _without_copies(osc, attractors)
+    attractors, shift = without_copies(osc, attractors)
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
     points = np.concatenate([points, *cycles])
@@ -172,6 +174,8 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     gap = float(np.ptp(places)) if len(places) == 2 else 0.0
     x, v = points.T
     low, high = min([x.min(), *places]), max([x.max(), *places])
+    if not osc.barriers:
+        low, high = with_barrier_tops(osc, low, high)
     swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
     widest = max(swings)
     least = 0.5 * max(gap, shift) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
@@ -184,7 +188,32 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
 
 
-def _without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> tuple[list[Attractor], float]:
+def with_barrier_tops(osc: Oscillator, low: float, high: float) -> tuple[float, float]:
+    """Return a range of x (m) extended to the next tops of potential barriers on both sides, if these are near.
+
+    There a steady force that has pushed the mass back begins to push it away. Periodic forces are left out.
+    """
+    field, length = VectorField(osc), max(length_of(osc), 0.5 * (high - low))
+    periodic = sum(field.excitation(i, 0.0) for i, part in enumerate(osc.excitations) if part.period is not None)
+    away = length * np.geomspace(1.0 / _TRIED, _FARTHEST, _TRIED)
+
+    def extended(end: float, sign: float) -> float:
+        def push(distances: Array) -> Array:
+            places = np.stack([end + sign * distances, np.zeros_like(distances)], axis=1)
+            outward: Array = sign * (field.rate(states_at(osc, places))[:, 1] - periodic)
+            return outward
+
+        outward = push(away) > 0
+        tops = np.flatnonzero(outward[1:] & ~outward[:-1])
+        if not tops.size:
+            return end
+        near, far = away[tops[0] : tops[0] + 2]
+        return end + sign * float(brentq(lambda distance: push(np.array([distance]))[0], near, far))
+
+    return extended(low, -1.0), extended(high, 1.0)
+
+
+def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> tuple[list[Attractor], float]:
     """Return attractors of which none is another one shifted along x, and the least such shift (m); 0 for none."""
     kept, least = list[Attractor](), math.inf
     for one in sorted(attractors, key=lambda each: abs(float(each.points[:, 0].mean()))):

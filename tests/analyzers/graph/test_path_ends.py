@@ -14,6 +14,7 @@ from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.rk4 import RK4
+from vibrokit.results.basins import ESCAPED
 
 
 @functools.cache
@@ -57,10 +58,16 @@ def test_a_saddle_between_other_basins_is_ignored():
     assert targets_at(AtSaddle((1,), 0, on_own_boundary=False), *setup()) == []
 
 
-def test_a_saddle_that_leads_to_several_targets_counts_for_the_first_that_is_an_attractor():
+def test_a_saddle_that_leads_to_several_targets_counts_for_the_first_that_is_an_attractor_or_escape():
     (target,) = targets_at(AtSaddle((-1, 1, 5), 0), *setup())
     assert target.label == 1
-    assert targets_at(AtSaddle((-1, -2), 0), *setup()) == []
+    (escape,) = targets_at(AtSaddle((-1, ESCAPED), 0), *setup())
+    assert escape.label == ESCAPED
+    assert targets_at(AtSaddle((-1,), 0), *setup()) == []
+
+
+def test_orbits_inside_a_chaotic_set_are_left_to_that_set():
+    assert targets_at(AtSaddle((1,), 0, embedded=True), *setup()) == []
 
 
 def test_a_basin_is_the_cells_that_surely_belong_to_it_and_the_attractor():

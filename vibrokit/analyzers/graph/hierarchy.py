@@ -208,7 +208,13 @@ class HierarchySearch:
         for _ in range(_RAISES):
             potential = quasi_potential(self.model, self.problem.attractor, grids, ceiling)
             solved = SolvedGrid(self.problem, self.model, potential)
-            if solved.highest(targets) < _NEAR_CEILING * ceiling:
+            highest = solved.highest(targets)
+            if not highest:
+                raise StructureError(
+                    f"the exits of {self.problem.attractor.name} are within a node of it, so the graph cannot tell "
+                    "what they cost; raise the number of nodes."
+                )
+            if highest < _NEAR_CEILING * ceiling:
                 return solved
             ceiling *= _RAISE
         raise StructureError(

@@ -12,6 +12,7 @@ from vibrokit.analyzers.graph.targets import ExitTarget, FaceTarget, StateTarget
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.basins.stop_cells import agreeing
 from vibrokit.structure.linear_map import linear_map
@@ -43,8 +44,8 @@ def targets_at(end: PathEnd, problem: ExitProblem, model: StepModel) -> list[Exi
 
 @targets_at.register
 def _(end: AtSaddle, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
-    labels = [label for label in end.targets if label >= 0]
-    if not (end.on_own_boundary and labels):
+    labels = [label for label in end.targets if label >= 0 or label == ESCAPED]
+    if end.embedded or not (end.on_own_boundary and labels):
         return []
     saddle = problem.structure.saddles[end.number]
     states = saddle.points[:, :2]

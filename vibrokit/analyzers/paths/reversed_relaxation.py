@@ -18,12 +18,14 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.single import record
 from vibrokit.kernels.vector_field import VectorField
+from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.symbolic.flow_kind import Flow
 
 FINDER = "reversed relaxation"
 _NEAR = 1e-4  # of the distance between both ends: so far from them it begins and ends
 _BENT = 1e-3  # of the linearized rates: so little others are where the path begins
+_AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
 _CHUNK, _LASTING, _MOST_SAMPLES = 256, 64, 2**20  # samples: recorded at a time, to be linear for, in all
 
 Array = NDArray[np.float64]
@@ -67,6 +69,7 @@ def _starts(end: PathEnd, problem: ExitProblem) -> Iterator[Array]:
 
 def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, goal: Array) -> Array | None:
     """The motion from a start to where it is linear about the equilibrium; None if it does not come there."""
+    around = Region.around(problem.structure.basins.region.bounds.T, _AROUND)
     osc, units, field = problem.scene, _units(problem), VectorField(problem.scene)
     wanted, jacobian = _NEAR * np.linalg.norm((start - goal) / units), field.jacobian(goal)
     states: Array = start[None]
@@ -81,6 +84,8 @@ def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, 
             states = np.vstack([states, more[:enough]])
             return None if problem.is_out(states[1:]).any() else states
         states = np.vstack([states, more])
+        if not around.contains(more[-1:]).all():  # where the motion may never come to rest
+            break
         at_rest = np.linalg.norm(np.ptp(more, axis=0) / units) <= wanted  # in another well
         if len(more) < _CHUNK or (at_rest and distances[-1] > wanted):
             break

@@ -31,6 +31,7 @@ PIECES = (8, 16)
 _NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
 _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
+_INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
 _SAMPLES = 128  # in a section interval: enough for pictures, and for quadrature to about 1e-6
@@ -87,7 +88,10 @@ class CandidatePolisher:
         failures, solved = [], False
         try:
             ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
-            for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
+            near = self._near(candidate)
+            ends = [end for end in near if self._is_wanted(end, candidate)]
+            solved = bool(near) and not ends
+            for end, way in itertools.product(ends, (*ways, PathSolver.solve)):
                 try:
                     self._add(self._solve(end, candidate, way))
                     solved = True
@@ -105,7 +109,7 @@ class CandidatePolisher:
 
     def reach(self, end: PathEnd, ranked: Sequence[Candidate]) -> None:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
-        if any(one.end is end for one in self.solved):
+        if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
         near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
         for candidate in itertools.chain(near, ranked[:1]):
@@ -127,6 +131,11 @@ class CandidatePolisher:
         to_target = self._least(end for end in self.ends if candidate.target in end.targets)
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
 
+    def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
+        """Whether a path to an end is wanted; inside a set it only bounds the energy, so that others must cost more."""
+        others = (other for other in self.ends if set(other.targets) & set(end.targets))
+        return not end.one_of_many or candidate.action < self._least(others)
+
     def _least(self, ends: Iterable[PathEnd]) -> float:
         """The least action of the known paths to some ends; infinite if there is none."""
         among = tuple(ends)
@@ -137,7 +146,9 @@ class CandidatePolisher:
         nodes: ResampledCandidate = self._resampled(candidate, PIECES[0])
         distances = [self._ending(end, PIECES[0]).distance(nodes) for end in self.ends]
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
-        return [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
+        near = [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
+        inside = [end for end in near if end.one_of_many]
+        return [end for end in near if end not in inside[_INSIDE:]]
 
     def _comes_near(self, end: PathEnd, candidate: Candidate) -> bool:
         try:

@@ -22,6 +22,7 @@ _ROUNDING = 1e-9  # of a path's extent: samples this far beyond the face still c
 _SHORT = 1e-4  # of a piece: time over which ∂H/∂t is taken
 _SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
 _MOST_ADDED = 40  # section intervals
+_CHAOTIC = "chaotic"
 _NEUTRAL = 1e-6  # distance of a multiplier from 1: that of a shift along a limit cycle is 1
 
 Array = NDArray[np.float64]
@@ -224,12 +225,15 @@ class SaddleEnding(Ending):
 def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
     """Return the ends that paths are polished to: those that are not a last resort, if any of them can be used."""
     own = [end for end in problem.path_ends if not end.last_resort]
-    findings = [
-        Finding.of(Code.SADDLE_NOT_USABLE, problem.source, saddle=end.saddle, kind=obstacle(end, problem))
-        for end in own
-        if end.saddle >= 0 and obstacle(end, problem)
-    ]
     usable = [end for end in own if not obstacle(end, problem)]
+    inside = [end.saddle for end in usable if end.one_of_many]
+    findings = [
+        Finding.of(Code.SADDLE_NOT_USABLE, problem.source, saddle=end.saddle, kind=kind)
+        for end in own
+        if end.saddle >= 0 and (kind := obstacle(end, problem)) and not (kind == _CHAOTIC and inside)
+    ]
+    if inside:
+        findings.append(Finding.of(Code.CHAOTIC_BOUNDARY, problem.source, saddles=inside))
     if not usable:
         usable = [end for end in problem.path_ends if end.last_resort and not obstacle(end, problem)]
         findings += [Finding.of(Code.SADDLES_OF_OTHERS, problem.source)] if usable else []
@@ -243,8 +247,8 @@ def obstacle(end: PathEnd, problem: ExitProblem) -> str:
     if not isinstance(end, AtSaddle):
         return "of a kind without conditions"
     saddle = problem.structure.saddles[end.number]
-    if saddle.kind == "chaotic":
-        return "chaotic"
+    if saddle.kind == _CHAOTIC:
+        return _CHAOTIC
     neutral = bool(np.any(np.abs(np.abs(saddle.multipliers) - 1) < _NEUTRAL))
     return "a limit cycle" if saddle.period == 1 and saddle.duration > 0 and neutral else ""
 

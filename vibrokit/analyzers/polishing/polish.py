@@ -156,7 +156,7 @@ def _energies(
             lower=0.0,
             upper=found.action + error,
             method=METHOD,
-            bound=Bound.UPPER,
+            bound=Bound.BRACKET if solved.end.one_of_many else Bound.UPPER,
             numerical_error=error,
             path=solved.path,
             saddle=solved.end.saddle,

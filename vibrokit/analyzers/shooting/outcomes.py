@@ -37,7 +37,7 @@ class Outcomes:
     states: Array  # (count, 2n + 1): last (q, p, S)
     status: Whole  # (count,): constants of `vibrokit.kernels.stopping`
     checks: Whole  # (count,): exit tests from the first section to the end
-    targets: Whole  # (count,): attractor of the exit's cell, or once confirmed the one reached; −1 if unknown
+    targets: Whole  # (count,): label of the exit's cell, or once confirmed what is reached; −1 if unknown
     confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
 
     @property
@@ -46,8 +46,11 @@ class Outcomes:
         return self.states[:, -1]
 
     def least(self, targets: int) -> Array:
-        """Return the least confirmed action of each of some targets, the unknown one (−1) last; infinite if none."""
-        least = np.full(targets + 1, np.inf)
+        """Return the least confirmed action of each of some targets, escape and the unknown one last; infinite if none.
+
+        So the labels of these two, −2 and −1, are indices too.
+        """
+        least = np.full(targets + 2, np.inf)
         np.minimum.at(least, self.targets[self.confirmed], self.actions[self.confirmed])
         return least
 
@@ -94,12 +97,12 @@ class Shooter:
         states = outcomes.states[which]
         reached = self._classifier.labels(states[:, : (states.shape[1] - 1) // 2])
         returned = reached == self.problem.source
-        exits = ~returned & (reached >= 0)
+        exits = ~returned & ((reached >= 0) | ((reached == ESCAPED) & self.problem.ends_by_escape))
         outcomes.targets[which[exits]] = reached[exits]
         outcomes.confirmed[which[exits]] = True
         outcomes.status[which[exits]] = LEFT_BASIN
         outcomes.status[which[reached == UNSETTLED]] = COMPLETED
-        outcomes.status[which[reached == ESCAPED]] = DIVERGED
+        outcomes.status[which[~exits & (reached == ESCAPED)]] = DIVERGED
         again = which[returned]
         left = self.budget * self.problem.checks - outcomes.checks[again]
         more = self._integrated(states[returned], np.maximum(left, 0))
@@ -110,8 +113,9 @@ class Shooter:
     def _classifier(self) -> BasinClassifier:
         known = self.problem.structure
         return BasinClassifier(
-            self.problem.osc, known.attractors, known.basins.region, known.settling, known.budget, self.stepper
-        )
+            self.problem.osc, known.attractors, known.basins.region, known.settling, known.budget, self.stepper,
+            shift=known.shift,
+        )  # fmt: skip
 
     def _integrated(self, states: Array, budget: int | Whole) -> Ensemble:
         problem = self.problem

@@ -142,12 +142,12 @@ class Shots:
         problem, states = self.shooter.problem, self.outcomes.states[:, :2]
         low, high = problem.stop.region.T
         beyond = np.concatenate([states < low, states > high], axis=1)
-        return self.outcomes.targets + len(problem.structure.attractors) * 2 * (beyond @ 2 ** np.arange(4))
+        return self.outcomes.targets + (len(problem.structure.attractors) + 2) * (beyond @ 2 ** np.arange(4))
 
     def _split(self, which: NDArray[np.int64]) -> Shots:
         boxes = self.boxes.split(which)
         new = self.shooter.shoot(*self.starts.states(boxes.centres[len(self.boxes.centres) :]))
         outcomes = self.outcomes.joined(new)
         self.shooter.confirm(outcomes, _CERTAIN)
-        least = outcomes.least(len(self.history[0]) - 1)
+        least = outcomes.least(len(self.shooter.problem.structure.attractors))
         return dataclasses.replace(self, boxes=boxes, outcomes=outcomes, history=(*self.history, least))

@@ -29,6 +29,7 @@ CELLS = "cells"
 _FIRST_STRETCH = 8  # sections after which the trajectories still under way are packed together again
 _LONGEST_STRETCH = 64  # with an extended attractor: the sections of a stretch are kept in memory
 _CONFIRMED = 64  # sections that a trajectory must stay near an extended attractor
+_FAR = 32  # shifts away from the region after which motion counts as escaped: it passes from copy to copy
 _MISSES = 6  # of these sections that may fall into gaps of the attractor's sample
 
 Array = NDArray[np.float64]
@@ -58,6 +59,9 @@ class BasinClassifier:
     executor : concurrent.futures.Executor, optional
     core : Basins, optional
         Cells that classify trajectories which are in them at a section; negative labels for cells that do not.
+    shift : float
+        Distance along x (m) by which a state may be moved without a change of its motion; 0 for none. A state that
+        leads to a copy of an attractor elsewhere has escaped.
     """
 
     osc: Oscillator
@@ -68,12 +72,13 @@ class BasinClassifier:
     stepper: Stepper
     executor: concurrent.futures.Executor | None = None
     core: Basins | None = None
+    shift: float = 0.0
 
     def labels(self, states: Array, start_time: float = 0.0) -> Whole:
         """Return the label of the attractor that each state (count, n), at a start time (s), leads to.
 
-        It is UNSETTLED where the budget was spent inside the region, ESCAPED where it was spent outside or the motion
-        diverged.
+        It is UNSETTLED where the budget was spent inside the region, ESCAPED where it was spent outside, where the
+        motion diverged, or where it came to a copy of an attractor.
         """
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.label(found, states, start_time)
@@ -86,7 +91,7 @@ class BasinClassifier:
         """
         trajectories = _Trajectories(self, states, found)
         trajectories.to_section(start_time)
-        longest = self.budget if self.mask is None else _LONGEST_STRETCH
+        longest = self.budget if self.mask is None and not self.shift else _LONGEST_STRETCH
         stretch, known = _FIRST_STRETCH, 0
         while (active := trajectories.active()).size:
             trajectories.follow(active, stretch)
@@ -130,6 +135,7 @@ class _Trajectories:
         self.found = found
         # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
         self.stayed, self.missed = np.zeros((2, len(states), extended), dtype=np.int64)
+        self.shifts = np.zeros(len(states), dtype=np.int64)  # by which the states were moved back into the region
         self.sections = 0  # of all together
 
     def active(self) -> Whole:
@@ -165,6 +171,17 @@ class _Trajectories:
         self.found[which[reached]] = ended.label[reached]
         if mask is not None:
             self._stay(which, ended, mask)
+        self.found[which[(self.shifts[which] != 0) & (self.found[which] >= 0)]] = ESCAPED
+        if classifier.shift:
+            self._move_back(which)
+
+    def _move_back(self, which: Whole) -> None:
+        """Move states along x into the middle of the region, where copies of attractors are recognised."""
+        shift, middle = self.classifier.shift, float(np.mean(self.classifier.region.x))
+        away = np.rint(np.nan_to_num((self.states[which, 0] - middle) / shift))
+        self.states[which, 0] -= shift * away
+        self.shifts[which] += away.astype(np.int64)
+        self.found[which[(np.abs(self.shifts[which]) > _FAR) & (self.found[which] == NOT_FOLLOWED)]] = ESCAPED
 
     def _stay(self, which: Whole, ended: Ensemble, mask: AttractorMask) -> None:
         """Note which trajectories have stayed near an extended attractor, by the sections that they passed."""
@@ -180,4 +197,5 @@ class _Trajectories:
     def close(self) -> None:
         """Label the trajectories whose budget is spent."""
         over = np.flatnonzero((self.found == NOT_FOLLOWED) & (self.remaining <= 0))
-        self.found[over] = np.where(self.classifier.region.contains(self.states[over]), UNSETTLED, ESCAPED)
+        inside = self.classifier.region.contains(self.states[over]) & (self.shifts[over] == 0)
+        self.found[over] = np.where(inside, UNSETTLED, ESCAPED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections import defaultdict
 
@@ -29,6 +30,7 @@ from vibrokit.structure.boundaries.edges import (
 )
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
 from vibrokit.structure.orbits import EQUAL
+from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
 
 _LONGEST_PERIOD = 16
@@ -47,6 +49,7 @@ _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer
 _QUICK = 2000
 _LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
+_ORBITS_INSIDE, _LONGEST_INSIDE = 8, 16  # unstable orbits inside a chaotic set, and their longest period
 _RESIDUAL = 1e-10
 
 Array = NDArray[np.float64]
@@ -81,14 +84,14 @@ class SaddleSearch:
 
     @property
     def saddles(self) -> tuple[Saddle, ...]:
-        """The saddles, by period; chaotic sets last."""
-        return tuple(sorted(self._found, key=lambda s: (s.kind == "chaotic", s.period, tuple(s.points[0]))))
+        """The saddles, by period; then chaotic sets, and last the orbits inside these."""
+        return tuple(sorted(self._found, key=lambda s: (s.embedded, s.kind == "chaotic", s.period, tuple(s.points[0]))))
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Findings about the saddles, and about boundaries without one."""
         orbits = [saddle for saddle in self._found if saddle.kind != "chaotic"]
-        found = [Finding.of(Code.SADDLES, count=len(orbits)), *self._findings]
+        found = [Finding.of(Code.SADDLES, count=sum(not saddle.embedded for saddle in orbits)), *self._findings]
         found += [_on_boundary(Code.BOUNDARY_LOST, pair) for pair in self._lost]
         largest = max([saddle.residual for saddle in orbits], default=0.0)
         if largest > _RESIDUAL:
@@ -217,12 +220,33 @@ class SaddleSearch:
                 self._findings.append(_on_boundary(Code.MOTIONS_NOT_CONVERGED, pair, count=count))
             if wandering and not self.osc.autonomous:
                 exponent, error = _growth(wandering, straddles.interval)
-                self._found.append(_chaotic(wandering, exponent))
+                chaotic = _chaotic(wandering, exponent)
+                self._found.append(chaotic)
+                inside = self._add_orbits_inside(chaotic)
                 self._findings.append(
-                    _on_boundary(Code.CHAOTIC_EDGE, pair, exponent=exponent, error=error, count=len(wandering))
-                )
+                    _on_boundary(
+                        Code.CHAOTIC_EDGE, pair, exponent=exponent, error=error, count=len(wandering), orbits=inside
+                    )
+                )  # fmt: skip
             elif wandering:
                 self._findings.append(_on_boundary(Code.EDGE_NOT_CONVERGED, pair))
+
+    def _add_orbits_inside(self, chaotic: Saddle) -> int:
+        """Add unstable orbits inside a chaotic set on a boundary, and return their number.
+
+        Those next to which all states lead to one attractor are left out: they do not lie on the boundary. So are
+        those that are so unstable that rounding errors do not let them close.
+        """
+        before = len(self._found)
+        for orbit in orbits_inside(self.osc, chaotic.points, self.orbit_stepper, _ORBITS_INSIDE, _LONGEST_INSIDE):
+            limits = branch_limits(self.classifier, orbit)
+            place = self.region.scaled(orbit.point[None])
+            if len(set(limits)) > 1 and not any(same_place(place, places, EQUAL) for places in self._places):
+                with contextlib.suppress(StructureError):  # Newton's method may lose it at its other points
+                    described = describe_unstable(self.osc, orbit, self.orbit_stepper, limits)
+                    if described.residual <= _RESIDUAL:
+                        self._add(dataclasses.replace(described, embedded=True))
+        return len(self._found) - before
 
     def _repeats(self, points: Array) -> bool:
         return almost_repeats(self.region.scaled(points), _FEW_POINTS, _LONGEST_PERIOD, _NEAR)

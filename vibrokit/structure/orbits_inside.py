@@ -1,4 +1,4 @@
-"""Unstable orbits inside a chaotic attractor, from its close returns."""
+"""Unstable orbits inside a chaotic set, from its close returns."""
 
 from __future__ import annotations
 
@@ -9,28 +9,25 @@ from scipy.spatial import cKDTree
 from vibrokit.errors import StructureError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import EQUAL, Orbit, least_period, refine_orbit, same_point, visited
 
-_LONGEST = 64  # largest number of periods between a point and its return
 _TRIES = 4  # closest returns of each period that are refined
 _NEAR = 4.0  # times the spacing of the sample: largest distance of a return
 
 Array = NDArray[np.float64]
 
 
-def orbits_inside(osc: Oscillator, attractor: Attractor, stepper: Stepper, most: int) -> tuple[Orbit, ...]:
-    """Find unstable periodic orbits inside a chaotic attractor, the shortest periods first, `most` at most.
+def orbits_inside(osc: Oscillator, points: Array, stepper: Stepper, most: int, longest: int) -> tuple[Orbit, ...]:
+    """Find unstable periodic orbits inside a chaotic set, the shortest periods first, `most` at most.
 
     A chaotic motion passes near each of them: where it nearly returns after some periods, Newton's method finds the
-    orbit (Lathrop & Kostelich, Phys. Rev. A 40, 4028, 1989). The attractor's points are a long sample of one motion in
-    the order of time.
+    orbit (Lathrop & Kostelich, Phys. Rev. A 40, 4028, 1989). The points (count, n) sample the set on the section: one
+    motion, or several one after the other, in the order of time. Periods are at most `longest`.
     """
-    points = attractor.points
     spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
     found: list[Orbit] = []
     known = np.empty((0, points.shape[1]))
-    for period in range(1, min(_LONGEST, len(points) - 1) + 1):
+    for period in range(1, min(longest, len(points) - 1) + 1):
         apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
         for start in np.argsort(apart)[:_TRIES]:
             if apart[start] > _NEAR * max(spacing, float(apart.min())) or apart[start] > 0.1 * np.ptp(points):
