@@ -150,8 +150,10 @@ class _Work:
             self._polish(found)
 
     def shoot(self) -> None:
-        """Shoot from an orbit or an equilibrium, and polish what is found."""
+        """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""
         if self.analyzer.shooting is None or not self.problem.attractor.is_fixed:
+            return
+        if self.analyzer.graph is not None and not any(polishing.ends for polishing in self._polishings):
             return
         try:
             found = self.analyzer.shooting.search(self.problem)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.kernels.ensemble import Ensemble, run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION
 from vibrokit.results.basins import ESCAPED, UNSETTLED
@@ -117,12 +117,24 @@ class Shooter:
             shift=known.shift,
         )  # fmt: skip
 
+    @cached_property
+    def _stop(self) -> Stop:
+        """The test of the problem; cells from which motion escapes have the next free label, if that is an exit."""
+        known, stop = self.problem.structure, self.problem.stop
+        if not self.problem.ends_by_escape:
+            return stop
+        return dataclasses.replace(
+            stop, labels=np.where(known.basins.labels == ESCAPED, len(known.attractors), stop.labels)
+        )
+
     def _integrated(self, states: Array, budget: int | Whole) -> Ensemble:
         problem = self.problem
-        return run_ensemble(
+        ended = run_ensemble(
             problem.scene, Flow.HAMILTONIAN, self.stepper, states, budget,
-            stop=problem.stop, interval=problem.scene.section_interval / problem.checks,
+            stop=self._stop, interval=problem.scene.section_interval / problem.checks,
         )  # fmt: skip
+        escaped = ended.label == len(problem.structure.attractors)
+        return dataclasses.replace(ended, label=np.where(escaped, ESCAPED, ended.label))
 
     def _to_section(self, starts: Array, times: Array) -> tuple[Array, Whole]:
         """Integrate starts between two sections to the next."""
