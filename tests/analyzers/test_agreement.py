@@ -1,5 +1,6 @@
 """Bounds and findings where a polished path and the graph give the energy of one exit."""
 
+import dataclasses
 import math
 from types import SimpleNamespace
 
@@ -33,6 +34,13 @@ def graph(value, error, target=1):
 def only(attractor, paths, estimates):
     (energy,), (finding,) = combined(attractor, paths, estimates)
     return energy, finding
+
+
+def test_a_path_to_a_set_gives_a_bracket():
+    bound = dataclasses.replace(path(1.0), bound=Bound.BRACKET)
+    energy, finding = only(ORBIT, (bound,), (graph(0.9, 0.2),))
+    assert (finding.code, energy.bound) == (Code.BRACKET, Bound.BRACKET)
+    assert (energy.lower, energy.value, energy.upper) == (pytest.approx(0.7), 0.9, 1.0 + ERROR)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,15 @@
 """What LeastAction keeps when it is stopped, and attractors that have left already."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.exits import LeaveRegion
-from vibrokit.results.energy import Bound
+from vibrokit.analyzers.least_action import _Work as Work
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code
 
 OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
@@ -69,6 +73,37 @@ def test_the_result_has_the_graph_s_potential_and_the_work_done(structure):
     assert "quasi_potential" in result.data
     assert result.stats.newton_iterations > 10
     assert {"graph", "action plot", "polishing", "certifying"} <= set(result.stats.seconds)
+
+
+def three_wells():
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=1.5, spring=vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)"),
+        noise=vk.WhiteNoise(1e-2),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, region=((-2.5, 2.5), (-1.0, 1.0)), cells=(40, 20), manifolds=False)
+    assert [round(float(each.points[0, 0])) for each in structure.attractors] == [-2, 0, 2]
+    return osc, structure
+
+
+def test_attractors_that_are_reached_through_other_basins_are_known():
+    osc, structure = three_wells()
+    for label, beyond in ((0, {2}), (1, set()), (2, {0})):
+        problem = ExitProblem(osc, structure, structure.attractor(label), vk.LeaveBasin())
+        assert Work(vk.LeastAction(), problem)._beyond == beyond
+
+
+@pytest.mark.parametrize(("finer", "useless"), [(0, {1, 2}), (1, {2}), (2, {2}), (3, set())])
+def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, useless):
+    """Each doubling of the nodes divides its error by 8 at best; half of a path's action is too coarse."""
+
+    def energy(target, value, error):
+        return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
+
+    problem = SimpleNamespace(attractor=SimpleNamespace(is_fixed=False))
+    work, paths = SimpleNamespace(problem=problem), (energy(1, 1.0, 0.0), energy(2, 0.01, 0.0))
+    work._estimates = lambda graph, branches: graph.estimates
+    graph = SimpleNamespace(finer=finer, estimates=(energy(1, 1.0, 2.0), energy(2, 1.0, 2.0), energy(3, 1.0, 9.0)))
+    assert Work._unresolvable(work, graph, paths) == useless
 
 
 def test_all_work_belongs_to_a_named_stage(structure):

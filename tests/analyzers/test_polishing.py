@@ -209,6 +209,24 @@ def test_no_path_is_polished_to_what_is_not_a_hyperbolic_orbit(problem, changes,
     assert found.findings[0].values == {"saddle": 0, "kind": kind}
 
 
+def test_a_path_to_an_orbit_inside_a_chaotic_set_is_a_bound(problem):
+    found = polish(with_saddles(problem, embedded=True), (guess(straight()),))
+    branch = only(found)
+    assert branch.value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
+    assert (branch.bound, branch.saddle) == (Bound.BRACKET, 0)
+    (finding,) = found.findings
+    assert (finding.code, finding.values) == (Code.CHAOTIC_BOUNDARY, {"saddles": [0]})
+
+
+def test_no_path_is_polished_to_an_orbit_inside_a_set_if_another_costs_less(problem):
+    (saddle,) = problem.structure.saddles
+    both = (saddle, dataclasses.replace(saddle, embedded=True))
+    both_known = dataclasses.replace(problem, structure=dataclasses.replace(problem.structure, saddles=both))
+    found = polish(both_known, (guess(straight()),))
+    assert (only(found).saddle, only(found).bound) == (0, Bound.UPPER)
+    assert [finding.code for finding in found.findings] == [Code.CHAOTIC_BOUNDARY]
+
+
 def test_saddles_of_others_are_used_where_there_is_no_own_one(problem):
     found = polish(with_saddles(problem, leads_to=(1, 2)), (guess(straight()),))
     assert [finding.code for finding in found.findings] == [Code.SADDLES_OF_OTHERS]

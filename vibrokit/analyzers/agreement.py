@@ -9,7 +9,8 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code, Finding
 
-_VAGUE = 0.5  # of a path's action: with a larger error the graph cannot exclude a path of half the action
+VAGUE = 0.5
+"""Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
 
 
 def combined(
@@ -60,7 +61,7 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
         code = Code.CHEAPER_PATH_EXPECTED if graph.value < path.value else Code.GRAPH_TOO_COARSE
         lower = min(path.value, graph.value) - difference
     else:
-        code = Code.GRAPH_TOO_COARSE if graph.numerical_error > _VAGUE * path.value else Code.AGREEMENT
+        code = Code.GRAPH_TOO_COARSE if graph.numerical_error > VAGUE * path.value else Code.AGREEMENT
         lower = min(path.value - path.numerical_error, graph.value - graph.numerical_error)
     bound = Bound.CERTIFIED if code is Code.AGREEMENT and path.certificate is not None else Bound.UPPER
     return code, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
@@ -71,7 +72,7 @@ def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnerg
 
     The value is the smaller one of both, and that of the path where the graph's error is as large.
     """
-    vague = graph.numerical_error > _VAGUE * path.value
+    vague = graph.numerical_error > VAGUE * path.value
     value = path.value if vague else min(path.value, graph.value)
     lower = min(path.value - path.numerical_error, graph.lower)
     return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=Bound.BRACKET)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from functools import cached_property
 from typing import Any, ClassVar
 
 import xarray
 
-from vibrokit.analyzers.agreement import combined
+from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
@@ -38,6 +38,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _MOST_ORBITS = 1000
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 _AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)  # more nodes change no other one
+_GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -69,7 +70,8 @@ class LeastAction(Analyzer):
         The other one; None to do without.
     accuracy : float
         The graph is refined, coarse to fine up to its `nodes`, until its error is at most this part of each energy,
-        except of those to attractors that are reached only through other basins.
+        except of those to attractors that are reached only through other basins, and of those that even its finest
+        grid could not resolve.
         The energies themselves are far more accurate; this is how far below them a cheaper path is not excluded.
     orbits : int
         Number of unstable orbits inside a chaotic attractor that paths are polished from.
@@ -191,9 +193,11 @@ class _Work:
         if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.is_fixed:
             return
         least: dict[int, ActivationEnergy] = {}
-        for branch in self._polished()[0]:  # the cheapest first
+        branches = self._polished()[0]  # the cheapest first
+        for branch in branches:
             least.setdefault(branch.target, branch)
-        for branch in least.values():
+        for target in sorted(least.keys() - self._unresolvable(self.graph, branches)):
+            branch = least[target]
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
                 self._polish(self.analyzer.graph.beginnings(self.problem, branch, self.graph))
 
@@ -214,25 +218,37 @@ class _Work:
         }
         return frozenset(unled - touching)
 
-    def _settled(self) -> set[int]:
-        """Labels of attractors to which a path and the graph agree within the accuracy, or that lie beyond others."""
+    def _settled(self) -> Set[int]:
+        """Labels of attractors on which an accurate graph and a path agree, or for which finer grids are of no use."""
         branches = self._polished()[0]
-        if self.graph is None or not self.problem.attractor.is_fixed:
+        if self.graph is None:
             return set()
+        useless = self._beyond | self._unresolvable(self.graph, branches)
+        if not self.problem.attractor.is_fixed:
+            return useless
         estimates = self._estimates(self.graph, branches)
         _, compared = combined(self.problem.attractor, branches, estimates)
         agreed = {finding.target for finding in compared if finding.code is Code.AGREEMENT}
         accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
-        return accurate & agreed | self._beyond
+        return accurate & agreed | useless
+
+    def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
+        """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
+        least = {branch.target: branch.value for branch in reversed(branches)}
+        within_reach = {
+            each.target: each.numerical_error / _GAIN**graph.finer for each in self._estimates(graph, branches)
+        }
+        return {target for target, error in within_reach.items() if error > VAGUE * least.get(target, math.inf)}
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
         branches = self._polished()[0]
-        estimates = [each for each in self._estimates(graph, branches) if each.target not in self._beyond]
+        useless = self._beyond | self._unresolvable(graph, branches)
+        estimates = [each for each in self._estimates(graph, branches) if each.target not in useless]
         _, compared = combined(self.problem.attractor, branches, estimates)
         if any(finding.code not in _AGREED for finding in compared):
             return math.inf
-        return max((each.numerical_error / each.value for each in estimates if each.value), default=math.inf)
+        return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
 
     def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""

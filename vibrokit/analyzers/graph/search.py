@@ -46,6 +46,7 @@ class GraphSolution:
     findings: tuple[Finding, ...]
     by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
     last: bool  # with so many nodes
+    finer: int  # how many times the nodes along a side may still be doubled
 
     def calibrated(self, polished: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """Return the estimates, with errors from actions that are known.
@@ -191,9 +192,9 @@ class GraphSearch:
         with stage("exit targets", subject=attractor.name):
             search = self._hierarchies(problem, self.nodes)
             targets = exit_targets(problem, search.model)
-        known = _Known()
-        for nodes in self._refinements():
-            done = settled()
+        known, refinements = _Known(), list(self._refinements())
+        for number, nodes in enumerate(refinements, start=1):
+            known.finer, done = len(refinements) - number, settled()
             try:
                 unsettled = [target for target in targets if target.label not in done]
                 yield from _solutions(problem, search, unsettled, nodes, known)
@@ -247,6 +248,7 @@ class _Known:
 
     estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
     potential: Potential | None = None  # on the finest grid that reaches the costliest target
+    finer: int = 0  # refinements that follow
 
 
 def _solutions(
@@ -329,4 +331,5 @@ def _solution(
         (used, *lost),
         {target.label: estimate.by_nodes for target, estimate in reversed(reached)},
         last,
+        known.finer,
     )

@@ -88,10 +88,10 @@ class CandidatePolisher:
         failures, solved = [], False
         try:
             ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
-            near = self._near(candidate)
-            ends = [end for end in near if self._is_wanted(end, candidate)]
-            solved = bool(near) and not ends
-            for end, way in itertools.product(ends, (*ways, PathSolver.solve)):
+            for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
+                if not self._is_wanted(end, candidate):
+                    solved = True  # by a path that costs less
+                    continue
                 try:
                     self._add(self._solve(end, candidate, way))
                     solved = True
