@@ -110,7 +110,8 @@ def test_all_work_belongs_to_a_named_stage(structure):
     seconds = dict(vk.LeastAction(source=0, **SMALL).run(OSC, structure).stats.seconds)
     rest = seconds.pop("LeastAction")
     assert set(seconds) - {"compiling"} == {
-        "first candidates", "exit targets", "graph", "starts of exit paths", "action plot", "ends of exit paths",
+        "reversed relaxation", "exit targets", "graph", "starts of exit paths", "action plot", "closest approach",
+            "ends of exit paths",
         "polishing", "certifying",
     }  # fmt: skip
     assert rest < 0.05 * sum(seconds.values())

@@ -17,7 +17,7 @@ from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.closest_approach import closest_approaches
-from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
+from vibrokit.analyzers.paths.reversed_relaxation import FINDER, reversed_relaxations
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import PIECES
 from vibrokit.analyzers.polishing.polish import METHOD, Polishing
@@ -112,10 +112,11 @@ class LeastAction(Analyzer):
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         work = _Work(self, problem)
         steps = (
-            ("first candidates", work.begin),
+            (FINDER, work.reverse),
             ("graph", work.search_graph),
             ("action plot", work.shoot),
             ("graph", work.refine_graph),
+            ("closest approach", work.approach),
             ("graph", work.search_beginnings),
         )
         for doing, step in steps:
@@ -142,12 +143,11 @@ class _Work:
     def stopped(self) -> bool:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
 
-    def begin(self) -> None:
-        """Polish the relaxation to an equilibrium, run backwards, or where a chaotic attractor is next to a saddle."""
+    def reverse(self) -> None:
+        """Run the relaxation to an equilibrium backwards, and polish that."""
         stepper = self.problem.single_stepper(Flow.STATE)
-        with stage("first candidates", subject=self.problem.attractor.name):
+        with stage(FINDER, subject=self.problem.attractor.name):
             found = reversed_relaxations(self.problem, SegmentPropagator(self.problem.scene, stepper, max(PIECES)))
-            found += closest_approaches(self.problem)
         if found:
             self._polish(found)
 
@@ -180,6 +180,14 @@ class _Work:
             self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
         if self.graph is not None and self.graph is not before:
             self._polish(self.graph.candidates)
+
+    def approach(self) -> None:
+        """Polish where a chaotic attractor comes nearest to a saddle, for exits that the graph gave no path to."""
+        reached = {branch.target for branch in self._polished()[0]}
+        with stage("closest approach", subject=self.problem.attractor.name):
+            found = [each for each in closest_approaches(self.problem) if each.target not in reached]
+        if found:
+            self._polish(found)
 
     def refine_graph(self) -> None:
         """Search the graph again until its error is as small as wanted."""

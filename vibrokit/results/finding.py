@@ -295,8 +295,8 @@ class Code(StrEnum):
     )  # fmt: skip
     SADDLES_OF_OTHERS = (
         "saddles-of-others", WARNING,
-        "No usable orbit on the basin boundary of {state} is known; paths were polished to saddles between other "
-        "basins.", "Refine the basin grid, so that edge tracking can follow this boundary.",
+        "On the basin boundary of {state} no usable saddle is known that lies outside chaotic sets; paths were "
+        "polished to saddles between other basins.", "Refine the basin grid, so that edge tracking can follow this boundary.",
     )  # fmt: skip
     CANDIDATES_SKIPPED = (
         "candidates-skipped", INFO,

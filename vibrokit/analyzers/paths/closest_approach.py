@@ -14,7 +14,7 @@ from vibrokit.symbolic.flow_kind import Flow
 FINDER = "closest approach"
 _BEFORE = 16  # section intervals on the attractor before noise acts
 _ACTING = (1, 2, 4)  # section intervals in which noise acts
-_MOST = 8  # candidates, at most one for each saddle
+_MOST = 4  # candidates, at most one for each saddle
 
 Array = NDArray[np.float64]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -32,6 +33,7 @@ _NEAR = 3.0  # times the distance to the nearest end: other ends that near are t
 _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
 _INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
+_MOST_FAILURES = 6  # candidates that lead to no path to an end, after which no other one is tried
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
 _SAMPLES = 128  # in a section interval: enough for pictures, and for quadrature to about 1e-6
@@ -76,6 +78,7 @@ class CandidatePolisher:
         self.solved: list[Solved] = []
         self.skipped = 0  # candidates that cost too much
         self.findings: list[Finding] = []
+        self._failures: Counter[PathEnd] = Counter()
         self._solver = functools.cache(lambda end, pieces: PathSolver(propagators[pieces], source(pieces)))
         self._ending = functools.cache(lambda end, pieces: ending_at(end, problem, propagators[pieces]))
         self._resampled = functools.cache(lambda candidate, pieces: resampled(propagators[pieces], candidate))
@@ -90,13 +93,14 @@ class CandidatePolisher:
             ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
             for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
                 if not self._is_wanted(end, candidate):
-                    solved = True  # by a path that costs less
+                    solved = True  # as far as it is going to be
                     continue
                 try:
                     self._add(self._solve(end, candidate, way))
                     solved = True
                 except StructureError as error:
                     failures.append(str(error))
+                    self._failures[end] += 1
         except StructureError as error:
             failures.append(str(error))
         if not solved:
@@ -113,10 +117,12 @@ class CandidatePolisher:
             return
         near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
         for candidate in itertools.chain(near, ranked[:1]):
+            if self._failures[end] >= _MOST_FAILURES:
+                return
             try:
                 return self._add(self._solve(end, candidate))
             except StructureError:
-                continue
+                self._failures[end] += 1
 
     def _add(self, one: Solved) -> None:
         if not any(one.is_same(other) for other in self.solved):
@@ -132,7 +138,9 @@ class CandidatePolisher:
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
 
     def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
-        """Whether a path to an end is wanted; inside a set it only bounds the energy, so that others must cost more."""
+        """Whether to look for a path to an end: not after many failures, nor inside a set if others cost less."""
+        if self._failures[end] >= _MOST_FAILURES and not any(one.end is end for one in self.solved):
+            return False
         others = (other for other in self.ends if set(other.targets) & set(end.targets))
         return not end.one_of_many or candidate.action < self._least(others)
 

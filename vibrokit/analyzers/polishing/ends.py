@@ -223,7 +223,10 @@ class SaddleEnding(Ending):
 
 
 def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
-    """Return the ends that paths are polished to: those that are not a last resort, if any of them can be used."""
+    """Return the ends that paths are polished to: those that are not a last resort, if any of them can be used.
+
+    Those that are one are used as well where all others lie inside chaotic sets.
+    """
     own = [end for end in problem.path_ends if not end.last_resort]
     usable = [end for end in own if not obstacle(end, problem)]
     inside = [end.saddle for end in usable if end.one_of_many]
@@ -234,9 +237,11 @@ def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
     ]
     if inside:
         findings.append(Finding.of(Code.CHAOTIC_BOUNDARY, problem.source, saddles=inside))
-    if not usable:
-        usable = [end for end in problem.path_ends if end.last_resort and not obstacle(end, problem)]
-        findings += [Finding.of(Code.SADDLES_OF_OTHERS, problem.source)] if usable else []
+    if all(end.one_of_many for end in usable):
+        ends = [end for end in problem.path_ends if end.last_resort and not end.one_of_many]
+        others = [end for end in ends if not obstacle(end, problem)]
+        findings += [Finding.of(Code.SADDLES_OF_OTHERS, problem.source)] if others else []
+        usable += others
     return usable, findings
 
 
