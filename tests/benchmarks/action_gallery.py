@@ -17,6 +17,7 @@ import time
 
 import vibrokit as vk
 from vibrokit.errors import VibrokitError
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.finding import Severity
 
 SCENES = {}
@@ -58,6 +59,11 @@ forced("double well, tilted", 0.0, 0.0, spring=WELLS, push=0.1)
 forced("double well, forced", 0.8, 0.1, spring=WELLS, damping=0.1)
 forced("double well, linear stops", 0.9, 0.15, spring=WELLS, damping=0.15, stops=both(vk.Linear(30.0), 1.2))
 forced("double well, stops", 0.0, 0.0, spring=WELLS, stops=both(vk.Hertz(20.0), 0.9))
+forced("double well, chaotic", 1.2, 0.3, spring=WELLS, damping=0.15)
+forced("cubic well", 0.85, 0.05, spring=vk.CustomSpring("x - x**2"))
+forced("cubic well, unforced", 0.0, 0.0, spring=vk.CustomSpring("x - x**2"))
+forced("pendulum", 0.75, 0.25, spring=vk.CustomSpring("sin(x)"))
+forced("pendulum, tilted", 0.0, 0.0, spring=vk.CustomSpring("sin(x)"), damping=0.1, push=0.3)
 for frequency in (0.525, 0.570):
     SCENES[f"hertz-{frequency:.3f}"] = vk.load_scene(f"hertz-{frequency:.3f}")
 forced("linear stops", 0.57, 0.18, damping=0.01, push=0.2, stops=both(vk.Linear(50.0), 0.5))
@@ -79,7 +85,8 @@ def rows_of(name, limit):
     seconds = time.perf_counter() - began
     found = f"{len(structure.attractors)} attractors, {len(structure.saddles)} saddles"
     rows = [{"attractor": "structure", "why": found, "seconds": seconds}]
-    exit_ = vk.LeaveBasin() if len(structure.attractors) > 1 else vk.FirstContact()
+    escapes = any(ESCAPED in saddle.leads_to for saddle in structure.saddles)
+    exit_ = vk.LeaveBasin() if len(structure.attractors) > 1 or escapes else vk.FirstContact()
     for attractor in structure.attractors:
         began = time.perf_counter()
         row = {"attractor": attractor.name, "kind": attractor.kind, "why": ""}

@@ -19,7 +19,7 @@ from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
-_SADDLE = ("period", "points", "multipliers", "kind", "leads_to")
+_SADDLE = ("period", "points", "multipliers", "kind", "leads_to", "embedded")
 _ENERGY = ("source", "target", "method", "value", "lower", "upper", "bound", "numerical_error", "residual", "saddle",
            "sensitivity", "sensitivity_error")  # fmt: skip
 _RATE = ("source", "target", "intensity", "value", "log_value", "log_error", "event", "method")

@@ -9,6 +9,7 @@ from typing import Any
 
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.progress import Stats
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding, Severity
 from vibrokit.results.plain import PlainRecord
@@ -76,9 +77,11 @@ def saddle_table(structure: Structure) -> str:
         return ""
     rows = [("saddle", "between", "kind", "period", "multipliers", "at (x, v)")]
     for number, s in enumerate(structure.saddles):
-        sides = " | ".join(structure.names[label] if label >= 0 else "–" for label in s.leads_to)
+        outside = {ESCAPED: "escape"}
+        sides = " | ".join(structure.names[label] if label >= 0 else outside.get(label, "–") for label in s.leads_to)
+        kind = f"{s.kind}, in a chaotic set" if s.embedded else s.kind
         sizes = ", ".join(f"{m.real:.6g}" if m.imag == 0 else f"{m:.4g}" for m in s.multipliers[:2])
-        rows.append((str(number), sides, s.kind, str(s.period), sizes, _place(s.points, 10)))
+        rows.append((str(number), sides, kind, str(s.period), sizes, _place(s.points, 10)))
     return "\n".join(text_table(rows))
 
 

@@ -296,7 +296,8 @@ class Code(StrEnum):
     SADDLES_OF_OTHERS = (
         "saddles-of-others", WARNING,
         "On the basin boundary of {state} no usable saddle is known that lies outside chaotic sets; paths were "
-        "polished to saddles between other basins.", "Refine the basin grid, so that edge tracking can follow this boundary.",
+        "polished to saddles between other basins.",
+        "Refine the basin grid, so that edge tracking can follow this boundary.",
     )  # fmt: skip
     CANDIDATES_SKIPPED = (
         "candidates-skipped", INFO,

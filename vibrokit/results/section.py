@@ -68,7 +68,7 @@ class Section:
             bounds=structure.basins.region.bounds,
             points=tuple(attractor.points for attractor in structure.attractors),
             names=structure.names,
-            saddles=tuple(saddle.points for saddle in structure.saddles if saddle.kind != "chaotic"),
+            saddles=tuple(s.points for s in structure.saddles if s.kind != "chaotic" and not s.embedded),
             chaotic=tuple(saddle.points for saddle in structure.saddles if saddle.kind == "chaotic"),
             stable=tuple(manifold.curve for manifold in structure.manifolds if manifold.stable),
         )

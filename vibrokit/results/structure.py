@@ -116,17 +116,21 @@ class Structure(Record):
         )
 
     def plot(self, ax: Any = None) -> SectionArtists:
-        """Draw attractors, saddles and manifolds over the basins; see `vibrokit.plots.basins.section_portrait`."""
+        """Draw attractors, saddles and manifolds over the basins; see `vibrokit.plots.basins.section_portrait`.
+
+        Orbits inside a chaotic set are left out; the set itself is drawn.
+        """
         from vibrokit.plots.basins import section_portrait
 
+        saddles = [saddle for saddle in self.saddles if not saddle.embedded]
         return section_portrait(
             self.basins.labels,
             self.basins.region.bounds,
             [attractor.points for attractor in self.attractors],
             names=self.names,
             kinds=[attractor.kind for attractor in self.attractors],
-            saddles=[saddle.points for saddle in self.saddles],
-            saddle_kinds=[saddle.kind for saddle in self.saddles],
+            saddles=[saddle.points for saddle in saddles],
+            saddle_kinds=[saddle.kind for saddle in saddles],
             stable=[manifold.curve for manifold in self.manifolds if manifold.stable],
             unstable=[manifold.curve for manifold in self.manifolds if not manifold.stable],
             cycles={a.label: a.orbit for a in self.attractors if a.kind == "limit cycle"},
