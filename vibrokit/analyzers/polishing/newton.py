@@ -26,6 +26,7 @@ _SHORTEST_STEP = 1e-4  # share of a Newton step
 ACCEPTED = 1e-9
 """Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
 _LONGEST_LAST = 3.0  # pieces
+_NEARER = 10.0  # times as near to its source: start of a path that nearly converges
 _SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
 _FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
 _INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
@@ -91,16 +92,23 @@ def extremal_path(
     *,
     evaluations: int = MOST_EVALUATIONS,  # of the misfits, at most
     accepted: float = ACCEPTED,  # misfit
+    nearly: float = 0.0,  # misfit from which a path that begins nearer to its source is tried
 ) -> ExtremalPath:
     """Solve for a path: continuity, n conditions at the source, the conditions of the ending.
 
     The Jacobian is sparse, its blocks the variational equations of H over one piece. Source of the method: Stoer and
     Bulirsch, Introduction to Numerical Analysis, 7.3; the damping is Deuflhard's (Newton Methods for Nonlinear
-    Problems, 3.3).
+    Problems, 3.3). Where two manifolds meet at a small angle, the error of a linearized start can be more than any
+    change of the path makes up for; such a path begins ten times as near to its source then.
 
     Raises StructureError if it does not converge.
     """
     found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations, accepted)
+    if accepted < found.residual < nearly and not source.start_on_orbit:
+        added = math.ceil(math.log(_NEARER) / (source.slowest_rate * propagator.grain)) * propagator.grain
+        points = np.concatenate([source.continued(found.points[0], first, -added), found.points])
+        first -= added
+        found = _Matching(propagator, source, first, ending, points, found.last).solve(points, evaluations, accepted)
     if not found.residual <= accepted:
         raise StructureError(
             f"Newton's method found no extremal path near the guess: the relative misfit stays at "

@@ -33,6 +33,7 @@ ROUGHLY_ACCEPTED = 1e-6
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
+_NEARLY = 1e-4  # misfit of a path that may converge if it begins nearer to its source
 _ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
@@ -138,7 +139,7 @@ class PathSolver:
     ) -> ExtremalPath:
         return extremal_path(
             self.propagator, source or self.source, first, cut.ending, points, cut.last,
-            evaluations=evaluations, accepted=ROUGHLY_ACCEPTED,
+            evaluations=evaluations, accepted=ROUGHLY_ACCEPTED, nearly=_NEARLY,
         )  # fmt: skip
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
