@@ -65,7 +65,7 @@ print(f"residual {certificate.residual:.0e}; path of {certificate.periods:.0f} p
 print(f"    from {certificate.start_distance:.0e} off the attractor to {certificate.end_distance:.0e} off the saddle")
 print(f"    changes by {certificate.by_start:.0e}, {certificate.by_length:.0e}, {certificate.by_stepper:.0e}")
 
-# The certificate proves that the path is an extremal and that its action has ten digits. It does not exclude a cheaper
+# The certificate shows that the path is an extremal and that its action has ten digits. It does not exclude a cheaper
 # path. The graph search tests this, within its error estimate. The bounds of the energy therefore are much wider than
 # the numerical error of the path: everything cheaper that was not excluded lies between them.
 

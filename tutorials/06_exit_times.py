@@ -126,7 +126,7 @@ log_periods = [-rate.log_value - math.log(osc.period) for rate in forced.rates]
 for rate, log_time in zip(forced.rates, log_periods, strict=True):
     print(f"D = {rate.intensity:g}: ln of the mean time in periods {log_time:.3f} ± {rate.log_error:.3f}")
 
-# Half the steps must not change the rate by more than the statistical errors, which `step_change_error` contains.
+# Steps twice as long must not change the rate by more than three standard errors (`step_change_error`).
 
 for change, error in np.stack([forced.data[f"step_change{end}"].sel(source=0) for end in ("", "_error")], axis=-1):
     print(f"half the steps change ln of the rate by {change:.2f} ± {error:.2f}")

@@ -70,7 +70,8 @@ print(f"each impact: {speed:.3f} m/s, {1e6 * depth:.2f} µm deep, {1e6 * duratio
 # 3. The activation energy
 #
 # The intensity D of white noise is half the one-sided power spectral density of the random acceleration. For weak noise
-# the mean time until the ball hammers is about T exp(ΔU/D), with T of the order of a period. ΔU does not depend on D.
+# the mean time until the ball hammers is C exp(ΔU/D). Here C is taken as the forcing period T; section 5 measures it.
+# ΔU does not depend on D.
 
 least = vk.LeastAction(source="clear").run(osc, structure)
 energy = least.energy("clear", "hammering")

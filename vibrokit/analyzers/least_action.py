@@ -56,7 +56,7 @@ class LeastAction(Analyzer):
     detailed balance holds, it is the path of least action. The graph is solved on a quarter of its nodes along each
     side first, and shooting follows. Then it is solved on twice as many, and on all, until it agrees with the paths
     within the `accuracy`. Last, the graph is solved around the beginning of the cheapest path, where paths compete that
-    differ by parts of a thousand. Paths are certified after each search. If the work is stopped in between, they are
+    differ by about 0.1 %. Paths are certified after each search. If the work is stopped in between, they are
     returned with the bounds that are known.
 
     For a chaotic attractor, the graph bounds the energy from below, and paths from unstable orbits inside it bound it
@@ -69,7 +69,7 @@ class LeastAction(Analyzer):
     graph : GraphSearch, optional
         The other one; None to do without.
     accuracy : float
-        The graph is refined, coarse to fine up to its `nodes`, until its error is at most this part of each energy,
+        The graph is refined, up to its `nodes`, until its error is at most this fraction of each energy,
         except of those to attractors that are reached only through other basins, and of those that even its finest
         grid could not resolve.
         The energies themselves are far more accurate; this is how far below them a cheaper path is not excluded.

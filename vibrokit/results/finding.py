@@ -76,7 +76,7 @@ class Code(StrEnum):
         "Narrow the region, or check the signs of the forces.",
     )  # fmt: skip
     STARTS_UNSETTLED = (
-        "starts-unsettled", WARNING, "At least {count} starts settled on no equilibrium and no limit cycle.",
+        "starts-unsettled", WARNING, "At least {count} starts did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,
     )  # fmt: skip
     SURVIVAL = (
@@ -105,7 +105,7 @@ class Code(StrEnum):
     COARSE_GRID = (
         "coarse-grid", INFO,
         "The basins have {nx} × {nv} cells: transients are long, and a finer grid would take some {sections:.1e} "
-        "sections.",
+        "section-map iterations.",
         "Give cells for a finer one.",
     )  # fmt: skip
     SADDLES = "saddles", INFO, "Unstable orbits on basin boundaries: {count}."
@@ -162,7 +162,7 @@ class Code(StrEnum):
     )
     PATH_LOST = (
         "path-lost", INFO, "The exit path {state} could not be followed from {parameter} = {value:.8g} to {next:.8g}: "
-        "{reason}", "It folds, grazes a stop or meets another one there; search at a value beyond.",
+        "{reason}", "The path folds, grazes a stop or meets another path; pass a value beyond in search=.",
     )  # fmt: skip
     LEAST_PATH_CHANGES = (
         "least-path-changes", INFO,
@@ -187,7 +187,7 @@ class Code(StrEnum):
     # Action plot
     SHOTS = (
         "shots", INFO,
-        "Action plot from {state}: {escaped} of {paths} extremal paths escaped, {left_region} left the region without "
+        "Action plot from {state}: {escaped} of {paths} paths reached the exit, {left_region} left the region without "
         "an exit, {remaining} remained inside, {diverged} diverged; {branches} distinct exit paths.",
     )  # fmt: skip
     REFINEMENT = (
@@ -269,7 +269,7 @@ class Code(StrEnum):
     DENSITY_TRUNCATED = (
         "density-truncated", WARNING,
         "Until t = {time:.4g} s truncation errors changed the probability by {change:+.1%}, which was divided out.",
-        "Raise the number of nodes: the density is narrow against their distances.",
+        "Raise the number of nodes: the density is narrow compared with their spacing.",
     )  # fmt: skip
     RATE_UNCERTAIN = (
         "rate-uncertain", WARNING,
@@ -278,7 +278,7 @@ class Code(StrEnum):
     )  # fmt: skip
     RATE_UNKNOWN = (
         "rate-unknown", WARNING,
-        "The rate from {state} to {goal} at D = {intensity:g} is not known: what leaves did not become steady above "
+        "The rate from {state} to {goal} at D = {intensity:g} is not known: the outflow did not become steady above "
         "the numerical errors.", "Raise the number of nodes or of steps, or the noise intensity.",
     )  # fmt: skip
 
@@ -316,7 +316,7 @@ class Code(StrEnum):
     STARTS_ON_ORBIT = (
         "starts-on-orbit", WARNING,
         "The path from {state} with action {action:.6g} starts on the orbit itself, {periods:.0f} periods before its "
-        "end, because the motion is not linear near the orbit. Its action is an upper bound.",
+        "end, because linearization fails near the orbit. Its action is an upper bound.",
     )  # fmt: skip
     COMPETING_PATHS = (
         "competing-paths", INFO,
@@ -359,11 +359,11 @@ class Code(StrEnum):
     NOT_SEARCHED = (
         "not-searched", WARNING,
         "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "
-        "exists.", "Keep the graph search.",
+        "exists.", "Run LeastAction with a graph search.",
     )  # fmt: skip
     BRACKET = (
         "bracket", INFO,
-        "From {state} to {goal}: at most {path:.6g}, by a path that begins or ends inside a set; the graph estimates "
+        "From {state} to {goal}: at most {path:.6g}, by a path that begins or ends in a chaotic set; the graph gives "
         "{graph:.4g} ± {error:.1g}.",
     )  # fmt: skip
 

@@ -87,7 +87,7 @@ def find_structure(
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them,
-        and where a shift along x leaves the motion unchanged, as of a pendulum, one of those that are alike. Motion
+        and, if the motion repeats along x, as that of a pendulum does, one copy of each steady state. Motion
         that ends at a copy of an attractor elsewhere has then left the region.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients

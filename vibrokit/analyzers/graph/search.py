@@ -112,15 +112,15 @@ class GraphSearch:
     """Search for the least action from an attractor to its exits, as a shortest path over time and space.
 
     The period is divided into steps, and the section at each of these phases into nodes. A step from a state x to a
-    node y costs ½ eᵀ C⁻¹ e, where e is the distance from y to the image of x without noise, and C is the covariance
+    node y costs ½ eᵀ C⁻¹ e, where e is the vector from the noise-free image of x to y, and C is the covariance
     that noise adds along the step. The least sum of such costs from the attractor is the quasi-potential V. Value
     iteration finds it as a shortest path over the phases. In it x may be any state, with V interpolated between nodes:
     if x were a node too, and damping is weak, grid rounding would add more action than the path itself. Near the
     attractor V is the exact quadratic form.
 
     The error estimate of an exit is the change when the number of nodes along each side is halved, and the difference
-    from the action of the graph's path after that is relaxed by Hamilton's equations. The latter measures what
-    linearization over a step changes: it can be much over a whole period, and is some 0.2 % over an eighth of it.
+    from the action of the graph's path after relaxation by Hamilton's equations. The latter measures what
+    linearization over a step changes: it can be large over a whole period, and is about 0.2 % over an eighth of it.
 
     Parameters
     ----------
