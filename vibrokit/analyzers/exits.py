@@ -167,11 +167,10 @@ class LeaveBasin(Exit):
         """The saddles on basin boundaries, those of this basin first, and basins that none of these leads to."""
         own, others = [], []
         wanted = [attractor.label for attractor in self.targets(structure, source)]
+        # Without a wanted one, motion that leaves the region counts too. What did not settle is no exit.
+        counting = {*wanted, *(() if self.to is not None else (ESCAPED,))}
         for number, saddle in enumerate(structure.saddles):
-            targets = tuple(
-                # Without a wanted one, motion that leaves the region counts too.
-                dict.fromkeys(one for one in saddle.leads_to if one != source and (self.to is None or one in wanted))
-            )
+            targets = tuple(dict.fromkeys(one for one in saddle.leads_to if one in counting))
             if source in saddle.leads_to and targets:
                 own.append(AtSaddle(targets, number, embedded=saddle.embedded))
             elif saddle.on_boundary:
