@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.exits import LeaveRegion
-from vibrokit.analyzers.least_action import _Work as Work
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Code
@@ -89,7 +89,7 @@ def test_attractors_that_are_reached_through_other_basins_are_known():
     osc, structure = three_wells()
     for label, beyond in ((0, {2}), (1, set()), (2, {0})):
         problem = ExitProblem(osc, structure, structure.attractor(label), vk.LeaveBasin())
-        assert Work(vk.LeastAction(), problem)._beyond == beyond
+        assert ExitSearch(vk.LeastAction(), problem)._beyond == beyond
 
 
 @pytest.mark.parametrize(("finer", "useless"), [(0, {1, 2}), (1, {2}), (2, {2}), (3, set())])
@@ -103,7 +103,7 @@ def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer,
     work, paths = SimpleNamespace(problem=problem), (energy(1, 1.0, 0.0), energy(2, 0.01, 0.0))
     work._estimates = lambda graph, branches: graph.estimates
     graph = SimpleNamespace(finer=finer, estimates=(energy(1, 1.0, 2.0), energy(2, 1.0, 2.0), energy(3, 1.0, 9.0)))
-    assert Work._unresolvable(work, graph, paths) == useless
+    assert ExitSearch._unresolvable(work, graph, paths) == useless
 
 
 def test_all_work_belongs_to_a_named_stage(structure):

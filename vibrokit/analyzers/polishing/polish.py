@@ -56,8 +56,8 @@ class Polishing:
     def __init__(self, problem: ExitProblem, orbit: Orbit | None = None) -> None:
         self._problem = problem
         with stage("ends of exit paths", subject=problem.attractor.name):
-            self.ends, self._findings = usable_ends(problem)
-            self._polisher = CandidatePolisher(problem, self.ends, *_start(problem, orbit))
+            self._ends, self._findings = usable_ends(problem)
+            self._polisher = CandidatePolisher(problem, self._ends, *_start(problem, orbit))
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
         self._known = set[tuple[int, bytes]]()
@@ -76,7 +76,7 @@ class Polishing:
                 for candidate in ranked:
                     self._polisher.polish(candidate)
                     advance()
-                for end in self.ends:
+                for end in self._ends:
                     self._polisher.reach(end, ranked)
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))

@@ -1,0 +1,273 @@
+"""ExitSearch: what the searches and the polishing of `LeastAction` have found of the exits of one attractor."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence, Set
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import xarray
+
+from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.analyzer import Analysis
+from vibrokit.analyzers.graph.search import GraphSolution
+from vibrokit.analyzers.path_ends import InBasin
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.closest_approach import closest_approaches
+from vibrokit.analyzers.paths.reversed_relaxation import FINDER, reversed_relaxations
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.candidate_polisher import PIECES
+from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.polishing.polish import Polishing
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
+from vibrokit.progress import stage
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Code, Finding
+from vibrokit.structure.boundaries.edges import meeting_cells
+from vibrokit.structure.orbits import Orbit
+from vibrokit.structure.orbits_inside import orbits_inside
+from vibrokit.symbolic.flow_kind import Flow
+
+if TYPE_CHECKING:
+    from vibrokit.analyzers.least_action import LeastAction
+
+_AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)  # more nodes change no other one
+_LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
+_GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
+_EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
+
+
+class ExitSearch:
+    """What was found so far of the exits of one attractor."""
+
+    def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
+        self.analyzer, self.problem = analyzer, problem
+        self.graph: GraphSolution | None = None
+        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
+        self._searched = False  # whether there are no more solutions
+        self.findings: list[Finding] = []
+
+    def run(self) -> Analysis:
+        """Search, polish and check, step by step, until the end or until the work is stopped."""
+        steps = (
+            (FINDER, self.reverse),
+            ("graph", self.search_graph),
+            ("action plot", self.shoot),
+            ("graph", self.refine_graph),
+            ("closest approach", self.approach),
+            ("graph", self.search_beginnings),
+        )
+        for doing, step in steps:
+            try:
+                step()
+            except KeyboardInterrupt as error:
+                self.findings.append(Finding.stopped(doing, error, self.problem.source))
+            if self.stopped:
+                break
+        return self.analysis()
+
+    @property
+    def stopped(self) -> bool:
+        return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
+
+    def reverse(self) -> None:
+        """Run the relaxation to an equilibrium backwards, and polish that."""
+        stepper = self.problem.single_stepper(Flow.STATE)
+        with stage(FINDER, subject=self.problem.attractor.name):
+            found = reversed_relaxations(self.problem, SegmentPropagator(self.problem.scene, stepper, max(PIECES)))
+        if found:
+            self._polish(found)
+
+    def shoot(self) -> None:
+        """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""
+        if self.analyzer.shooting is None or not self.problem.attractor.is_fixed:
+            return
+        if self.analyzer.graph is not None and not usable_ends(self.problem)[0]:
+            return
+        try:
+            found = self.analyzer.shooting.search(self.problem)
+        except (StructureError, StepperError) as error:
+            self._failed("action plot", error, only=self.analyzer.graph is None)
+        else:
+            self.findings += found.findings
+            self._polish(found.candidates)
+
+    def search_graph(self) -> None:
+        """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
+        before = self.graph
+        try:
+            for found in self._solutions:
+                self.graph = found
+                if found.last:
+                    break
+            else:
+                self._searched = True
+        except (SceneError, StructureError, StepperError) as error:
+            self._searched = True
+            self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
+        if self.graph is not None and self.graph is not before:
+            self._polish(self.graph.candidates)
+
+    def approach(self) -> None:
+        """Polish where a chaotic attractor comes nearest to a saddle, for exits that the graph gave no path to."""
+        reached = {branch.target for branch in self._polished()[0]}
+        with stage("closest approach", subject=self.problem.attractor.name):
+            found = [each for each in closest_approaches(self.problem) if each.target not in reached]
+        if found:
+            self._polish(found)
+
+    def refine_graph(self) -> None:
+        """Search the graph again until its error is as small as wanted."""
+        while not self._searched and not self.stopped:
+            if self.graph is not None and self._graph_error(self.graph) <= self.analyzer.accuracy:
+                break
+            self.search_graph()
+
+    def search_beginnings(self) -> None:
+        """Search other beginnings of the cheapest path to each attractor, and polish those."""
+        if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.is_fixed:
+            return
+        least: dict[int, ActivationEnergy] = {}
+        branches = self._polished()[0]  # the cheapest first
+        for branch in branches:
+            least.setdefault(branch.target, branch)
+        for target in sorted(least.keys() - self._unresolvable(self.graph, branches)):
+            branch = least[target]
+            with contextlib.suppress(StructureError):  # too close to the attractor for any grid
+                self._polish(self.analyzer.graph.beginnings(self.problem, branch, self.graph))
+
+    @cached_property
+    def _beyond(self) -> frozenset[int]:
+        """Labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
+
+        Paths to these pass other basins. They are no first exits, and one estimate of them is enough.
+        """
+        unled = {label for end in self.problem.path_ends if isinstance(end, InBasin) for label in end.targets}
+        if not unled:
+            return frozenset()
+        touching = {
+            label
+            for pair in meeting_cells(self.problem.structure.basins)
+            if self.problem.source in pair
+            for label in pair
+        }
+        return frozenset(unled - touching)
+
+    def _settled(self) -> Set[int]:
+        """Labels of attractors on which an accurate graph and a path agree, or for which finer grids are of no use."""
+        branches = self._polished()[0]
+        if self.graph is None:
+            return set()
+        useless = self._beyond | self._unresolvable(self.graph, branches)
+        if not self.problem.attractor.is_fixed:
+            return useless
+        estimates = self._estimates(self.graph, branches)
+        _, compared = combined(self.problem.attractor, branches, estimates)
+        agreed = {finding.target for finding in compared if finding.code is Code.AGREEMENT}
+        accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
+        return accurate & agreed | useless
+
+    def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
+        """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
+        least = {branch.target: branch.value for branch in reversed(branches)}
+        within_reach = {
+            each.target: each.numerical_error / _GAIN**graph.finer for each in self._estimates(graph, branches)
+        }
+        return {target for target, error in within_reach.items() if error > VAGUE * least.get(target, math.inf)}
+
+    def _graph_error(self, graph: GraphSolution) -> float:
+        """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
+        branches = self._polished()[0]
+        useless = self._beyond | self._unresolvable(graph, branches)
+        estimates = [each for each in self._estimates(graph, branches) if each.target not in useless]
+        _, compared = combined(self.problem.attractor, branches, estimates)
+        if any(finding.code not in _AGREED for finding in compared):
+            return math.inf
+        return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
+
+    def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
+        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
+        if not self.problem.attractor.is_fixed:
+            return graph.estimates
+        return graph.calibrated([branch for branch in branches if branch.bound is not Bound.BRACKET])
+
+    @cached_property
+    def _polishings(self) -> list[Polishing]:
+        """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
+        found = list[Polishing]()
+        for orbit in (None,) if self.problem.attractor.is_fixed else self._orbits_inside():
+            try:
+                found.append(Polishing(self.problem, orbit))
+            except (StructureError, StepperError) as error:
+                self._failed("polishing", error)
+        return found
+
+    def _polish(self, candidates: Sequence[Candidate]) -> None:
+        for polishing in self._polishings:
+            polishing.add(candidates)
+            if self.stopped:
+                break
+
+    def _polished(self) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+        """Branches and findings of all orbits."""
+        if "_polishings" not in vars(self):
+            return (), ()
+        found = [polishing.polished() for polishing in self._polishings]
+        branches = tuple(branch for each in found for branch in each.branches)
+        findings = tuple(finding for each in found for finding in each.findings)
+        return branches if self.problem.attractor.is_fixed else _once(branches), findings
+
+    def analysis(self) -> Analysis:
+        """Combine what was found."""
+        branches, polished = self._polished()
+        estimates = () if self.graph is None else self._estimates(self.graph, branches)
+        energies, compared = combined(self.problem.attractor, branches, estimates)
+        every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
+        findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
+        findings += compared
+        if not energies and not self.stopped:
+            findings.append(Finding.of(Code.NO_EXIT_FOUND, self.problem.source))
+        return Analysis(
+            energies,
+            xarray.Dataset() if self.graph is None else self.graph.dataset(),
+            tuple(finding for number, finding in enumerate(findings) if finding not in findings[:number]),
+            branches,
+            complete=not self.stopped,
+        )
+
+    def _failed(self, method: str, error: VibrokitError, *, only: bool = False) -> None:
+        """Note that a method could not be used; raise its error again if it is the only search."""
+        if only:
+            raise error
+        reason = str(error)
+        self.findings.append(Finding.of(Code.METHOD_FAILED, self.problem.source, method=method, reason=reason))
+
+    def _orbits_inside(self) -> tuple[Orbit, ...]:
+        problem, attractor = self.problem, self.problem.attractor
+        if attractor.kind != "chaotic":
+            self.findings.append(Finding.of(Code.GRAPH_ONLY_SOURCE, problem.source, kind=attractor.kind))
+            return ()
+        stepper = problem.single_stepper(Flow.STATE_VARIATIONAL)
+        with stage("orbits inside the attractor"):
+            found = orbits_inside(problem.scene, attractor.points, stepper, self.analyzer.orbits, _LONGEST_ORBIT)
+        periods = [orbit.period for orbit in found]
+        self.findings.append(
+            Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods)
+        )  # fmt: skip
+        return found
+
+
+def _once(branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
+    """The branches, the cheapest first; of those that differ only in the orbit that they start on, the cheapest."""
+    kept: list[ActivationEnergy] = []
+    for branch in sorted(branches, key=lambda branch: branch.value):
+        if not any(
+            (branch.target, branch.saddle) == (other.target, other.saddle)
+            and branch.value <= (1 + _EQUAL) * other.value
+            for other in kept
+        ):
+            kept.append(branch)
+    return tuple(kept)
