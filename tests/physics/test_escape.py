@@ -40,6 +40,7 @@ def test_the_only_well_is_left_by_escape():
     assert energy.value == pytest.approx(4 * DAMPING / 6, rel=1e-9)  # the barrier of x²/2 − x³/3
     assert energy.lower < 4 * DAMPING / 6 < energy.upper * (1 + 1e-12)
     assert (energy.target, result.exit_of(energy)) == (ESCAPED, "rest → escape")
+    assert result.energy("rest", "escape") is energy
 
 
 def test_shots_find_the_escape():

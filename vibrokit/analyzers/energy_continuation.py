@@ -19,6 +19,7 @@ from vibrokit.progress import Progress, Work, advance, stage, working
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation
 from vibrokit.results.finding import Code, Finding
+from vibrokit.results.labels import goal_name
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import followed_parameter, ordered_values
@@ -194,8 +195,8 @@ class _Run:
             return
         if any(place in curve.paths and path.is_same(curve.paths[place]) for curve in self.curves):
             return
-        names = (*problem.structure.names, "exit")  # an exit that is no attractor has the label −1
-        curve = _Curve(names[branch.source], names[branch.target])
+        names = problem.structure.names
+        curve = _Curve(names[branch.source], goal_name(names, branch.target))
         self.curves.append(curve)
         self._keep(curve, place, path)
         for direction in (1, -1) if follow else ():

@@ -30,7 +30,7 @@ class EnergyBranch:
     Attributes
     ----------
     source, target : str
-        Names of the attractors between which it leads, ``"exit"`` for a target that is no attractor.
+        Names of the attractors between which it leads, ``"exit"`` or ``"escape"`` for a target that is no attractor.
     action : array (values,)
         In m² s⁻³.
     error : array (values,)

@@ -9,6 +9,9 @@ from typing import Any
 from vibrokit.errors import StructureError, nearest, shown
 from vibrokit.results.basins import ESCAPED
 
+OUTSIDE = {-1: "exit", ESCAPED: "escape"}
+"""Names of exits that lead to no attractor, by the label that stands for the goal."""
+
 
 def exit_between(names: Sequence[str], source: int, target: int) -> str:
     """Return the names of the attractors between which an exit leads, such as ``"hammering → clear"``.
@@ -16,8 +19,17 @@ def exit_between(names: Sequence[str], source: int, target: int) -> str:
     The goal is ``"escape"`` for motion that leaves the region for good, and ``"exit"`` for another end that is no
     attractor.
     """
-    goal = names[target] if target >= 0 else "escape" if target == ESCAPED else "exit"
-    return f"{names[source]} → {goal}"
+    return f"{names[source]} → {goal_name(names, target)}"
+
+
+def goal_name(names: Sequence[str], target: int) -> str:
+    """Return the name of what an exit leads to."""
+    return names[target] if target >= 0 else OUTSIDE[target]
+
+
+def goal_of(which: Any, names: Sequence[str]) -> int:
+    """Return the label of what an exit leads to: of an attractor, as `label_of`, or −1 for "exit", −2 for "escape"."""
+    return next((label for label, name in OUTSIDE.items() if which in (label, name)), None) or label_of(which, names)
 
 
 def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:

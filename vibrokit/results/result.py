@@ -15,7 +15,7 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
 from vibrokit.results.energy import ActivationEnergy, ExitPath, energy_variables, read_energies
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.labels import label_of, source_among
+from vibrokit.results.labels import exit_between, goal_of, label_of, source_among
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
@@ -99,7 +99,8 @@ class Result(Record):
         ----------
         source : int or str
         target : int or str, optional
-            By default the exit of least energy.
+            ``"escape"`` for motion that leaves the region for good, ``"exit"`` for another end that is no attractor; by
+            default the exit of least energy.
 
         Raises
         ------
@@ -107,12 +108,12 @@ class Result(Record):
             There is no such attractor, or no energy is known for this exit.
         """
         start = label_of(source, self.names)
-        end = -1 if target in (-1, "exit") else None if target is None else label_of(target, self.names)
+        end = None if target is None else goal_of(target, self.names)
         found = [e for e in self.energies if e.source == start and end in (None, e.target)]
         if not found:
             known = ", ".join(self.exit_of(e) for e in self.energies) or "none"
-            goal = "" if end is None else f" → {self.names[end] if end >= 0 else 'exit'}"
-            raise StructureError(f"there is no energy of {self.names[start]}{goal}; the result has {known}.")
+            wanted = self.names[start] if end is None else exit_between(self.names, start, end)
+            raise StructureError(f"there is no energy of {wanted}; the result has {known}.")
         return min(found, key=lambda energy: energy.value)
 
     def exit_of(self, energy: ActivationEnergy | ExitRate) -> str:
