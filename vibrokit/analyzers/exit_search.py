@@ -14,9 +14,8 @@ from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.search import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
+from vibrokit.analyzers.paths import closest_approach, reversed_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.closest_approach import closest_approaches
-from vibrokit.analyzers.paths.reversed_relaxation import FINDER, reversed_relaxations
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import PIECES
 from vibrokit.analyzers.polishing.ends import usable_ends
@@ -53,11 +52,11 @@ class ExitSearch:
     def run(self) -> Analysis:
         """Search, polish and check, step by step, until the end or until the work is stopped."""
         steps = (
-            (FINDER, self.reverse),
+            (reversed_relaxation.FINDER, self.reverse),
             ("graph", self.search_graph),
             ("action plot", self.shoot),
             ("graph", self.refine_graph),
-            ("closest approach", self.approach),
+            (closest_approach.FINDER, self.approach),
             ("graph", self.search_beginnings),
         )
         for doing, step in steps:
@@ -76,8 +75,9 @@ class ExitSearch:
     def reverse(self) -> None:
         """Run the relaxation to an equilibrium backwards, and polish that."""
         stepper = self.problem.single_stepper(Flow.STATE)
-        with stage(FINDER, subject=self.problem.attractor.name):
-            found = reversed_relaxations(self.problem, SegmentPropagator(self.problem.scene, stepper, max(PIECES)))
+        with stage(reversed_relaxation.FINDER, subject=self.problem.attractor.name):
+            propagator = SegmentPropagator(self.problem.scene, stepper, max(PIECES))
+            found = reversed_relaxation.reversed_relaxations(self.problem, propagator)
         if found:
             self._polish(found)
 
@@ -114,8 +114,8 @@ class ExitSearch:
     def approach(self) -> None:
         """Polish where a chaotic attractor comes nearest to a saddle, for exits that the graph gave no path to."""
         reached = {branch.target for branch in self._polished()[0]}
-        with stage("closest approach", subject=self.problem.attractor.name):
-            found = [each for each in closest_approaches(self.problem) if each.target not in reached]
+        with stage(closest_approach.FINDER, subject=self.problem.attractor.name):
+            found = [each for each in closest_approach.closest_approaches(self.problem) if each.target not in reached]
         if found:
             self._polish(found)
 
@@ -130,14 +130,11 @@ class ExitSearch:
         """Search other beginnings of the cheapest path to each attractor, and polish those."""
         if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.is_fixed:
             return
-        least: dict[int, ActivationEnergy] = {}
-        branches = self._polished()[0]  # the cheapest first
-        for branch in branches:
-            least.setdefault(branch.target, branch)
+        branches = self._polished()[0]
+        least = _least(branches)
         for target in sorted(least.keys() - self._unresolvable(self.graph, branches)):
-            branch = least[target]
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
-                self._polish(self.analyzer.graph.beginnings(self.problem, branch, self.graph))
+                self._polish(self.analyzer.graph.beginnings(self.problem, least[target], self.graph))
 
     @cached_property
     def _beyond(self) -> frozenset[int]:
@@ -172,11 +169,12 @@ class ExitSearch:
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
-        least = {branch.target: branch.value for branch in reversed(branches)}
-        within_reach = {
-            each.target: each.numerical_error / _GAIN**graph.finer for each in self._estimates(graph, branches)
+        least, gain = _least(branches), _GAIN**graph.finer
+        return {
+            each.target
+            for each in self._estimates(graph, branches)
+            if each.target in least and each.numerical_error / gain > VAGUE * least[each.target].value
         }
-        return {target for target, error in within_reach.items() if error > VAGUE * least.get(target, math.inf)}
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
@@ -258,6 +256,11 @@ class ExitSearch:
             Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods)
         )  # fmt: skip
         return found
+
+
+def _least(branches: Sequence[ActivationEnergy]) -> dict[int, ActivationEnergy]:
+    """The cheapest branch to each target; the branches are sorted, the cheapest first."""
+    return {branch.target: branch for branch in reversed(branches)}
 
 
 def _once(branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:

@@ -12,6 +12,7 @@ from vibrokit.progress import Stats
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding, Severity
+from vibrokit.results.labels import goal_name
 from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -77,8 +78,9 @@ def saddle_table(structure: Structure) -> str:
         return ""
     rows = [("saddle", "between", "kind", "period", "multipliers", "at (x, v)")]
     for number, s in enumerate(structure.saddles):
-        outside = {ESCAPED: "escape"}
-        sides = " | ".join(structure.names[label] if label >= 0 else outside.get(label, "–") for label in s.leads_to)
+        sides = " | ".join(
+            goal_name(structure.names, label) if label >= 0 or label == ESCAPED else "–" for label in s.leads_to
+        )
         kind = f"{s.kind}, in a chaotic set" if s.embedded else s.kind
         sizes = ", ".join(f"{m.real:.6g}" if m.imag == 0 else f"{m:.4g}" for m in s.multipliers[:2])
         rows.append((str(number), sides, kind, str(s.period), sizes, _place(s.points, 10)))

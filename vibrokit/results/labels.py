@@ -29,7 +29,10 @@ def goal_name(names: Sequence[str], target: int) -> str:
 
 def goal_of(which: Any, names: Sequence[str]) -> int:
     """Return the label of what an exit leads to: of an attractor, as `label_of`, or −1 for "exit", −2 for "escape"."""
-    return next((label for label, name in OUTSIDE.items() if which in (label, name)), None) or label_of(which, names)
+    for label, name in OUTSIDE.items():
+        if which in (label, name):
+            return label
+    return label_of(which, names)
 
 
 def label_of(which: Any, names: Sequence[str], what: str = "attractor") -> int:

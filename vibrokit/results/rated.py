@@ -13,7 +13,7 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.labels import exit_between, label_of, source_among
+from vibrokit.results.labels import exit_between, goal_of, source_among
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class RatedResult(Result):
         label = source_among({rate.source for rate in self.rates}, source, self.names, "rate", "of")
         own = [rate for rate in self.rates if rate.source == label]
         reached = sorted({rate.target for rate in own})
-        wanted = reached[0] if target is None else label_of(target, self.names) if target != -1 else -1
+        wanted = reached[0] if target is None else goal_of(target, self.names)
         if wanted not in reached:
             known = ", ".join(exit_between(self.names, label, one) for one in reached)
             raise StructureError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -222,7 +223,7 @@ class _Finder:
         found = sorted(kept, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
         self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
 
-    @property
+    @cached_property
     def frame(self) -> Region:
         """Region of the basin grid."""
         return self.region or frame_of(self.osc, self.search.attractors)

@@ -80,10 +80,7 @@ def shape_stability(
     check_means(osc, stepper, executor)
     check_belongs(osc, structure)
     phases, directions = whole("phases", phases, 1, _MOST), whole("directions", directions, 4, _MOST)
-    classifier = BasinClassifier(
-        osc, structure.attractors, structure.basins.region, structure.settling, structure.budget,
-        stepper or named_stepper(structure.stepper), executor,
-    )  # fmt: skip
+    classifier = BasinClassifier.of(osc, structure, stepper or named_stepper(structure.stepper), executor)
     angles = 2 * np.pi * (np.arange(directions) + 0.5) / directions
     searches = {"velocity_kick": (np.array([0.5, 1.5]) * np.pi, 0.0), "any_kick": (angles, 2 * np.pi / directions)}
     found = []

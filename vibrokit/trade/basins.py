@@ -95,9 +95,7 @@ def _labelled(
     osc: Oscillator, structure: Structure, stepper: Stepper, cells: tuple[int, int], margin: int | None
 ) -> tuple[NDArray[np.int16], float]:
     """Labels of a grid and the time per cell (s); a small grid is run before, so that compilation is not timed."""
-    classifier = BasinClassifier(
-        osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper
-    )
+    classifier = BasinClassifier.of(osc, structure, stepper)
     classify_grid(classifier, (2, 2), margin=margin)
     began = time.perf_counter()
     labels = classify_grid(classifier, cells, margin=margin).labels

@@ -29,17 +29,16 @@ def closest_approaches(problem: ExitProblem) -> list[Candidate]:
     if attractor.kind != "chaotic" or osc.autonomous or attractor.points.shape[1] > 2:
         return []
     stepper, best = problem.ensemble_stepper(Flow.LINEARISED), dict[int, Candidate]()
+    own = [end for end in problem.path_ends if isinstance(end, AtSaddle) and end.on_own_boundary]
     for acting in _ACTING:
         starts = attractor.points[_BEFORE:-acting]
         reached = gaussian_map(osc, starts, stepper, intervals=acting)
-        for end in problem.path_ends:
-            if not isinstance(end, AtSaddle) or not end.on_own_boundary:
-                continue
+        for end in own:
             saddle = problem.structure.saddles[end.number]
-            if not saddle.period:
+            if not saddle.period:  # a chaotic set; the orbits inside it are ends of their own
                 continue
             costs = _costs(saddle.points, reached.images, reached.covariances)
-            place, goal = np.unravel_index(int(np.nanargmin(costs)), costs.shape)
+            place, goal = np.unravel_index(int(np.argmin(costs)), costs.shape)
             known = best.get(end.number)
             if known is None or costs[place, goal] < known.action:
                 states = np.vstack([attractor.points[place : place + _BEFORE + acting], saddle.points[goal]])

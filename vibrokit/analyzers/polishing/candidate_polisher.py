@@ -93,7 +93,7 @@ class CandidatePolisher:
             ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
             for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
                 if not self._is_wanted(end, candidate):
-                    solved = True  # as far as it is going to be
+                    solved = True  # no failure of this candidate
                     continue
                 try:
                     self._add(self._solve(end, candidate, way))
@@ -117,7 +117,7 @@ class CandidatePolisher:
             return
         near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
         for candidate in itertools.chain(near, ranked[:1]):
-            if self._failures[end] >= _MOST_FAILURES:
+            if not self._is_wanted(end, candidate):
                 return
             try:
                 return self._add(self._solve(end, candidate))

@@ -111,11 +111,7 @@ class Shooter:
 
     @cached_property
     def _classifier(self) -> BasinClassifier:
-        known = self.problem.structure
-        return BasinClassifier(
-            self.problem.osc, known.attractors, known.basins.region, known.settling, known.budget, self.stepper,
-            shift=known.shift,
-        )  # fmt: skip
+        return BasinClassifier.of(self.problem.osc, self.problem.structure, self.stepper)
 
     @cached_property
     def _stop(self) -> Stop:

@@ -19,6 +19,7 @@ from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.stop_cells import AttractorMask, core_of, is_extended, mask_of
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
@@ -73,6 +74,20 @@ class BasinClassifier:
     executor: concurrent.futures.Executor | None = None
     core: Basins | None = None
     shift: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        osc: Oscillator,
+        structure: Structure,
+        stepper: Stepper,
+        executor: concurrent.futures.Executor | None = None,
+    ) -> BasinClassifier:
+        """Return the classifier with the attractors, the region and the budget of a structure."""
+        return cls(
+            osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper, executor,
+            shift=structure.shift,
+        )  # fmt: skip
 
     def labels(self, states: Array, start_time: float = 0.0) -> Whole:
         """Return the label of the attractor that each state (count, n), at a start time (s), leads to.
