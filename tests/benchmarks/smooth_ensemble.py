@@ -1,4 +1,4 @@
-"""Smooth ensembles: RK8 and RK4 against heyoka's batch integrator, one thread each, at the same error.
+"""Smooth ensembles: RKN12, RK8 and RK4 against heyoka's batch integrator, one thread each, at the same error.
 
     python tests/benchmarks/smooth_ensemble.py [--rounds 5] [--trajectories 8192] [--periods 20]
 
@@ -93,6 +93,10 @@ def race(flow, given, one_thread):
         "RK8": [
             (f"{steps} steps", functools.partial(ours, vk.RK8(steps)))
             for steps in (8, 12, 16, 20, 24, 28, 32, 40, 48, 56, 64, 72, 80, 96)
+        ],
+        "RKN12": [
+            (f"{steps} steps", functools.partial(ours, vk.RKN12(steps)))
+            for steps in (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20)
         ],
     }  # fmt: skip
     settled = np.isfinite(reference).all(axis=1)

@@ -108,7 +108,7 @@ def write_source(scene: Scene, flow: Flow, stepper: Emitter) -> str:
     bends = text.breaks and flow is Flow.HAMILTONIAN_VARIATIONAL
     conditions = {"forced": text.forced, "unforced": not text.forced, "noisy": flow is Flow.NOISY}
     conditions |= {"breaking": text.breaks, "unbroken": not text.breaks, "bending": bends, "unbent": not bends}
-    conditions["staged"] = stepper.staged
+    conditions |= {"staged": stepper.staged, "scaled": stepper.scaled}
     pieces = [text.preamble, imports, *stepper.scene_part(text), _fitting(body, conditions)]
     return _with_needed_imports("\n\n".join(piece.strip("\n") + "\n" for piece in pieces if piece))
 

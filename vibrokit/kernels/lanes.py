@@ -32,7 +32,7 @@ def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
     # Few enough lanes that their numbers stay in the nearest cache.
     lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
-    head = _sizes(lanes, len(_CLASSICAL_NODES))
+    head = sizes(lanes, len(_CLASSICAL_NODES))
     return [head, tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope, _unrolled(text)]
 
 
@@ -40,10 +40,10 @@ def staged_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
     lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
     nodes = tuple(float(node) for node in NODES)
-    return [f"{_sizes(lanes, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
+    return [f"{sizes(lanes, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
 
 
-def _sizes(lanes: int, nodes: int) -> str:
+def sizes(lanes: int, nodes: int) -> str:
     """Lanes of a block, and values of the forcing in a step."""
     return f"{_REGISTERS}\n\nLANES = {lanes}\nNODES = {nodes}\n"
 

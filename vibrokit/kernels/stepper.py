@@ -26,6 +26,7 @@ class Emitter(ABC):
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
     staged: ClassVar[bool] = False  # whether a step keeps the slopes of its stages
+    scaled: ClassVar[bool] = False  # whether factors of its stages are computed beforehand
 
     @abstractmethod
     def scene_part(self, text: SceneText) -> list[str]:

@@ -10,7 +10,7 @@ Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the
 it drives, Milstein's term makes it strong order 1.
 
 Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows, those marked "staged" only for
-steps that keep the slopes of their stages.
+steps that keep the slopes of their stages, and those marked "scaled" only for steps with factors of their stages.
 """
 
 import numpy as np
@@ -20,10 +20,12 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_sta
 from vibrokit.kernels.templates.scene import (
     CONTRACTED,
     EQUATIONS,
+    KINDS,
     LANES,
     NODES,
     STAGES,
     draw_lanes,
+    scale,
     step_lanes,
     tabulate,
 )
@@ -66,6 +68,8 @@ def advance(
     z = np.zeros((EQUATIONS, LANES))
     slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
     point = np.zeros((EQUATIONS, LANES))  # staged
+    factors = np.zeros((KINDS, STAGES + 2, 4))  # scaled
+    scale(theta, h, factors)  # scaled
     before = np.zeros((EQUATIONS, LANES))
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
@@ -115,6 +119,7 @@ def advance(
                 slopes,  # staged
                 point,  # staged
                 table[row, step],  # forced
+                factors,  # scaled
                 first,  # noisy
                 second,  # noisy
                 theta,
@@ -177,6 +182,8 @@ def record(
     z = np.zeros((EQUATIONS, LANES))
     slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
     point = np.zeros((EQUATIONS, LANES))  # staged
+    factors = np.zeros((KINDS, STAGES + 2, 4))  # scaled
+    scale(theta, h, factors)  # scaled
     table = np.zeros((steps, NODES))  # forced
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
     first = np.zeros(LANES)  # noisy
@@ -198,6 +205,7 @@ def record(
                 slopes,  # staged
                 point,  # staged
                 table[step],  # forced
+                factors,  # scaled
                 first,  # noisy
                 second,  # noisy
                 theta,
