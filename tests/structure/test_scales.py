@@ -11,7 +11,8 @@ from vibrokit.kernels.choice import single_stepper
 from vibrokit.parts.functions import cos, sin, tanh
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import refine_equilibrium
-from vibrokit.structure.scales import frame_of, length_of, search_region
+from vibrokit.structure.regions import frame_of, search_region
+from vibrokit.structure.scales import length_of
 from vibrokit.symbolic.flow_kind import Flow
 
 

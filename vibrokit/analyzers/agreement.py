@@ -45,7 +45,7 @@ def _of_target(
         code, energy = Code.NO_POLISHED_PATH, graph
     elif graph is None:
         code, energy = Code.NOT_SEARCHED, path
-    elif not attractor.is_fixed or path.bound is Bound.BRACKET:
+    elif not attractor.repeats or path.bound is Bound.BRACKET:
         code, energy = Code.BRACKET, _bracket(path, graph)
     else:
         code, energy = _compared(path, graph)

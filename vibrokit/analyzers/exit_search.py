@@ -128,7 +128,7 @@ class ExitSearch:
 
     def search_beginnings(self) -> None:
         """Search other beginnings of the cheapest path to each attractor, and polish those."""
-        if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.is_fixed:
+        if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.repeats:
             return
         branches = self._polished()[0]
         least = _least(branches)
@@ -159,7 +159,7 @@ class ExitSearch:
         if self.graph is None:
             return set()
         useless = self._beyond | self._unresolvable(self.graph, branches)
-        if not self.problem.attractor.is_fixed:
+        if not self.problem.attractor.repeats:
             return useless
         estimates = self._estimates(self.graph, branches)
         _, compared = combined(self.problem.attractor, branches, estimates)
@@ -188,7 +188,7 @@ class ExitSearch:
 
     def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
-        if not self.problem.attractor.is_fixed:
+        if not self.problem.attractor.repeats:
             return graph.estimates
         return graph.calibrated([branch for branch in branches if branch.bound is not Bound.BRACKET])
 
@@ -196,7 +196,7 @@ class ExitSearch:
     def _polishings(self) -> list[Polishing]:
         """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
         found = list[Polishing]()
-        for orbit in (None,) if self.problem.attractor.is_fixed else self._orbits_inside():
+        for orbit in (None,) if self.problem.attractor.repeats else self._orbits_inside():
             try:
                 found.append(Polishing(self.problem, orbit))
             except (StructureError, StepperError) as error:
@@ -216,7 +216,7 @@ class ExitSearch:
         found = [polishing.polished() for polishing in self._polishings]
         branches = tuple(branch for each in found for branch in each.branches)
         findings = tuple(finding for each in found for finding in each.findings)
-        return branches if self.problem.attractor.is_fixed else _once(branches), findings
+        return branches if self.problem.attractor.repeats else _once(branches), findings
 
     def analysis(self) -> Analysis:
         """Combine what was found."""

@@ -29,7 +29,7 @@ from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import followed_parameter, ordered_values
-from vibrokit.structure.scales import frame_of
+from vibrokit.structure.regions import frame_of
 from vibrokit.structure.tracing.branches import (
     Tracing,
     bifurcations_of,

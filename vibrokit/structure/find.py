@@ -30,14 +30,8 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
-from vibrokit.structure.scales import (
-    frame_of,
-    lies_in,
-    search_region,
-    states_at,
-    with_barrier_tops,
-    without_copies,
-)
+from vibrokit.structure.regions import frame_of, lies_in, search_region, with_barrier_tops, without_copies
+from vibrokit.structure.scales import states_at
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow

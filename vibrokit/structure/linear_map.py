@@ -85,13 +85,14 @@ def gaussian_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: in
 
 
 def gaussian_pieces(
-    osc: Oscillator, point: Array, stepper: Stepper, pieces: int, count: int
+    osc: Oscillator, point: Array, stepper: Stepper, pieces: int, count: int, turn: float | None = None
 ) -> tuple[Array, GaussianMap]:
-    """Linearize along the trajectory from a point of the section, in `count` pieces, `pieces` to a section interval.
+    """Linearize along the trajectory from a point of the section, in `count` pieces, `pieces` to a turn.
 
-    Returns the nodes (count + 1, n), where the pieces begin and the last one ends, and the map of each piece.
+    A turn (s) is a section interval, and may be another time without forcing. Returns the nodes (count + 1, n), where
+    the pieces begin and the last one ends, and the map of each piece.
     """
-    interval = osc.section_interval / pieces
+    interval = (turn or osc.section_interval) / pieces
     nodes, parts = [point], list[GaussianMap]()
     for number in range(count):
         begin = number % pieces * interval

@@ -23,7 +23,8 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, section_equations, visited
-from vibrokit.structure.scales import search_region, states_at, units_of
+from vibrokit.structure.regions import search_region
+from vibrokit.structure.scales import states_at, units_of
 from vibrokit.structure.validation import check_means, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 

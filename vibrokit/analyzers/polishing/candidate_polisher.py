@@ -15,7 +15,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate, resampled
 from vibrokit.analyzers.polishing.ends import ending_at
-from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
+from vibrokit.analyzers.polishing.linearized_cycle import linearized_orbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath
 from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.problem import ExitProblem
@@ -23,6 +23,7 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.finding import Code, Finding
+from vibrokit.structure.orbits import Orbit
 from vibrokit.symbolic.flow_kind import Flow
 
 WORTH = 1.25
@@ -64,15 +65,16 @@ class Solved:
 
 
 class CandidatePolisher:
-    """Polishes candidates that leave one orbit, and keeps each path once.
+    """Polishes candidates that leave one orbit, by default the attractor itself, and keeps each path once.
 
-    Raises StructureError if the orbit is not hyperbolic.
+    Raises StructureError if the orbit is not hyperbolic, or if the attractor is none and no other is given.
     """
 
-    def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], point: np.ndarray, period: int) -> None:
+    def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], orbit: Orbit | None = None) -> None:
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
         propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in PIECES}
-        source = functools.cache(lambda pieces: linearized_orbit(propagators[pieces], point, period))
+        left = _left(problem, orbit)
+        source = functools.cache(lambda pieces: linearized_orbit(propagators[pieces], *left))
         source(PIECES[0])
         self.problem, self.ends = problem, ends
         self.solved: list[Solved] = []
@@ -194,6 +196,19 @@ class CandidatePolisher:
                 candidate, times=path.t[inside], states=path.q[inside], momenta=path.p[inside]
             )  # fmt: skip
         raise StructureError(f"after {_ROUNDS} cuts where it has already left, the path still leaves before its end.")
+
+
+def _left(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int, float]:
+    """A point of the orbit that paths leave, its period and its duration."""
+    if orbit is not None:
+        return orbit.point, orbit.period, orbit.duration
+    attractor = problem.attractor
+    if not attractor.repeats:
+        raise StructureError(
+            f"{attractor.name} is {attractor.kind}, and paths are polished from an orbit, an equilibrium or a limit "
+            "cycle; give an unstable orbit inside it."
+        )
+    return attractor.points[0], attractor.period, attractor.duration
 
 
 def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:

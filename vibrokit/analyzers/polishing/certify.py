@@ -9,9 +9,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.linearized_orbit import linearized_orbit
-from vibrokit.analyzers.polishing.newton import ACCEPTED, ExtremalPath, extremal_path
-from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, ROUGHLY_ACCEPTED, solved_again
+from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
 from vibrokit.results.energy import Certificate
 
 _FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows
@@ -24,10 +23,8 @@ def certify(propagator: SegmentPropagator, found: ExtremalPath) -> Certificate:
 
     Raises StructureError if one of these has no solution nearby.
     """
-    # In a family, no shift makes up for the larger error of a linearized start from farther away.
-    accepted = ROUGHLY_ACCEPTED if found.flat else ACCEPTED
-    nearer = solved_again(propagator, found, -_dropped(found), 0, accepted)
-    before, after = len(found.source.states), found.ending.period_nodes
+    nearer = solved_again(propagator, found, -_dropped(found), 0, found.accepted(_FARTHER))
+    before, after = found.source.period_nodes, found.ending.period_nodes
     longer = solved_again(propagator, found, MORE_PERIODS * before, MORE_PERIODS * after)
     tighter = _tightened(propagator, found)
     return Certificate(
@@ -45,18 +42,16 @@ def certify(propagator: SegmentPropagator, found: ExtremalPath) -> Certificate:
 def _dropped(found: ExtremalPath) -> int:
     """Nodes to drop for a start ten times as far; for one on the orbit, two periods, or half of the path."""
     if found.source.start_on_orbit:
-        return min(MORE_PERIODS * len(found.source.states), len(found.points) // 2)
+        return min(MORE_PERIODS * found.source.period_nodes, len(found.points) // 2)
     distances = found.distances
     away = np.flatnonzero(distances[:-1] >= _FARTHER * distances[0])
     return int(away[0]) if away.size else 0
 
 
 def _tightened(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
-    finer, orbit = dataclasses.replace(propagator, stepper=propagator.stepper.refined()), found.source
-    source = linearized_orbit(finer, orbit.states[0], len(orbit.states) // finer.pieces)
-    if orbit.start_on_orbit:
-        source = source.with_start_on_orbit()
-    return extremal_path(finer, source, found.first, found.ending.carried_by(finer), found.points, found.last)
+    finer = dataclasses.replace(propagator, stepper=propagator.stepper.refined())
+    source, ending = found.source.again(finer), found.ending.carried_by(finer)
+    return extremal_path(finer, source, found.first, ending, found.points, found.last)
 
 
 def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:
@@ -68,7 +63,7 @@ def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:
     """
     scale, n = found.scale, propagator.size
     slopes = found.slopes * scale / scale[:, None]
-    leaving = [_orthonormal(found.source.unstable[found.source.node(found.first)] / scale[:, None])]
+    leaving = [_orthonormal(found.source.unstable_at(found.first) / scale[:, None])]
     for slope in slopes:
         leaving.append(_orthonormal(slope @ leaving[-1]))
     reaching = [_orthonormal(_tangents(propagator, found))]

@@ -87,6 +87,10 @@ class Ending(ABC):
     def carried_by(self, propagator: SegmentPropagator) -> Self:
         """Return the same ending, prepared with another propagator."""
 
+    def through(self, point: Array) -> Self:
+        """Return the ending at an orbit so shifted in time, if it may be, that it is nearest to a last point (2n,)."""
+        return self
+
     def moved_to(self, end: PathEnd) -> Self:
         """Return the ending for the same end of a scene with another parameter."""
         return self

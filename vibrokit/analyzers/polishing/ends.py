@@ -13,7 +13,8 @@ from vibrokit.analyzers.path_ends import AtFace, AtSaddle, PathEnd
 from vibrokit.analyzers.paths.action_descent import Closing
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, linearized_orbit, normals_of
+from vibrokit.analyzers.polishing.linearized_cycle import linearized_orbit
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.finding import Code, Finding
@@ -23,7 +24,6 @@ _SHORT = 1e-4  # of a piece: time over which ∂H/∂t is taken
 _SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
 _MOST_ADDED = 40  # section intervals
 _CHAOTIC = "chaotic"
-_NEUTRAL = 1e-6  # distance of a multiplier from 1: that of a shift along a limit cycle is 1
 
 Array = NDArray[np.float64]
 
@@ -153,37 +153,40 @@ class SaddleEnding(Ending):
 
     def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
         """Cut where the candidate, on the section, is closest to the orbit, and stay on the orbit from there."""
-        _, node, phase = self._closest(candidate)
-        pieces = self.propagator.pieces
-        periods = math.ceil(_SETTLING / (self.orbit.slowest_rate * pieces))
+        _, node, place = self._closest(candidate)
+        (orbit, phase), pieces = self.orbit.starting(place), self.propagator.pieces
+        periods = math.ceil(_SETTLING / (orbit.slowest_rate * pieces))
         added = min(max(2, periods), _MOST_ADDED) * pieces
-        states = np.concatenate([candidate.all_states[: node + 1], self.orbit.along(phase + 1, added)])
-        ending, momenta = dataclasses.replace(self, phase=phase + added), candidate.momenta_of(node + 1, len(states))
+        states = np.concatenate([candidate.all_states[: node + 1], orbit.along(phase + 1, added)])
+        ending = dataclasses.replace(self, orbit=orbit, phase=phase + added)
+        momenta = candidate.momenta_of(node + 1, len(states))
         return [Cut(states, ending, self.propagator.piece, momenta)]
 
     def misfit(self, point: Array, time: float, scale: Array) -> Array:
-        return self._normals(scale) @ ((point - self._point) / scale)
+        return self.orbit.misfit(point, self.phase, scale, leaving=False)
 
     def derivatives(self, point: Array, time: float, scale: Array) -> tuple[Array, Array]:
-        normals = self._normals(scale)
-        return normals, np.zeros((len(normals), 0))
+        in_point = self.orbit.misfit_derivatives(point, self.phase, scale, leaving=False)
+        return in_point, np.zeros((len(in_point), 0))
 
     def carried_by(self, propagator: SegmentPropagator) -> Self:
-        again = linearized_orbit(propagator, self.orbit.states[0], self.period_nodes // propagator.pieces)
-        return dataclasses.replace(self, propagator=propagator, orbit=again)
+        return dataclasses.replace(self, propagator=propagator, orbit=self.orbit.again(propagator))
+
+    def through(self, point: Array) -> Self:
+        return dataclasses.replace(self, orbit=self.orbit.through(point, self.phase, leaving=False))
 
     @property
     def period_nodes(self) -> int:
-        return len(self.orbit.states)
+        return self.orbit.period_nodes
 
     @property
     def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:
-        return ((self.orbit, self.orbit.node(self.phase)),)
+        return ((self.orbit, self.phase),)
 
     @property
     def closing(self) -> Closing:
         n = self.propagator.size
-        basis = self.orbit.stable[self.orbit.node(self.phase)]
+        basis = self.orbit.stable_at(self.phase)
         form = -np.linalg.solve(basis[:n].T, basis[n:].T).T
         return self._point[:n], (form + form.T) / 2
 
@@ -207,19 +210,13 @@ class SaddleEnding(Ending):
     def _point(self) -> Array:
         return self.orbit.point(self.phase)
 
-    def _normals(self, scale: Array) -> Array:
-        return normals_of(self.orbit.stable[self.orbit.node(self.phase)], scale)
-
-    def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, int]:
-        """Distance, node of the candidate, and phase of the orbit."""
+    def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, float]:
+        """Distance, node of the candidate, and place on the orbit."""
         states, grain = candidate.all_states, self.propagator.grain
         nodes = np.arange(grain, len(states), grain)
-        phases = np.arange(0, self.period_nodes, self.propagator.pieces)
-        offsets = (states[nodes][:, None] - self.orbit.states[phases]) / self.propagator.units
-        distances = np.linalg.norm(offsets, axis=2)
-        distances = np.where(np.isfinite(distances), distances, np.inf)
-        node, phase = np.unravel_index(int(np.argmin(distances)), distances.shape)
-        return float(distances[node, phase]), int(nodes[node]), int(phases[phase])
+        distances, places = self.orbit.nearest(states[nodes])
+        nearest = int(np.argmin(distances))
+        return float(distances[nearest]), int(nodes[nearest]), float(places[nearest])
 
 
 def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
@@ -252,10 +249,7 @@ def obstacle(end: PathEnd, problem: ExitProblem) -> str:
     if not isinstance(end, AtSaddle):
         return "of a kind without conditions"
     saddle = problem.structure.saddles[end.number]
-    if saddle.kind == _CHAOTIC:
-        return _CHAOTIC
-    neutral = bool(np.any(np.abs(np.abs(saddle.multipliers) - 1) < _NEUTRAL))
-    return "a limit cycle" if saddle.period == 1 and saddle.duration > 0 and neutral else ""
+    return _CHAOTIC if saddle.kind == _CHAOTIC else ""
 
 
 def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
@@ -263,4 +257,5 @@ def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator)
     if isinstance(end, AtFace):
         return FaceEnding(propagator, end)
     saddle = problem.structure.saddles[end.saddle]
-    return SaddleEnding(propagator, linearized_orbit(propagator, saddle.points[0], max(1, saddle.period)))
+    orbit = linearized_orbit(propagator, saddle.points[0], saddle.period, saddle.duration)
+    return SaddleEnding(propagator, orbit)

@@ -11,7 +11,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, linearized_orbit
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
 from vibrokit.analyzers.polishing.path_solver import FEW_EVALUATIONS, completed
 from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
@@ -36,12 +36,12 @@ class FollowedPath:
     def of(cls, problem: ExitProblem, energy: ActivationEnergy) -> FollowedPath:
         """Polish the path of an energy once more; raises StructureError if it has none or that fails."""
         path, attractor = energy.path, problem.attractor
-        if path is None or not attractor.is_fixed:
+        if path is None or not attractor.repeats:
             raise StructureError(f"there is no polished path from {attractor.name}, an attractor that is an orbit.")
         ends = [
             end for end in problem.path_ends if end.saddle == energy.saddle and energy.target in end.targets
         ]  # fmt: skip
-        polisher = CandidatePolisher(problem, ends, attractor.points[0], attractor.period)
+        polisher = CandidatePolisher(problem, ends)
         polisher.polish(Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method))
         if not polisher.solved:
             raise StructureError(str(polisher.findings[0].values["reason"]))
@@ -59,7 +59,7 @@ class FollowedPath:
         orbits = [(one.source, two.source)]
         orbits += [(own, its) for (own, _), (its, _) in zip(one.ending.approached, two.ending.approached, strict=False)]
         return abs(one.action - two.action) <= _SAME * one.action and all(
-            np.linalg.norm(own.states - its.states[0], axis=1).min() <= _SAME * one.extent for own, its in orbits
+            own.nearest(its.along(0, 1))[0].min() <= _SAME * one.extent for own, its in orbits
         )
 
     def at(self, osc: Oscillator) -> FollowedPath:
@@ -70,18 +70,17 @@ class FollowedPath:
         problem, before = dataclasses.replace(self.problem, osc=osc), self.found
         propagator = dataclasses.replace(self.propagator, osc=problem.scene)
         moved = dataclasses.replace(self, problem=problem, propagator=propagator)
-        source = linearized_orbit(propagator, before.source.states[0], len(before.source.states) // propagator.pieces)
+        source = before.source.again(propagator)
         ending = before.ending.carried_by(propagator).moved_to(moved.end)
         pairs = [(before.source, source)]
         pairs += [(old, new) for (old, _), (new, _) in zip(before.ending.approached, ending.approached, strict=True)]
         if any(_unstable(old) != _unstable(new) for old, new in pairs):
             raise StructureError("the orbit that it leaves or the saddle that it reaches has changed its stability.")
-        if before.source.start_on_orbit:
-            source = source.with_start_on_orbit()
         last = before.last * propagator.piece / self.propagator.piece
         found = extremal_path(
-            propagator, source, before.first, ending, before.points, last, evaluations=FEW_EVALUATIONS
-        )
+            propagator, source, before.first, ending, before.points, last,
+            evaluations=FEW_EVALUATIONS, accepted=before.accepted(),
+        )  # fmt: skip
         return dataclasses.replace(moved, found=found)
 
     def completed(self) -> FollowedPath:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.paths.sparse_blocks import sparse_blocks
 from vibrokit.analyzers.polishing.ending import Ending
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, normals_of
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.errors import StructureError
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
@@ -25,9 +25,12 @@ _LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may
 _SHORTEST_STEP = 1e-4  # share of a Newton step
 ACCEPTED = 1e-9
 """Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
+ROUGHLY_ACCEPTED = 1e-6
+"""Misfit of a path that starts farther from its source than the final one: linearization makes it larger."""
 _LONGEST_LAST = 3.0  # pieces
 _NEARER = 10.0  # times as near to its source: start of a path that nearly converges
 _SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
+_GAINING = 10.0  # ratio of the misfits before and after a step in all but that direction that is worth another one
 _FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
 _INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
 _LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
@@ -69,6 +72,15 @@ class ExtremalPath:
         n = self.points.shape[1] // 2
         offset = self.points[0] - self.source.point(self.first)
         return 0.5 * float(offset[n:] @ offset[:n])
+
+    def accepted(self, farther: float = 1.0) -> float:
+        """Return the misfit that is accepted of the path solved for again, from some times as far from its orbits.
+
+        Where it is one of a family, no shift makes up for the error of the linearized equations at its ends, which is
+        of the second order in their distance.
+        """
+        left = max(float(self.distances[0]), self.ending.distance_left(self.points[-1])) / self.extent
+        return max(ACCEPTED, (farther * left) ** 2) if self.flat else ACCEPTED
 
     @property
     def distances(self) -> Array:
@@ -119,6 +131,8 @@ def extremal_path(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Evaluation:
+    source: LinearizedOrbit  # so shifted in time, if it may be, that the first point is nearest to its phase
+    ending: Ending  # shifted likewise
     carried: HamiltonianMap
     unknown: NDArray[np.intp]  # nodes
     misfits: Array
@@ -196,10 +210,8 @@ class _Matching:
         last: float,
     ) -> None:
         self.propagator, self.source, self.first, self.ending, self.last = propagator, source, first, ending, last
-        self.origin = source.point(first)
         self.pin: _Pin | None = None
-        self.scale = _sizes(guess[self._unknown(guess)], self.origin)
-        self.normals = normals_of(source.unstable[source.node(first)], self.scale)
+        self.scale = _sizes(guess[self._unknown(guess)], source.point(first))
         if propagator.osc.autonomous and ending.period_nodes > 0:
             self.pin = _Pin(propagator, guess, self.scale)
         self.start_of_last = float((first + len(guess) - 2) % propagator.pieces) * propagator.piece
@@ -229,34 +241,38 @@ class _Matching:
         """Carry all pieces and compare."""
         last = self._last(number)
         if not 0 < last < _LONGEST_LAST * self.propagator.piece:
-            return _Evaluation(HamiltonianMap(points, points, points), unknown, points, math.inf)
+            nothing = HamiltonianMap(points, points, points)
+            return _Evaluation(self.source, self.ending, nothing, unknown, points, math.inf)
         carried = self.propagator.extremal(points[:-1], self.first, last)
+        source, ending = self.source.through(points[0], self.first, leaving=True), self.ending.through(points[-1])
         parts = [
-            self.normals @ ((points[0] - self.origin) / self.scale),
+            source.misfit(points[0], self.first, self.scale, leaving=True),
             ((points[1:] - carried.images) / self.scale)[unknown[1:] - 1].ravel(),
-            self.ending.misfit(points[-1], self.start_of_last + last, self.scale),
+            ending.misfit(points[-1], self.start_of_last + last, self.scale),
         ]
         if self.pin is not None:
             parts[1][self._jump(unknown)] -= number[0] * self.pin.normal
             parts.append(np.array([self.pin.rate @ (points[self.pin.node] / self.scale - self.pin.point)]))
         misfits = np.concatenate(parts)
         largest = float(np.abs(misfits).max())
-        return _Evaluation(carried, unknown, misfits, largest if math.isfinite(largest) else math.inf)
+        largest = largest if math.isfinite(largest) else math.inf
+        return _Evaluation(source, ending, carried, unknown, misfits, largest)
 
     def derivatives(self, points: Array, number: Array, current: _Evaluation) -> scipy.sparse.csc_array:
         """Derivatives of the misfits in the scaled points and the number."""
         unknown, double = current.unknown, points.shape[1]
+        at_start = current.source.misfit_derivatives(points[0], self.first, self.scale, leaving=True)
         pieces = len(unknown) - 1
-        size, ahead = double * (pieces + 1), len(self.normals)
+        size, ahead = double * (pieces + 1), len(at_start)
         below, end = ahead + pieces * double, self.start_of_last + self._last(number)
-        at_end, in_time = self.ending.derivatives(points[-1], end, self.scale)
+        at_end, in_time = current.ending.derivatives(points[-1], end, self.scale)
         over_one = current.carried.derivatives * self.scale / self.scale[:, None]
         steps = over_one[unknown[:-1]]
         over_two = np.flatnonzero(np.diff(unknown) == 2)
         steps[over_two] = over_one[unknown[over_two] + 1] @ steps[over_two]
         starts, ones = double * np.arange(pieces), np.arange(pieces * double)
         table = [
-            (self.normals, 0, 0),
+            (at_start, 0, 0),
             (-steps, ahead + starts, starts),
             (np.ones((len(ones), 1, 1)), ahead + ones, double + ones),
             (at_end, below, size - double),
@@ -279,7 +295,7 @@ class _Matching:
         may be small enough already. If not, the path moves along the family, a short step at a time.
         """
         number = np.array([self.last] if self.ending.free_time else [0.0] if self.pin is not None else [])
-        (points, current), flat = self._arranged(points, number), False
+        (points, current), flat, before = self._arranged(points, number), False, math.inf
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
             try:
@@ -290,8 +306,8 @@ class _Matching:
             soft = _Soft.of(factors, step)
             rest = soft.without(step)
             if soft.flat or soft.most < np.abs(soft.direction @ step):
-                if np.linalg.norm(rest) > _MATCHED * soft.most:
-                    step = rest
+                if np.linalg.norm(rest) > _MATCHED * soft.most or ACCEPTED < current.largest < before / _GAINING:
+                    step, before = rest, current.largest
                 elif current.largest <= accepted:
                     flat = True
                     break
@@ -317,7 +333,7 @@ class _Matching:
                 points, current = self._arranged(points, number)
         slack = 0.0 if self.pin is None else abs(float(number[0]))
         return ExtremalPath(
-            self.source, self.first, self.ending, points, self._last(number),
+            current.source, self.first, current.ending, points, self._last(number),
             current.carried.derivatives, current.carried.actions, _over_jumps(points, current.carried.images),
             current.largest, slack, self.scale, flat,
         )  # fmt: skip

@@ -13,7 +13,13 @@ from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import ACCEPTED, MOST_EVALUATIONS, ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.newton import (
+    ACCEPTED,
+    MOST_EVALUATIONS,
+    ROUGHLY_ACCEPTED,
+    ExtremalPath,
+    extremal_path,
+)
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
@@ -28,8 +34,6 @@ _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a 
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
-ROUGHLY_ACCEPTED = 1e-6
-"""Misfit of a path that starts farther from its source than the final one: linearization makes it larger."""
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
 _FEWEST = 2  # nodes of a path
@@ -60,10 +64,10 @@ class PathSolver:
         """
         propagator, fitted = self.propagator, []
         for cut in cuts:
-            first, points = _begun(propagator, self.source, cut)
+            source, first, points = _begun(propagator, self.source, cut)
             states = points[:, : propagator.size]
-            fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), first, cut))
-        points, action, first, cut = min(fitted, key=lambda each: each[1])
+            fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), source, first, cut))
+        points, action, source, first, cut = min(fitted, key=lambda each: each[1])
         for _, known in self._known:
             if isinstance(known, ExtremalPath) and _in_family(known, first, points, action):
                 return known
@@ -79,7 +83,7 @@ class PathSolver:
 
         try:
             iterations = MANY_ITERATIONS if action < worth else FEW_ITERATIONS
-            found = self._descended(self.source, first, cut, points, iterations)
+            found = self._descended(source, first, cut, points, iterations)
         except StructureError as error:
             return from_orbit(error, action)
         return self._once(found, from_orbit)
@@ -92,10 +96,10 @@ class PathSolver:
         """
         for cut in cuts:
             assert cut.momenta is not None
-            phases, _ = _nearest(self.propagator, self.source, cut.states[:1])
+            source, first = self.source.starting(self.source.nearest(cut.states[:1])[1][0])
             points = np.hstack([cut.states, cut.momenta])
             try:
-                found = self._shot(int(phases[0]), points, cut, evaluations=_FROM_MOMENTA)
+                found = self._shot(source, first, points, cut, evaluations=_FROM_MOMENTA)
                 return self._once(found, _give_up)
             except StructureError as error:
                 failure = error
@@ -127,18 +131,13 @@ class PathSolver:
             self.propagator, first, points,
             last=cut.last, free=cut.ending.free, closing=cut.ending.closing, iterations=iterations,
         )  # fmt: skip
-        return self._shot(first, points, cut, source)
+        return self._shot(source, first, points, cut)
 
     def _shot(
-        self,
-        first: int,
-        points: Array,
-        cut: Cut,
-        source: LinearizedOrbit | None = None,
-        evaluations: int = MOST_EVALUATIONS,
+        self, source: LinearizedOrbit, first: int, points: Array, cut: Cut, evaluations: int = MOST_EVALUATIONS
     ) -> ExtremalPath:
         return extremal_path(
-            self.propagator, source or self.source, first, cut.ending, points, cut.last,
+            self.propagator, source, first, cut.ending, points, cut.last,
             evaluations=evaluations, accepted=ROUGHLY_ACCEPTED, nearly=_NEARLY,
         )  # fmt: skip
 
@@ -146,6 +145,8 @@ class PathSolver:
         """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""
         best, failures, propagator = None, 0, self.propagator
         source = self.source.with_start_on_orbit()
+        if source is None:
+            raise failure
         for intervals in _ON_ORBIT:
             added = intervals * propagator.pieces
             states = np.concatenate([source.along(first - added, added), points[:, : propagator.size]])
@@ -153,7 +154,7 @@ class PathSolver:
                 longer, _ = gauss_newton(propagator, first - added, states, cut.last, cut.ending.free)
                 found = self._descended(source, first - added, cut, longer)
                 found = _within(propagator, found, _RADIUS * found.extent)
-                solved_again(propagator, found, MORE_PERIODS * len(source.states), 0)
+                solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)
             except StructureError:
                 failures += 1
                 if best is not None or failures == _FAILURES:
@@ -173,7 +174,13 @@ def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPat
     Raises StructureError if it cannot be joined to them by the linearized equations.
     """
     radius = _RADIUS * found.extent
-    found = _within(propagator, found, radius)
+    try:
+        found = _within(propagator, found, radius)
+    except StructureError:
+        if not found.flat:  # of one of a family, only the error of the linearized equations may be too large
+            raise
+        radius /= 10
+        found = _within(propagator, found, radius)
     for _ in range(_CLOSER):
         radius /= 10
         closer = _within(propagator, found, radius)
@@ -256,30 +263,25 @@ def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -
         found, share = longer, share // 2
 
 
-def _nearest(propagator: SegmentPropagator, source: LinearizedOrbit, states: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return the phase of the orbit on the section that each state is nearest to, and how near."""
-    phases = np.arange(0, len(source.states), propagator.pieces)
-    distances = np.linalg.norm((states[:, None] - source.states[phases]) / propagator.units, axis=2)
-    return phases[np.argmin(distances, axis=1)], distances.min(axis=1)
-
-
-def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[int, Array]:
+def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[LinearizedOrbit, int, Array]:
     """Points (q, p) of a candidate that starts on its source, where it last is near or long before its first state.
+
+    They come with the source and the phase there.
 
     The start stays on the orbit until multiple shooting: the linearized equations do not hold for a start far from the
     orbit, and would give it much too small an action.
     """
     states = cut.states
     nodes = np.arange(0, len(states) - 1, propagator.grain)
-    nearest, closest = _nearest(propagator, source, states[nodes])
+    closest, places = source.nearest(states[nodes])
     wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
     near = np.flatnonzero(closest <= wanted)
     entered = int(near[-1]) if near.size else 0
-    first, states = int(nearest[entered]), states[nodes[entered] :]
+    (source, first), states = source.starting(places[entered]), states[nodes[entered] :]
     if not near.size:
         periods = math.ceil(math.log(closest[0] / wanted) / (source.slowest_rate * propagator.pieces))
         added = min(periods, _MOST_ADDED) * propagator.pieces
         first -= added
         states = np.concatenate([source.along(first, added), states])
     states = np.concatenate([source.along(first, 1), states[1:]])
-    return first, np.hstack([states, np.zeros_like(states)])
+    return source, first, np.hstack([states, np.zeros_like(states)])

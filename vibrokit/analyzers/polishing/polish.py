@@ -6,8 +6,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher, Solved
 from vibrokit.analyzers.polishing.certify import certify
@@ -57,7 +55,7 @@ class Polishing:
         self._problem = problem
         with stage("ends of exit paths", subject=problem.attractor.name):
             self._ends, self._findings = usable_ends(problem)
-            self._polisher = CandidatePolisher(problem, self._ends, *_start(problem, orbit))
+            self._polisher = CandidatePolisher(problem, self._ends, orbit)
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
         self._known = set[tuple[int, bytes]]()
@@ -101,18 +99,6 @@ class Polishing:
             findings.append(Finding(Code.CANDIDATES_SKIPPED, self._problem.source, values=values))
         branches = sorted(self._branches, key=lambda branch: branch.value)
         return Polished(tuple(branches), (*findings, *_valleys(branches)))
-
-
-def _start(problem: ExitProblem, orbit: Orbit | None) -> tuple[np.ndarray, int]:
-    attractor = problem.attractor
-    if orbit is not None:
-        return orbit.point, orbit.period
-    if not attractor.is_fixed:
-        raise StructureError(
-            f"{attractor.name} is {attractor.kind}, and paths are polished from an orbit or an equilibrium; give an "
-            "unstable orbit inside it."
-        )
-    return attractor.points[0], attractor.period
 
 
 def _certified(problem: ExitProblem, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import ExtremalPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import ParameterError, SceneError
@@ -74,48 +73,26 @@ class _ActionChange:
         self.problem, self.propagator, self.found = problem, propagator, found
         self.place = problem.path_ends.index(end)
         n = propagator.size
-        left = [(found.source, found.source.node(found.first), -found.points[0, n:])]
-        approached = [(orbit, node, found.points[-1, n:]) for orbit, node in found.ending.approached]
-        orbits = [*left, *approached]
-        states = [np.empty((0, n)), *(orbit.states for orbit, _, _ in orbits)]
-        still = np.concatenate(states)
-        reached = np.concatenate([np.roll(each, -1, axis=0) for each in states])
-        # Of the orbits, which rest at p = 0, and of the path: starts, images, and derivatives of the action in these.
-        self.starts = np.concatenate([np.pad(still, ((0, 0), (0, n))), found.points[:-1]])
-        self.images = np.concatenate([reached, found.points[1:, :n]])
-        self.pulls = np.concatenate([*(_pull(*each) for each in orbits), -found.points[1:, n:]])
-        self.actions = np.append(np.zeros(len(still)), found.actions)
-        phases = [np.arange(len(each)) for each in states]
-        self.phases = np.concatenate([*phases, found.first + np.arange(len(found.points) - 1)])
+        self.orbits = [found.source.displacement(found.first, -found.points[0, n:])]
+        self.orbits += [orbit.displacement(phase, found.points[-1, n:]) for orbit, phase in found.ending.approached]
 
     def at(self, osc: Oscillator) -> tuple[float, float]:
         """Return the change of the action, and the largest change of a piece relative to the path's size."""
         found, n = self.found, self.propagator.size
+        points, scale = found.points, found.scale[: self.propagator.size]
         moved = dataclasses.replace(self.propagator, osc=self.problem.exit.scene(osc))
         shorter = None if found.last == self.propagator.piece else found.last * moved.piece / self.propagator.piece
-        carried = moved.extremal_from(self.starts, self.phases, shorter)
-        offsets = carried.images[:, :n] - self.images
-        change = float(np.sum(carried.actions - self.actions) + np.sum(self.pulls * offsets))
+        carried = moved.extremal(points[:-1], found.first, shorter)
+        offsets = carried.images[:, :n] - points[1:, :n]
+        change = float(np.sum(carried.actions - found.actions) - np.sum(points[1:, n:] * offsets))
+        largest = float(np.abs(offsets / scale).max())
+        for orbit in self.orbits:
+            offsets = orbit.offsets(moved)
+            change += float(np.sum(orbit.pulls * offsets))
+            largest = max(largest, float(np.abs(offsets / scale).max()))
         end = dataclasses.replace(self.problem, osc=osc).path_ends[self.place]
-        change += found.ending.displaced(found.points[-1], end)
-        return change, float(np.abs(offsets / found.scale[:n]).max())
-
-
-def _pull(orbit: LinearizedOrbit, node: int, momentum: Array) -> Array:
-    """Return the derivatives (nodes, n) of p·q, q the orbit at a node, in the images of its pieces.
-
-    The orbit moves by δ at each node, δ′ = M δ + g with the change g of the image, and closes after its period.
-    """
-    steps = orbit.linear.derivatives
-    count, whole = len(steps), np.eye(len(momentum))
-    for number in range(count):
-        whole = steps[(node + number) % count] @ whole
-    weight, weights = np.linalg.solve((np.eye(len(momentum)) - whole).T, momentum), np.empty((count, len(momentum)))
-    for number in range(count - 1, -1, -1):
-        place = (node + number) % count
-        weights[place] = weight
-        weight = steps[place].T @ weight
-    return weights
+        change += found.ending.displaced(points[-1], end)
+        return change, largest
 
 
 def _derivative(change: _ActionChange, entry: Entry) -> Sensitivity | None:

@@ -39,6 +39,7 @@ class Outcomes:
     checks: Whole  # (count,): exit tests from the first section to the end
     targets: Whole  # (count,): label of the exit's cell, or once confirmed what is reached; −1 if unknown
     confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
+    returns: Whole  # (count,): how often the motion without noise settled on the source from where it seemed to exit
 
     @property
     def actions(self) -> Array:
@@ -72,16 +73,19 @@ class Shooter:
         """Integrate starts (count, 2n + 1) at some times (s) to their exits; exits from a basin are not confirmed."""
         problem = self.problem
         begun, section = self._to_section(starts, times)
-        ended = self._integrated(begun, self.budget * problem.checks)
+        ended = self._integrated(begun, self.budget * problem.checks, self._stop)
         confirmed = (ended.status == problem.exit_status) & problem.exit.by_position
-        return Outcomes(begun, section, ended.states, ended.status, ended.intervals, ended.label, confirmed)
+        return Outcomes(
+            begun, section, ended.states, ended.status, ended.intervals, ended.label, confirmed, 0 * section
+        )
 
     def confirm(self, outcomes: Outcomes, factor: float = 1.0) -> None:
         """Confirm the cheapest exits, in place, until the best one to each target is certain.
 
         The motion without noise from the exit decides. If it settles on another attractor, the exit is confirmed. If it
-        settles on the source, the path only touched coarse cells of the basin boundary and is continued. If it settles
-        nowhere, the path is no exit. All exits up to `factor` times the least action of their target are confirmed.
+        settles on the source, the path only touched coarse cells of the basin boundary and is continued, each time for
+        twice as long before it is tested again: it may stay in those cells. If it settles nowhere, the path is no
+        exit. All exits up to `factor` times the least action of their target are confirmed.
         """
         for _ in range(0 if self.problem.exit.by_position else _BATCHES):
             open_ = np.flatnonzero(np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION)) & ~outcomes.confirmed)
@@ -104,10 +108,13 @@ class Shooter:
         outcomes.status[which[reached == UNSETTLED]] = COMPLETED
         outcomes.status[which[~exits & (reached == ESCAPED)]] = DIVERGED
         again = which[returned]
-        left = self.budget * self.problem.checks - outcomes.checks[again]
-        more = self._integrated(states[returned], np.maximum(left, 0))
+        left = np.maximum(self.budget * self.problem.checks - outcomes.checks[again], 0)
+        untested = np.minimum(2 ** outcomes.returns[again] - 1, left)
+        beyond = self._integrated(states[returned], untested, Stop())
+        more = self._integrated(beyond.states, left - untested, self._stop)
         outcomes.states[again], outcomes.status[again], outcomes.targets[again] = more.states, more.status, more.label
-        outcomes.checks[again] += more.intervals
+        outcomes.checks[again] += untested + more.intervals
+        outcomes.returns[again] += 1
 
     @cached_property
     def _classifier(self) -> BasinClassifier:
@@ -123,11 +130,11 @@ class Shooter:
             stop, labels=np.where(known.basins.labels == ESCAPED, len(known.attractors), stop.labels)
         )
 
-    def _integrated(self, states: Array, budget: int | Whole) -> Ensemble:
+    def _integrated(self, states: Array, budget: int | Whole, stop: Stop) -> Ensemble:
         problem = self.problem
         ended = run_ensemble(
             problem.scene, Flow.HAMILTONIAN, self.stepper, states, budget,
-            stop=self._stop, interval=problem.scene.section_interval / problem.checks,
+            stop=stop, interval=problem.scene.section_interval / problem.checks,
         )  # fmt: skip
         escaped = ended.label == len(problem.structure.attractors)
         return dataclasses.replace(ended, label=np.where(escaped, ESCAPED, ended.label))

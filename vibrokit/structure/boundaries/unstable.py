@@ -91,11 +91,12 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     basins, its label is the most frequent one, or the next if both branches have the same one. A repeller has the
     labels of all directions.
     """
+    # Nearer than that, coarse steps across contacts may have orbits of their own.
+    away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
     with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
         orbit = orbit.refined(classifier.osc, classifier.stepper)
     values, vectors = np.linalg.eig(orbit.monodromy)
     widths = classifier.region.widths
-    away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
     if np.sum(np.abs(values) > 1) > 1:
         angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
         ring = np.zeros((_ROUND, len(orbit.point)))
