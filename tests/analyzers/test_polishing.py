@@ -16,7 +16,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ending import resampled
 from vibrokit.analyzers.polishing.ends import ending_at
-from vibrokit.analyzers.polishing.linearized_cycle import linearized_orbit
+from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem

@@ -18,8 +18,8 @@ class RK4(FixedSteps):
 
     Order 4 while nothing touches; a contact that is crossed inside a step costs order: 2.5 for Hertz, 2 for linear
     stops, 1 where the force jumps at first touch. Choose it for basins and action plots of scenes with stops, and for
-    noise, which need many trajectories at moderate accuracy; choose `RKN12` where there are no stops, and `FreeFlight` or
-    `Order8` for orbits and certificates, and wherever a contact is shorter than a few steps.
+    noise, which need many trajectories at moderate accuracy; choose `RKN12` or `RK8` where there are no stops, and
+    `FreeFlight` or `Order8` for orbits and certificates, and wherever a contact is shorter than a few steps.
 
     Derivatives of momenta jump where those of a contact force do: at linear stops, and where a law that would pull is
     cut. Steps across such a contact miss it, by a term proportional to p₂. So they are right along the motion without

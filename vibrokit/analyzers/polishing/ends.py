@@ -13,7 +13,7 @@ from vibrokit.analyzers.path_ends import AtFace, AtSaddle, PathEnd
 from vibrokit.analyzers.paths.action_descent import Closing
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
-from vibrokit.analyzers.polishing.linearized_cycle import linearized_orbit
+from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.energy import ExitPath

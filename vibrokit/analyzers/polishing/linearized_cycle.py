@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.linearized_orbit import (
-    LinearizedOrbit,
+from vibrokit.analyzers.polishing.linear_spaces import (
     carried_along,
     check_hyperbolic,
     extended,
     invariant_spaces,
     normalized,
-    orbit_at_nodes,
     scale_of,
 )
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.structure.autonomous import Cycle, refine_cycle
@@ -58,7 +57,7 @@ class LinearizedCycle(LinearizedOrbit):
 
     @property
     def slowest_rate(self) -> float:
-        return float(np.abs(np.log(np.abs(without_shift(self.multipliers)))).min()) * (
+        return float(np.abs(np.log(np.abs(_without_shift(self.multipliers)))).min()) * (
             self.propagator.piece / self.cycle.duration
         )
 
@@ -182,36 +181,13 @@ def linearized_cycle(propagator: SegmentPropagator, point: Array, duration: floa
     states, linear = gaussian_pieces(osc, cycle.point, stepper, _NODES, _NODES, cycle.duration)
     monodromy, covariance = linear.composed()
     multipliers = np.linalg.eigvals(monodromy).astype(complex)
-    check_hyperbolic(cycle.point, without_shift(multipliers))
+    check_hyperbolic(cycle.point, _without_shift(multipliers))
     spaces = invariant_spaces(monodromy, covariance, VectorField(osc).rate(cycle.point)[:, None])
     scale = scale_of(propagator, covariance)
     unstable, stable = carried_along(linear, *spaces, scale, LinearizedCycle.neutral)
     return LinearizedCycle(propagator, multipliers, cycle, states[:-1], linear, unstable, stable, scale)
 
 
-def linearized_orbit(propagator: SegmentPropagator, point: Array, period: int, duration: float) -> LinearizedOrbit:
-    """Linearize Hamilton's equations along an orbit, an equilibrium, or a limit cycle, of any stability.
-
-    Parameters
-    ----------
-    propagator : SegmentPropagator
-    point : array (n,)
-        One of its points on the section; it is refined.
-    period : int
-        In section intervals; 0 and 1 are the same.
-    duration : float
-        Time after which it repeats (s); 0 for an equilibrium.
-
-    Raises
-    ------
-    StructureError
-        There is no such orbit near the point, or it is not hyperbolic.
-    """
-    if propagator.osc.autonomous and duration > 0:
-        return linearized_cycle(propagator, point, duration)
-    return orbit_at_nodes(propagator, point, max(1, period))
-
-
-def without_shift(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _without_shift(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Return the multipliers of a limit cycle less that of a shift in time, which is 1."""
     return np.delete(multipliers, np.argmin(np.abs(multipliers - 1)))

@@ -1,0 +1,107 @@
+"""LinearizedAtNodes: a periodic orbit or an equilibrium, with Hamilton's equations linearized along it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.linear_spaces import (
+    carried_along,
+    check_hyperbolic,
+    extended,
+    invariant_spaces,
+    scale_of,
+)
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
+from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
+from vibrokit.structure.linear_map import GaussianMap, gaussian_pieces
+from vibrokit.structure.orbits import refine_orbit
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearizedAtNodes(LinearizedOrbit):
+    """A periodic orbit or an equilibrium: it repeats after a whole number of pieces."""
+
+    states: Array  # (nodes, n): the orbit at each node, from the section on
+    linear: GaussianMap  # M and C of the pieces that begin at the nodes
+    unstable: Array  # (nodes, 2n, n)
+    stable: Array  # (nodes, 2n, n)
+    left_from_itself: bool = False
+
+    @property
+    def period_nodes(self) -> int:
+        return len(self.states)
+
+    @property
+    def slowest_rate(self) -> float:
+        return float(np.abs(np.log(np.abs(self.multipliers))).min()) / len(self.states)
+
+    @property
+    def start_on_orbit(self) -> bool:
+        return self.left_from_itself
+
+    def with_start_on_orbit(self) -> Self:
+        size = self.states.shape[1]
+        free = np.vstack([np.zeros((size, size)), np.eye(size)])
+        return dataclasses.replace(self, unstable=np.broadcast_to(free, self.unstable.shape), left_from_itself=True)
+
+    def node(self, phase: int) -> int:
+        return phase % len(self.states)
+
+    def along(self, first: int, count: int) -> Array:
+        return self.states[(first + np.arange(count)) % len(self.states)]
+
+    def unstable_at(self, phase: int) -> Array:
+        return self.unstable[self.node(phase)]
+
+    def stable_at(self, phase: int) -> Array:
+        return self.stable[self.node(phase)]
+
+    def step(self, phase: int) -> Array:
+        return extended(self.linear.derivatives[self.node(phase)], self.linear.covariances[self.node(phase)])
+
+    def nearest(self, states: Array) -> tuple[Array, Array]:
+        phases = np.arange(0, len(self.states), self.propagator.pieces)
+        distances = np.linalg.norm((states[:, None] - self.states[phases]) / self.propagator.units, axis=2)
+        distances = np.where(np.isfinite(distances), distances, np.inf)
+        return distances.min(axis=1), phases[np.argmin(distances, axis=1)]
+
+    def starting(self, place: float) -> tuple[Self, int]:
+        return self, int(place)
+
+    def through(self, point: Array, phase: int, *, leaving: bool) -> Self:
+        return self
+
+    def again(self, propagator: SegmentPropagator) -> LinearizedAtNodes:
+        found = orbit_at_nodes(propagator, self.states[0], len(self.states) // propagator.pieces)
+        return found.with_start_on_orbit() if self.left_from_itself else found
+
+    def displacement(self, phase: int, momentum: Array) -> OrbitDisplacement:
+        phases = (phase + np.arange(len(self.states))) % len(self.states)
+        weights = pulls(self.linear.derivatives[phases], momentum)
+        return OrbitDisplacement(self.states[phases], np.roll(self.states, -1, axis=0)[phases], weights, phases, None)
+
+
+def orbit_at_nodes(propagator: SegmentPropagator, point: Array, period: int) -> LinearizedAtNodes:
+    """Linearize Hamilton's equations along an orbit of any stability that repeats after some section intervals.
+
+    From the section, the spaces are carried to the other nodes, the unstable one forward and the stable one backward:
+    in these directions they attract.
+
+    The point (n,) on the section is refined. Raises StructureError if there is no orbit, or if it is not hyperbolic.
+    """
+    orbit = refine_orbit(propagator.osc, point, period, propagator.stepper)
+    nodes = period * propagator.pieces
+    states, linear = gaussian_pieces(propagator.osc, orbit.point, propagator.stepper, propagator.pieces, nodes)
+    monodromy, covariance = linear.composed()
+    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    check_hyperbolic(orbit.point, multipliers)
+    spaces = invariant_spaces(monodromy, covariance, np.empty((len(point), 0)))
+    unstable, stable = carried_along(linear, *spaces, scale_of(propagator, covariance))
+    return LinearizedAtNodes(propagator, multipliers, states[:-1], linear, unstable, stable)
