@@ -306,7 +306,7 @@ class _Matching:
             soft = _Soft.of(factors, step)
             rest = soft.without(step)
             if soft.flat or soft.most < np.abs(soft.direction @ step):
-                if np.linalg.norm(rest) > _MATCHED * soft.most or ACCEPTED < current.largest < before / _GAINING:
+                if np.linalg.norm(rest) > _MATCHED * soft.most or accepted < current.largest < before / _GAINING:
                     step, before = rest, current.largest
                 elif current.largest <= accepted:
                     flat = True
