@@ -10,8 +10,8 @@ from vibrokit.analyzers.agreement import combined
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
 from vibrokit.results.finding import Code
 
-ORBIT = SimpleNamespace(label=0, is_fixed=True)
-CHAOS = SimpleNamespace(label=0, is_fixed=False)
+ORBIT = SimpleNamespace(label=0, repeats=True)
+CHAOS = SimpleNamespace(label=0, repeats=False)
 ERROR = 1e-9
 
 

@@ -59,8 +59,11 @@ def test_order_12_in_hamiltons_equations():
     assert error(24) < 1e-12
 
 
-@pytest.mark.parametrize("noise", NOISES)
-@pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.value)
+CASES = [pytest.param(flow, "white", marks=[pytest.mark.slow] * (flow is FLOWS[-1]), id=flow.value) for flow in FLOWS]
+CASES += [pytest.param(Flow.HAMILTONIAN, "state-dependent", id="state-dependent noise")]
+
+
+@pytest.mark.parametrize(("flow", "noise"), CASES)
 def test_flows_agree_with_another_method(flow, noise):
     osc = duffing(noise=noise)
     starts = starts_of(osc, flow)

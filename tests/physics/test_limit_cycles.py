@@ -70,6 +70,7 @@ def polished(source):
     return branch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", [0, 1])
 def test_path_between_rest_and_cycle_is_certified(source):
     branch = polished(source)
@@ -79,6 +80,7 @@ def test_path_between_rest_and_cycle_is_certified(source):
     assert abs(branch.value - exact) < 10 * branch.numerical_error + 1e-12
 
 
+@pytest.mark.slow
 def test_sensitivities_are_the_derivatives_of_the_closed_form():
     branch = polished(1)
     exact = G * (OUTER - INNER) ** 3 / 3

@@ -327,3 +327,16 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
         np.testing.assert_allclose(named[0].multipliers, named[1].multipliers, rtol=1e-8)
     else:
         assert len(found) == 1
+
+
+@pytest.mark.slow
+def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
+    """Nearer to the saddle of period 6, fixed steps across this stop have a stable orbit that the scene has not."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.03, barriers=(vk.Barrier(vk.Linear(1000.0), 0.2, "right"),),
+        excitations=(vk.Harmonic(0.4, 2.6),),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False)
+    periods = {attractor.period: attractor.label for attractor in structure.attractors}
+    (saddle,) = (saddle for saddle in structure.saddles if saddle.period == 6)
+    assert set(saddle.leads_to) == {periods[2], periods[6]}

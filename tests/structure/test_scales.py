@@ -188,3 +188,22 @@ def test_wells_that_are_one_shifted_along_x_are_framed_once():
     # Neighbours at 1 and 3 are alike, but the force is not the same around them.
     low, high = frame_of_wells("(x - 1)*(x - 2)*(x - 3)", 1.0, 3.0).x
     assert low < 1 < 3 < high
+
+
+def self_excited(formula, *, unit=1.0, **parameters):
+    """An oscillator without other damping; lengths are in some unit (m)."""
+    return vk.Oscillator(
+        natural_frequency=2.0, damping_ratio=0.0, spring=vk.CustomSpring(f"4*x + {formula}", u=unit, **parameters)
+    )
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e3])
+def test_self_sustained_motion_has_the_amplitude_of_averaging(unit):
+    """1 − 5A²/4 + A⁴/4 = 0 at A = 1 and 2; van der Pol's A = 2."""
+    assert length_of(self_excited("c*(1 - 5*(x/u)**2 + 2*(x/u)**4)*v", unit=unit, c=0.1)) == pytest.approx(2 * unit)
+    assert length_of(self_excited("c*((x/u)**2 - 1)*v", unit=unit, c=0.1)) == pytest.approx(2 * unit)
+
+
+def test_damping_of_one_sign_has_no_amplitude_of_its_own():
+    assert length_of(self_excited("c*(1 + (x/u)**2)*v", c=0.1)) == 1.0
+    assert length_of(self_excited("c*v + 0*u", c=0.1)) == 1.0
