@@ -45,7 +45,6 @@ class LinearizedCycle(LinearizedOrbit):
 
     cycle: Cycle
     states: Array  # (nodes, n): at equal times, from the turning point on
-    linear: GaussianMap  # M and C from node to node
     unstable: Array  # (nodes, 2n, n)
     stable: Array  # (nodes, 2n, n)
     scale: Array  # (2n,): sizes of (q, p) that belong together
@@ -68,16 +67,10 @@ class LinearizedCycle(LinearizedOrbit):
         return np.array([self._from_node(phase)[1].images[0] for phase in range(first, first + count)])
 
     def unstable_at(self, phase: int) -> Array:
-        node, moved = self._from_node(phase)
-        return normalized(
-            extended(moved.derivatives[0], moved.covariances[0]) @ self.unstable[node], self.scale, self.neutral
-        )
+        return self._carried(self.unstable, phase)
 
     def stable_at(self, phase: int) -> Array:
-        node, moved = self._from_node(phase)
-        return normalized(
-            extended(moved.derivatives[0], moved.covariances[0]) @ self.stable[node], self.scale, self.neutral
-        )
+        return self._carried(self.stable, phase)
 
     def step(self, phase: int) -> Array:
         (state,) = self.along(phase, 1)
@@ -110,10 +103,10 @@ class LinearizedCycle(LinearizedOrbit):
                 break
         return moved
 
-    def again(self, propagator: SegmentPropagator) -> Self:
+    def again(self, propagator: SegmentPropagator) -> LinearizedCycle:
         found = linearized_cycle(propagator, self.cycle.point, self.cycle.duration)
         start = self.start * found.cycle.duration / self.cycle.duration
-        return dataclasses.replace(self, **(vars(found) | {"start": start}))
+        return dataclasses.replace(found, start=start)
 
     def conditions(self, phase: int, scale: Array, *, leaving: bool) -> Array:
         """By the symplectic form, which is 0 between any two vectors of such a space; smooth in time."""
@@ -157,6 +150,12 @@ class LinearizedCycle(LinearizedOrbit):
         """Time from node to node (s)."""
         return self.cycle.duration / len(self.states)
 
+    def _carried(self, spaces: Array, phase: int) -> Array:
+        """A space at a phase, carried there from the node before."""
+        node, moved = self._from_node(phase)
+        there = extended(moved.derivatives[0], moved.covariances[0]) @ spaces[node]
+        return normalized(there, self.scale, self.neutral)
+
     def _from_node(self, phase: int) -> tuple[int, GaussianMap]:
         """The node before a phase, and the map from there to the phase."""
         time = (self.start + phase * self.propagator.piece) % self.cycle.duration
@@ -185,7 +184,7 @@ def linearized_cycle(propagator: SegmentPropagator, point: Array, duration: floa
     spaces = invariant_spaces(monodromy, covariance, VectorField(osc).rate(cycle.point)[:, None])
     scale = scale_of(propagator, covariance)
     unstable, stable = carried_along(linear, *spaces, scale, LinearizedCycle.neutral)
-    return LinearizedCycle(propagator, multipliers, cycle, states[:-1], linear, unstable, stable, scale)
+    return LinearizedCycle(propagator, multipliers, cycle, states[:-1], unstable, stable, scale)
 
 
 def _without_shift(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
