@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from vibrokit.errors import StepperError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.flow_kind import Flow
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -29,6 +30,7 @@ class FixedSteps(Stepper):
     """
 
     templates: ClassVar[tuple[str, ...]] = ("fixed_steps",)
+    takes_noise: ClassVar[bool] = False
 
     steps: int = 256
 
@@ -37,6 +39,11 @@ class FixedSteps(Stepper):
             raise StepperError(
                 f"{type(self).__name__}: steps must be a whole number from 1 to {_LARGEST}, got {self.steps!r}."
             )
+
+    def check(self, scene: Scene, flow: Flow) -> None:
+        """Refuse noise, unless the steps are made for it: a random force has no high order."""
+        if flow is Flow.NOISY and not self.takes_noise:
+            raise StepperError(f"{type(self).__name__} integrates smooth motion only; use RK4 for noisy trajectories.")
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
         """Steps in this interval, after how many of them the forcing repeats, and the step length."""

@@ -30,21 +30,19 @@ _CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    # Few enough lanes that their numbers stay in the nearest cache.
-    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
-    head = sizes(lanes, len(_CLASSICAL_NODES))
+    head = sizes(text, len(_CLASSICAL_NODES))
     return [head, tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope, _unrolled(text)]
 
 
 def staged_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
-    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
     nodes = tuple(float(node) for node in NODES)
-    return [f"{sizes(lanes, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
+    return [f"{sizes(text, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
 
 
-def sizes(lanes: int, nodes: int) -> str:
-    """Lanes of a block, and values of the forcing in a step."""
+def sizes(text: SceneText, nodes: int) -> str:
+    """Lanes of a block, whose numbers stay in the nearest cache, and values of the forcing in a step."""
+    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
     return f"{_REGISTERS}\n\nLANES = {lanes}\nNODES = {nodes}\n"
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.second_order_source import SecondOrderWriter
     from vibrokit.symbolic.source import SceneText
 
-_FEW_PAIRS = 3
 _SCALE = """@njit(**OPTIONS)
 def scale(theta, h, factors):
     constants = np.zeros((KINDS, 3))
@@ -51,8 +50,7 @@ def nystrom_step(text: SceneText) -> list[str]:
             f"RKN12 needs forces that do not depend on the velocity, besides linear damping, and the "
             f"{text.flow.value} flow of this scene has others; use RK8 or Order8."
         )
-    lanes = 32 if len(writer.pairs) <= _FEW_PAIRS else 16
-    head = f"{sizes(lanes, STAGES)}STAGES = {STAGES}\nKINDS = {writer.kinds}\n"
+    head = f"{sizes(text, STAGES)}STAGES = {STAGES}\nKINDS = {writer.kinds}\n"
     head += f"FRACTIONS = np.array({(*NODES.tolist(), 1.0)!r})\n"
     accelerations = writer.text(tuple(text.parameters), forced=text.forced)
     return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, _step(text, writer)]

@@ -32,6 +32,7 @@ class RK4(FixedSteps):
     """
 
     name: ClassVar[str] = "rk4"
+    takes_noise: ClassVar[bool] = True
 
     def step_part(self, text: SceneText) -> list[str]:
         """The classical step, with kicks where there is noise."""

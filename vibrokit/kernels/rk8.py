@@ -5,11 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
-from vibrokit.errors import StepperError
 from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.lanes import staged_step
-from vibrokit.parts.scene import Scene
-from vibrokit.symbolic.flow_kind import Flow
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -33,11 +30,6 @@ class RK8(FixedSteps):
     staged: ClassVar[bool] = True
 
     steps: int = 24
-
-    def check(self, scene: Scene, flow: Flow) -> None:
-        """Refuse noise: a random force has no order 8."""
-        if flow is Flow.NOISY:
-            raise StepperError("RK8 integrates smooth motion only; use RK4 for noisy trajectories.")
 
     def step_part(self, text: SceneText) -> list[str]:
         """The step of twelve stages."""

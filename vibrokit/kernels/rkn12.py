@@ -37,8 +37,7 @@ class RKN12(FixedSteps):
 
     def check(self, scene: Scene, flow: Flow) -> None:
         """Refuse noise and stops."""
-        if flow is Flow.NOISY:
-            raise StepperError("RKN12 integrates smooth motion only; use RK4 for noisy trajectories.")
+        super().check(scene, flow)
         if scene.barriers:
             raise StepperError("RKN12 is for scenes without stops; use Order8 or FreeFlight, which locate contacts.")
 

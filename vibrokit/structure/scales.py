@@ -89,8 +89,9 @@ def _swing(osc: Oscillator, field: VectorField, force: float, period: float) -> 
 
 
 def _self_sustained(osc: Oscillator, field: VectorField) -> float:
-    """Largest amplitude of the first few at which x = A cos ω_n t neither gains nor loses energy; 0 if there is none.
+    """Largest amplitude A at which the motion x = A cos ω_n t has the same energy after a turn; 0 if there is none.
 
+    Damping that oscillates with the amplitude has many; the first few count.
     Limit cycles, stable and unstable ones, have about these amplitudes (N. N. Bogoliubov and Y. A. Mitropolsky,
     "Asymptotic Methods in the Theory of Non-linear Oscillations", 1961, section 1).
     """

@@ -29,13 +29,8 @@ class Pair:
         """What stages depend on besides the force."""
         return self.own, self.turned, self.damping
 
-    @property
-    def rate(self) -> sympy.Expr:
-        """Factor of u′ in u″."""
-        return self.own + self.damping
-
     def acceleration(self, position: sympy.Symbol) -> sympy.Expr:
-        """F of u″ = rate u′ + F."""
+        """F of u″ = (own + damping) u′ + F."""
         return self.turned * self.force - self.own * self.damping * position
 
 

@@ -110,7 +110,7 @@ class LinearizedCycle(LinearizedOrbit):
 
     def conditions(self, phase: int, scale: Array, *, leaving: bool) -> Array:
         """By the symplectic form, which is 0 between any two vectors of such a space; smooth in time."""
-        basis, n = self.unstable_at(phase) if leaving else self.stable_at(phase), len(scale) // 2
+        basis, n = self.space_at(phase, leaving=leaving), len(scale) // 2
         rows: Array = np.vstack([basis[n:], -basis[:n]]).T * scale
         return rows / np.linalg.norm(rows, axis=1)[:, None]
 
@@ -130,7 +130,7 @@ class LinearizedCycle(LinearizedOrbit):
 
     def _ahead(self, phase: int, *, leaving: bool) -> Array:
         """The derivative (2n,) in a point of the time by which it is ahead of the phase."""
-        basis, n = self.unstable_at(phase) if leaving else self.stable_at(phase), len(self.scale) // 2
+        basis, n = self.space_at(phase, leaving=leaving), len(self.scale) // 2
         rate = VectorField(self.propagator.osc).rate(self.along(phase, 1)[0])
         shares = np.linalg.pinv(basis / self.scale[:, None])[0] / self.scale
         return np.asarray(shares / np.linalg.norm(rate / self.scale[:n]), dtype=np.float64)

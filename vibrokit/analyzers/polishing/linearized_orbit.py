@@ -104,9 +104,13 @@ class LinearizedOrbit(ABC):
         (state,) = self.along(phase, 1)
         return np.concatenate([state, np.zeros(len(state))])
 
+    def space_at(self, phase: int, *, leaving: bool) -> Array:
+        """Return a basis (2n, n) of the unstable space, in which paths leave, or of the stable one."""
+        return self.unstable_at(phase) if leaving else self.stable_at(phase)
+
     def conditions(self, phase: int, scale: Array, *, leaving: bool) -> Array:
         """Return what (n, 2n) is 0 of an offset over `scale` in the unstable space, or in the stable one."""
-        return normals_of(self.unstable_at(phase) if leaving else self.stable_at(phase), scale)
+        return normals_of(self.space_at(phase, leaving=leaving), scale)
 
     def misfit(self, point: Array, phase: int, scale: Array, *, leaving: bool) -> Array:
         """Return how far a point (2n,) misses the unstable space at a phase, or the stable one, relative to `scale`."""

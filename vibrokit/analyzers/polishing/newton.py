@@ -25,8 +25,6 @@ _LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may
 _SHORTEST_STEP = 1e-4  # share of a Newton step
 ACCEPTED = 1e-9
 """Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
-ROUGHLY_ACCEPTED = 1e-6
-"""Misfit of a path that starts farther from its source than the final one: linearization makes it larger."""
 _LONGEST_LAST = 3.0  # pieces
 _NEARER = 10.0  # times as near to its source: start of a path that nearly converges
 _SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it

@@ -16,7 +16,6 @@ from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import (
     ACCEPTED,
     MOST_EVALUATIONS,
-    ROUGHLY_ACCEPTED,
     ExtremalPath,
     extremal_path,
 )
@@ -33,6 +32,7 @@ _FROM_MOMENTA = 60  # evaluations for a candidate with momenta: paths that conve
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
+_ROUGHLY_ACCEPTED = 1e-6  # misfit of a path that starts farther from its source than the final one
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
@@ -138,7 +138,7 @@ class PathSolver:
     ) -> ExtremalPath:
         return extremal_path(
             self.propagator, source, first, cut.ending, points, cut.last,
-            evaluations=evaluations, accepted=ROUGHLY_ACCEPTED, nearly=_NEARLY,
+            evaluations=evaluations, accepted=_ROUGHLY_ACCEPTED, nearly=_NEARLY,
         )  # fmt: skip
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
