@@ -58,7 +58,7 @@ def steps_taken(osc, stepper, states):
     if isinstance(stepper, vk.RK4):
         return stepper.steps
     interval = osc.section_interval
-    module, theta, stop = kernel_for(osc, Flow.STATE, stepper).module, theta_of(osc), Stop()
+    kernel, theta, stop = kernel_for(osc, Flow.STATE, stepper), theta_of(osc), Stop()
     settings = np.array(stepper.settings(osc, interval))
     tests = (
         np.zeros(1, dtype=np.int64),
@@ -78,7 +78,7 @@ def steps_taken(osc, stepper, states):
         settings[1] = limit
         out = np.empty((1, 2)), *(np.zeros(1, dtype=np.int64) for _ in range(3))
         budget, none = np.ones(1, dtype=np.int64), np.empty((1, 0, 2))
-        module.advance(state[None], theta, 0.0, interval, settings, budget, *tests, *out, none)
+        kernel.advance(state[None], theta, 0.0, interval, settings, budget, *tests, *out, none)
         return out[2][0] == STALLED
 
     counts = []

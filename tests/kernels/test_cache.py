@@ -267,8 +267,9 @@ def test_the_code_follows_a_changed_global():
     linear = kernel_for(osc, Flow.STATE, vk.RK4())
     law_type.force.__globals__["power"] = sympy.Rational(2)
     square = kernel_for(osc, Flow.STATE, vk.RK4())
-    assert square.name != linear.name
-    assert square.source != linear.source
+    assert square.scene.name != linear.scene.name
+    assert square.scene.source != linear.scene.source
+    assert square.driver == linear.driver
 
 
 def test_what_cannot_be_described_is_never_taken_for_the_same():

@@ -12,9 +12,9 @@ import pytest
 import vibrokit as vk
 from vibrokit.kernels import ensemble
 from vibrokit.kernels.ensemble import Stop, carry, run_ensemble
-from vibrokit.kernels.kernel import _fitting
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, LEFT_REGION, REACHED
 from vibrokit.kernels.streams import streams_of
+from vibrokit.kernels.template import fitting
 from vibrokit.symbolic.flow_kind import Flow
 
 # Tests compare one rounding with another, not with the true motion.
@@ -347,9 +347,9 @@ class TestBetween:
 
 def test_a_misspelt_condition_is_refused():
     text = "x = 1  # forced\ny = 2  # of two words\nz = 3  # noisy\n"
-    assert _fitting(text, {"forced": True, "noisy": False}) == "x = 1\ny = 2  # of two words\n"
+    assert fitting(text, {"forced": True, "noisy": False}) == "x = 1\ny = 2  # of two words\n"
     with pytest.raises(ValueError, match="z = 3  # noisi"):
-        _fitting(text.replace("noisy", "noisi"), {"forced": True, "noisy": False})
+        fitting(text.replace("noisy", "noisi"), {"forced": True, "noisy": False})
 
 
 @pytest.mark.parametrize("flow", [Flow.STATE, Flow.HAMILTONIAN_VARIATIONAL], ids=lambda flow: flow.value)

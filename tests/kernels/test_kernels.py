@@ -164,7 +164,7 @@ def test_read_only_and_strided_arrays_compile_nothing_new():
     osc, stepper = scene(), vk.RK4(steps=64)
     starts = np.random.default_rng(0).uniform(-0.4, 0.4, (10, 2))
     plain = run_ensemble(osc, Flow.STATE, stepper, starts, 2)
-    compiled = kernel_for(osc, Flow.STATE, stepper).module.advance.signatures
+    compiled = kernel_for(osc, Flow.STATE, stepper).driver.module.advance.signatures
     spread = np.zeros((10, 4))
     spread[:, ::2] = starts
     starts.setflags(write=False)
@@ -173,5 +173,5 @@ def test_read_only_and_strided_arrays_compile_nothing_new():
     for given in (starts, spread[:, ::2], np.asfortranarray(starts)):
         ended = run_ensemble(osc, Flow.STATE, stepper, given, np.full(10, 2), stop=ensemble.Stop(region))
         assert ended.states.tobytes() == plain.states.tobytes()
-    assert kernel_for(osc, Flow.STATE, stepper).module.advance.signatures == compiled
+    assert kernel_for(osc, Flow.STATE, stepper).driver.module.advance.signatures == compiled
     assert len(compiled) == 1

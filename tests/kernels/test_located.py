@@ -41,25 +41,25 @@ def theta(damping=DAMPING, amplitude=AMPLITUDE, force=FORCE, right=HERTZ, left=H
 
 
 @pytest.fixture(scope="module", params=[vk.Order8(), vk.FreeFlight()], ids=lambda stepper: stepper.name)
-def module(request):
-    return kernel_for(SCENE, Flow.HAMILTONIAN, request.param).module
+def kernel(request):
+    return kernel_for(SCENE, Flow.HAMILTONIAN, request.param)
 
 
 @pytest.fixture(scope="module")
 def clamped():
     barriers = (vk.Barrier(PULLING, STOP, "right"), vk.Barrier(PULLING, -STOP, "left"))
     scene = dataclasses.replace(SCENE, barriers=barriers)
-    return kernel_for(scene, Flow.HAMILTONIAN, vk.Order8()).module, theta_of(scene)
+    return kernel_for(scene, Flow.HAMILTONIAN, vk.Order8()), theta_of(scene)
 
 
-def advance(module, states, tolerance, intervals=1, interval=PERIOD, values=None, limit=1e5, region=EVERYWHERE):
+def advance(kernel, states, tolerance, intervals=1, interval=PERIOD, values=None, limit=1e5, region=EVERYWHERE):
     states = np.atleast_2d(np.asarray(states, dtype=float))
     count = len(states)
     out, done, status, label = np.empty_like(states), *(np.zeros(count, dtype=np.int64) for _ in range(3))
     labels = EVERYWHERE, np.zeros((0, 0), dtype=np.int8), -1
     points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
     outputs = out, done, status, label, np.zeros((count, 0, 5))
-    module.advance(
+    kernel.advance(
         states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0, 1.0]),
         np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, *outputs,
     )  # fmt: skip
@@ -146,9 +146,9 @@ def errors(found, true):
     return off[:, :2].max(axis=1), momentum, off[:, 4] / true[:, 4]
 
 
-def test_flows_agree_with_scipy(module, solutions):
+def test_flows_agree_with_scipy(kernel, solutions):
     states, true = solutions
-    out, done, status = advance(module, states, 1e-14, intervals=2)
+    out, done, status = advance(kernel, states, 1e-14, intervals=2)
     assert (status == COMPLETED).all()
     assert (done == 2).all()
     for error in errors(out, true):
@@ -156,35 +156,35 @@ def test_flows_agree_with_scipy(module, solutions):
         assert error.max() < 1e-9
 
 
-def test_error_follows_the_tolerance(module, solutions):
+def test_error_follows_the_tolerance(kernel, solutions):
     states, true = solutions
-    medians = [np.median(errors(advance(module, states, 10.0**-k, 2)[0], true)[0]) for k in (5, 7, 9, 11)]
+    medians = [np.median(errors(advance(kernel, states, 10.0**-k, 2)[0], true)[0]) for k in (5, 7, 9, 11)]
     assert all(finer < 0.1 * coarser for coarser, finer in itertools.pairwise(medians))
     assert medians[-1] < 1e-9
 
 
-def test_action_scales_with_tiny_momenta(module):
-    large, small = (advance(module, starts(8, momentum), 1e-12, 2)[0] for momentum in (1e-11, 1e-13))
+def test_action_scales_with_tiny_momenta(kernel):
+    large, small = (advance(kernel, starts(8, momentum), 1e-12, 2)[0] for momentum in (1e-11, 1e-13))
     assert np.allclose(large[:, 2:4] * 1e-2, small[:, 2:4], rtol=1e-6, atol=0)
     assert np.allclose(large[:, 4] * 1e-4, small[:, 4], rtol=1e-6, atol=0)
 
 
-def test_start_exactly_at_touch(module):
+def test_start_exactly_at_touch(kernel):
     """Going in, it is the mirror of coming out; at rest, the acceleration decides; resting, it stays."""
     free = theta(damping=0.0, amplitude=0.0, force=0.0)
     into, duration = [STOP, 0.4, 0, 0, 0], 0.2
-    deep = advance(module, into, 1e-14, interval=duration, values=free)[0][0]
+    deep = advance(kernel, into, 1e-14, interval=duration, values=free)[0][0]
     assert deep[0] > STOP
-    back = advance(module, deep * [1, -1, 1, 1, 1], 1e-14, interval=duration, values=free)[0][0]
+    back = advance(kernel, deep * [1, -1, 1, 1, 1], 1e-14, interval=duration, values=free)[0][0]
     assert back[:2] == pytest.approx([STOP, -0.4], abs=1e-12)
-    away = advance(module, [STOP, 0, 0, 0, 0], 1e-13, interval=1.0, values=free)[0][0]
+    away = advance(kernel, [STOP, 0, 0, 0, 0], 1e-13, interval=1.0, values=free)[0][0]
     assert away[:2] == pytest.approx([STOP * np.cos(1.0), -STOP * np.sin(1.0)], abs=1e-12)
     pressed = theta(damping=2.0, amplitude=0.0, force=2.0)
-    rest = advance(module, [STOP, 0, 0, 0, 0], 1e-13, intervals=8, values=pressed)[0][0]
+    rest = advance(kernel, [STOP, 0, 0, 0, 0], 1e-13, intervals=8, values=pressed)[0][0]
     assert rest[1] == pytest.approx(0.0, abs=1e-12)
     assert STIFFNESS * rest[0] + HERTZ * (rest[0] - STOP) ** 1.5 == pytest.approx(2.0, abs=1e-12)
     balanced = theta(damping=0.1, amplitude=0.0, force=STOP)
-    still = advance(module, [STOP, 0, 0, 0, 0], 1e-13, intervals=3, values=balanced)[0][0]
+    still = advance(kernel, [STOP, 0, 0, 0, 0], 1e-13, intervals=3, values=balanced)[0][0]
     assert still[:2] == pytest.approx([STOP, 0.0], abs=1e-14)
 
 
@@ -203,17 +203,17 @@ def time_in_contact(beyond, stiffness):
 
 
 @pytest.mark.parametrize("beyond", [1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-9, -1e-12, -1e-6])
-def test_grazing_is_not_missed(module, beyond):
+def test_grazing_is_not_missed(kernel, beyond):
     """A mass that would turn `beyond` a hard stop comes back earlier, by a known time."""
     values = theta(damping=0.0, amplitude=0.0, force=0.0, right=1e12, left_stop=-5.0)
-    out = advance(module, [0, STOP + beyond, 0, 0, 0], 1e-12, interval=np.pi, values=values)[0][0]
+    out = advance(kernel, [0, STOP + beyond, 0, 0, 0], 1e-12, interval=np.pi, values=values)[0][0]
     early = 0.0
     if beyond > 0:
         early = 2 * np.arctan(np.sqrt(beyond * (1 + beyond)) / STOP) - time_in_contact(beyond, 1e12)
     assert out[0] == pytest.approx(-(STOP + beyond) * np.sin(early), abs=1e-9)
 
 
-def test_energy_at_any_stiffness_and_without_gap(module):
+def test_energy_at_any_stiffness_and_without_gap(kernel):
     """Stiff stops lose what the rounding of x hides; without a gap, energy drifts from bounce to bounce."""
     scenes = [(1.0, 0.5, 1e-12), (1e6, 0.5, 1e-11), (1e12, 0.5, 1e-9), (50.0, 0.0, 1e-11), (1e6, 0.0, 1e-9)]
     for stiffness, stop, drift in scenes:
@@ -221,7 +221,7 @@ def test_energy_at_any_stiffness_and_without_gap(module):
             damping=0.0, amplitude=0.0, force=0.0, right=stiffness, left=stiffness, right_stop=stop, left_stop=-stop
         )
         states = starts(6, 0.0) * [0.9 if stop else 0.0, 1, 1, 1, 1]
-        out, _, status = advance(module, states, 1e-13, 5, values=values)
+        out, _, status = advance(kernel, states, 1e-13, 5, values=values)
         energy = [
             (z[:, 1] ** 2 + z[:, 0] ** 2) / 2 + 0.4 * stiffness * np.maximum(np.abs(z[:, 0]) - stop, 0) ** 2.5
             for z in (states, out)
@@ -234,9 +234,9 @@ def test_energy_at_any_stiffness_and_without_gap(module):
 def test_law_that_would_pull_is_let_go(clamped):
     """The fine solution agrees with small Runge–Kutta steps of max(law, 0), which lose order at the kinks."""
     states = starts(6, 0.0)
-    module, values = clamped
+    kernel, values = clamped
     fine, coarse = (
-        advance(module, states, tolerance, interval=4.0, values=values)[0][:, :2] for tolerance in (1e-13, 1e-9)
+        advance(kernel, states, tolerance, interval=4.0, values=values)[0][:, :2] for tolerance in (1e-13, 1e-9)
     )
 
     def rates(t, z):
@@ -255,31 +255,31 @@ def test_law_that_would_pull_is_let_go(clamped):
     assert coarse == pytest.approx(fine, abs=1e-7)
 
 
-def test_record_passes_through_the_sections(module):
+def test_record_passes_through_the_sections(kernel):
     out = np.empty((41, 5))
     state = starts(1)[0]
-    assert module.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0, 1.0]), out) == 41
-    sections = [advance(module, state, 1e-13, k)[0][0] for k in (1, 2)]
+    assert kernel.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0, 1.0]), out) == 41
+    sections = [advance(kernel, state, 1e-13, k)[0][0] for k in (1, 2)]
     assert out[[20, 40], :2] == pytest.approx(np.array(sections)[:, :2], abs=1e-10)
 
 
-def test_intervals_are_memoryless(module):
+def test_intervals_are_memoryless(kernel):
     state = starts(1)[0]
-    twice = advance(module, advance(module, state, 1e-8)[0][0], 1e-8)[0]
-    assert (twice == advance(module, state, 1e-8, 2)[0]).all()
+    twice = advance(kernel, advance(kernel, state, 1e-8)[0][0], 1e-8)[0]
+    assert (twice == advance(kernel, state, 1e-8, 2)[0]).all()
 
 
-def test_stops_are_reported(module):
+def test_stops_are_reported(kernel):
     states = starts(2)
-    _, done, status = advance(module, states, 1e-10, 3, region=np.array([[-1e-9, 1e-9], [-1e-9, 1e-9]]))
+    _, done, status = advance(kernel, states, 1e-10, 3, region=np.array([[-1e-9, 1e-9], [-1e-9, 1e-9]]))
     assert (status == LEFT_REGION).all()
     assert (done == 1).all()
-    out, done, status = advance(module, states, 1e-12, 3, limit=4)
+    out, done, status = advance(kernel, states, 1e-12, 3, limit=4)
     assert (status == STALLED).all()
     assert (out == states).all()
     states[1, 2:4] = 1e300
-    out, done, status = advance(module, states, 1e-6, 3, values=theta(damping=60.0))
+    out, done, status = advance(kernel, states, 1e-6, 3, values=theta(damping=60.0))
     assert status[1] == DIVERGED
     assert np.isfinite(out).all()
     samples = np.empty((9, 5))
-    assert module.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0, 1.0]), samples) < 9
+    assert kernel.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0, 1.0]), samples) < 9

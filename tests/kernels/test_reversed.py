@@ -192,6 +192,6 @@ def test_nothing_but_the_signs_of_drag_and_time_differs(stepper, excitations):
 
 def test_without_drag_and_forcing_the_way_back_is_the_way():
     osc = vk.load_scene("double-well").replace({"damping_ratio": 0.0})
-    assert kernel_for(osc, Flow.STATE, vk.RK4()).name != kernel_for(osc, Flow.STATE_REVERSED, vk.RK4()).name
+    assert kernel_for(osc, Flow.STATE, vk.RK4()).scene != kernel_for(osc, Flow.STATE_REVERSED, vk.RK4()).scene
     there = run_ensemble(osc, Flow.STATE, vk.RK4(), STATES).states
     assert np.array_equal(preimages(osc, STATES * [1.0, -1.0], stepper=vk.RK4()) * [1.0, -1.0], there)

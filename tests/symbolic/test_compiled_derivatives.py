@@ -17,6 +17,7 @@ from vibrokit.kernels.vector_field import VectorField
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.source import SceneText
 from vibrokit.symbolic.symbols import parameter_symbols
+from vibrokit.testing.compiled import Pieces
 
 DIGITS = 160  # so that second differences are good to 50
 TOLERANCE = 1e-12
@@ -217,7 +218,7 @@ def expected(case, flow, x, v):
 def compiled(name, flow):
     """The compiled right-hand side of lanes, and the values of the parameters that it takes."""
     scene = CASES[name].scene
-    module = kernel_for(scene, flow, vk.RK4()).module
+    module = kernel_for(scene, flow, Pieces()).module
     values = dict(zip(map(str, parameter_symbols(scene).values()), theta_of(scene), strict=True))
     names = list(inspect.signature(module.derivative.py_func).parameters)
     return module, [values[name] for name in names[names.index("f") + 1 :]]

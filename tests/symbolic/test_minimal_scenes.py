@@ -69,8 +69,8 @@ def test_unforced_has_no_time(flow, excitations):
     assert not words(text) & {"forcing", "tabulate", "table", "cos", "sin", "omega", "phi", "f", "t", "elapsed"}
     parts = functions(text)
     assert "f" not in arguments(parts["derivative"])
-    normals = ["first", "second"] if flow is Flow.NOISY else []
-    assert arguments(parts["step_lanes"]) == ["z", *normals, "theta", "h"]
+    assert arguments(parts["step_lanes"]) == ["z", "forces", "normals", "theta", "room", "h"]
+    assert "forces[" not in text
 
 
 @pytest.mark.parametrize("flow", [Flow.STATE, Flow.STATE_VARIATIONAL], ids=lambda flow: flow.value)
@@ -87,7 +87,7 @@ def test_flows_without_noise_have_no_momenta_and_draw_nothing(flow, noise):
         "draw_lanes",
         "seed_lane",
         "amplitude",
-        "first",
+        "drawn",
     }
 
 
@@ -112,7 +112,9 @@ def test_additive_noise_has_no_slope_and_state_dependent_noise_has_no_more_than_
 
 @pytest.mark.parametrize("flow", list(Flow), ids=lambda flow: flow.value)
 def test_generated_modules_read_well(flow):
-    text = source(everything(), flow)
+    kernel = kernel_for(everything(), flow, vk.RK4())
+    text = kernel.scene.source
+    assert kernel.driver.source.startswith('"""')
     tree = ast.parse(text)
     imports = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
     imported = [alias.asname or alias.name for node in imports for alias in node.names]
@@ -122,7 +124,7 @@ def test_generated_modules_read_well(flow):
     assert "theta[3] = barriers.0.law.stiffness (k_r)" in ast.get_docstring(tree)
     assert not re.search(
         r"\*\*|\bpow\(|select\(|Heaviside|DiracDelta|\n{4}",
-        text.split('"""')[2].replace("**OPTIONS", "").replace("**CONTRACTED", "").replace("**INLINED", ""),
+        text.split('"""')[2].replace("@njit(**", ""),
     )
 
 

@@ -19,17 +19,23 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
 _LANES = 8  # those of one register; more were not faster, and fewer trajectories would fill them
+_LEAST_DEPTH = 64.0 * 2.0**-52  # of the position of a stop
 _ASSUMED = "    keep_apart(), use_widest_registers()"
 _EACH_NUMBER = "    for _k in range((EQUATIONS + 1)*LANES):"
-_IMPORTS = (
-    "from vibrokit.kernels.registers import keep_apart, promise_no_overlap, use_widest_registers",
-    "from vibrokit.kernels.pointers import offset_by",
-    "from vibrokit.kernels.waves import cos, sin",
-)
+_IMPORTS = """from math import sqrt
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.options import INNER_LANES, LINKED_LANES
+from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.registers import keep_apart, promise_no_overlap, use_widest_registers
+"""
+_WAVES = "from vibrokit.kernels.waves import cos, sin\n"
 
 
 class AttemptWriter:
-    """Writes `attempt_lanes` and `misfit_lanes`, and the offsets that they use; `templates/scene.py` says what they do.
+    """Writes `attempt_lanes` for the scene and `misfit_lanes` for the driver; `templates/scene.py` says what they do.
 
     The slopes of a stage are one function, and all else are loops over the numbers of all variables. Written out for
     each stage and variable, an attempt took a tenth less time, and up to 2.4 times as long to compile.
@@ -50,11 +56,18 @@ class AttemptWriter:
             self._places[name] = self._numbers
             self._numbers += height * _LANES
 
-    def text(self) -> list[str]:
-        """The pieces: offsets, slopes, attempt, misfit."""
+    def offsets(self) -> str:
+        """Where the numbers of a block are."""
         offsets = [f"{name} = {place}" for name, place in self._places.items()]
-        head = [*_IMPORTS, "", f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", *offsets, ""]
-        return ["\n".join(lines) for lines in (head, self._slopes(), self._attempt(), self._misfit())]
+        return "\n".join([f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", *offsets, ""])
+
+    def attempt(self) -> list[str]:
+        """Pieces of the scene: the slopes, and the attempt."""
+        return [_IMPORTS + _WAVES, *("\n".join(lines) for lines in (self._slopes(), self._attempt()))]
+
+    def misfit(self) -> list[str]:
+        """Pieces of the driver: the error of an attempt."""
+        return [_IMPORTS, "\n".join(self._misfit())]
 
     def _at(self, name: str, row: int = 0) -> str:
         """Text of the number of a lane in a row of a block of rows."""
@@ -77,7 +90,7 @@ class AttemptWriter:
     def _slopes(self) -> list[str]:
         """Function `slopes_lanes(node, lanes, slopes, theta)`: the slopes at POINT along each course."""
         names = (*self._text.variables, "_now")
-        lines = ["@njit(**CONTRACTED)", "def slopes_lanes(node, lanes, slopes, theta):"]
+        lines = ["@njit(**INNER_LANES)", "def slopes_lanes(node, lanes, slopes, theta):"]
         lines += [_ASSUMED, "    promise_no_overlap()"]
         lines += [f"    {name} = theta[{place}]" for name, place in self._text.parameters.items()]
         lines += ["    for lane in range(LANES):"]
@@ -105,7 +118,7 @@ class AttemptWriter:
             "x = _wall + _side*_sigma*_sigma if _deep else x",
             "_rate = _side*v",
             "_along = 1.0 if _deep else _rate",
-            f"_least = LEAST_DEPTH*abs(_wall) + 1e-16*{self._at('LENGTH')}*{self._at('LENGTH')}*abs(_along)",
+            f"_least = {_LEAST_DEPTH!r}*abs(_wall) + 1e-16*{self._at('LENGTH')}*{self._at('LENGTH')}*abs(_along)",
             "_shallow = _rooted and _side*(x - _wall) < _least",
             "x = _wall + _side*_least if _shallow else x",
             "_weight = (2.0*_sigma if _rooted else 1.0)/(_rate if _deep else 1.0)",
@@ -117,7 +130,7 @@ class AttemptWriter:
         return [f"        {line}" for line in lines]
 
     def _attempt(self) -> list[str]:
-        lines = ["@njit(**CONTRACTED)", "def attempt_lanes(lanes, theta, pushing, room):", _ASSUMED]
+        lines = ["@njit(**LINKED_LANES)", "def attempt_lanes(lanes, theta, pushing, room):", _ASSUMED]
         lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
         lines += ["            lanes[LENGTHS + _e*LANES + lane] = lanes[LENGTH + lane]"]
         for stage in range(STAGES):
@@ -137,7 +150,7 @@ class AttemptWriter:
     def _misfit(self) -> list[str]:
         text, clock = self._text, self._count
         blocks = error_blocks(text.states, text.states * text.flow.has_momenta, clock)
-        lines = ["@njit(**CONTRACTED)", "def misfit_lanes(lanes, tolerance, span):", _ASSUMED]
+        lines = ["@njit(**INNER_LANES)", "def misfit_lanes(lanes, tolerance, span):", _ASSUMED]
         values = self._each("STATE"), self._each("TRIAL"), f"{self._each('LENGTHS')}*{self._each('SLOPES')}"
         lines += [_EACH_NUMBER, f"        _one, _two, _three = {', '.join(f'abs({value})' for value in values)}"]
         lines += ["        _one = _one if _one > _two else _two"]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.kernel import Kernel, first_call, kernel_for, theta_of
+from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.progress import TRAJECTORIES, advance, count, working
@@ -180,13 +180,11 @@ def run_ensemble(
 def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
     """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation."""
     kernel = kernel_for(scene, flow, stepper)
-    advance_kernel = kernel.module.advance
-    if not advance_kernel.overloads:
+    if not kernel.compiled:
         common = (theta_of(scene), 0.0, 1.0, np.array(stepper.settings(scene, 1.0)))
         nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
         none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)
-        with first_call(advance_kernel):
-            _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
+        _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
     return kernel
 
 
@@ -219,7 +217,7 @@ def _advance_block(
     region, area, points, metrics = (_plain(array, float) for array in bounds)
     labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
     budget, phases = _plain(budget, np.int64), _plain(phases, np.int64)
-    kernel.module.advance(
+    kernel.advance(
         _plain(starts, float), *common, *((streams,) if streams.shape[1] else ()), budget, phases,
         stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
         ended.states, ended.intervals, ended.status, ended.label, ended.visits,

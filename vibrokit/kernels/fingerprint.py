@@ -24,7 +24,7 @@ _EMITTERS = ("parts", "symbolic", "kernels")
 
 def scene_fingerprint(scene: Scene) -> str:
     """Return text that is equal for two scenes exactly if the same generated code serves both."""
-    rows = [_environment()]
+    rows = [environment()]
     rows += ["" if scene.spring is None else _part(scene.spring)]
     rows += [f"{barrier.side} {barrier.adhesive} {_part(barrier.law)}" for barrier in scene.barriers]
     rows += [_part(excitation) for excitation in scene.excitations]
@@ -34,7 +34,7 @@ def scene_fingerprint(scene: Scene) -> str:
 
 
 @functools.cache
-def _environment() -> str:
+def environment() -> str:
     """Versions of everything that writes or compiles code, and the source of this package's part of it."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]

@@ -29,7 +29,6 @@ class FixedSteps(Stepper):
         Steps from section to section (forcing period, or 2π/ω_n without forcing).
     """
 
-    templates: ClassVar[tuple[str, ...]] = ("fixed_steps",)
     takes_noise: ClassVar[bool] = False
 
     steps: int = 256
@@ -67,7 +66,19 @@ class FixedSteps(Stepper):
                 f"{what} jump too; use FreeFlight or Order8, which locate contacts."
             )
         # The laws are compiled only if contact times are needed.
-        return [text.constants, text.forcing, *self.step_part(text), text.stops]
+        return [text.constants, self.sizes(text), text.forcing, *self.step_part(text), text.stops]
+
+    def driver_part(self, text: SceneText) -> list[str]:
+        """The sizes."""
+        return [text.constants, self.sizes(text)]
+
+    @abstractmethod
+    def sizes(self, text: SceneText) -> str:
+        """Return the constants LANES, NODES of a step and ROOM, the numbers that a step works in."""
+
+    def templates_for(self, text: SceneText) -> tuple[str, ...]:
+        """The loop over trajectories, and what draws the noise."""
+        return ("drawing", "fixed_steps") if text.flow is Flow.NOISY else ("fixed_steps",)
 
     @abstractmethod
     def step_part(self, text: SceneText) -> list[str]:

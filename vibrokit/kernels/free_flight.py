@@ -29,5 +29,9 @@ class FreeFlight(LocatedStepper):
     templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "free_flight", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The right-hand side with switched stops, and the series of the flight."""
-        return [*self.located_part(text), text.flight]
+        """That of a located stepper, and the series of the flight."""
+        return [text.flight_sizes, *super().scene_part(text), text.flight]
+
+    def series(self, text: SceneText) -> str:
+        """The order of the series, and its number of terms."""
+        return text.flight_sizes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,12 +17,10 @@ if TYPE_CHECKING:
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
-_NORMALS = ("first", "second")
-_REGISTERS = "from vibrokit.kernels.registers import use_widest_registers"
-_DRAWING = (
-    "from vibrokit.kernels.streams import normal_pair", "", "",
-    "@njit(**INLINED)", "def draw_lanes(streams, first, second):", "    use_widest_registers()",
-    "    for lane in range(LANES):", "        first[lane], second[lane] = normal_pair(streams, lane)",
+_REGISTERS = "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers\n"
+_STEP = (
+    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, room, h):",
+    "    promise_no_overlap(), use_widest_registers()",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 _CLASSICAL_NODES = (0.0, 0.5, 1.0)
@@ -30,114 +28,129 @@ _CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    head = sizes(text, len(_CLASSICAL_NODES))
-    return [head, tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope, _unrolled(text)]
+    pieces = [tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope]
+    return [*pieces, "\n".join([*step_head(text), *_unrolled(text)])]
+
+
+def classical_sizes(text: SceneText) -> str:
+    """Constants of classical Runge–Kutta steps."""
+    return sizes(text, len(_CLASSICAL_NODES))
 
 
 def staged_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
     nodes = tuple(float(node) for node in NODES)
-    return [f"{sizes(text, STAGES)}STAGES = {STAGES}\n", tabulation(text, nodes), text.derivative, _staged(text)]
+    return [tabulation(text, nodes), text.derivative, "\n".join([*step_head(text), *_staged(text)])]
 
 
-def sizes(text: SceneText, nodes: int) -> str:
-    """Lanes of a block, whose numbers stay in the nearest cache, and values of the forcing in a step."""
-    lanes = 32 if len(text.variables) <= _FEW_EQUATIONS else 16
-    return f"{_REGISTERS}\n\nLANES = {lanes}\nNODES = {nodes}\n"
+def staged_sizes(text: SceneText) -> str:
+    """Constants of Dormand–Prince steps, which work in their slopes and a point."""
+    return sizes(text, STAGES, room=(STAGES + 1) * len(text.variables) * lanes_of(text))
 
 
-def _staged(text: SceneText) -> str:
-    """Function `step_lanes(z, slopes, point, forces, theta, h)`: a step of order 8 of every lane.
+def sizes(text: SceneText, nodes: int, room: int = 1) -> str:
+    """Lanes of a block, values of the forcing in a step, and numbers that a step works in."""
+    return f"LANES = {lanes_of(text)}\nNODES = {nodes}\nROOM = {room}\n"
 
-    `slopes` and `point` are workspaces. With few equations, a stage is one loop over the lanes. With many, that loop
-    would need more registers and a longer compilation than it gains: the point of a stage is computed in a loop over
-    all numbers of all lanes first, which halves both times.
+
+def lanes_of(text: SceneText) -> int:
+    """Number of lanes of a block, whose numbers stay in the nearest cache."""
+    return 32 if len(text.variables) <= _FEW_EQUATIONS else 16
+
+
+def step_head(text: SceneText) -> list[str]:
+    """Lines that begin `step_lanes(z, forces, normals, theta, room, h)`: a step of every lane.
+
+    `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of the step, the same for all lanes
+    because they share the phase; `normals` has two standard normals for each lane, in two rows; both only where a scene
+    and a flow need them.
     """
-    names, few = text.variables, len(text.variables) <= _FEW_EQUATIONS
-    lines = ["@njit(**INLINED)", f"def step_lanes(z, slopes, point, {'forces, ' * text.forced}theta, h):"]
-    lines += ["    use_widest_registers()"]
-    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    flat_z, flat_point = z.reshape(EQUATIONS*LANES), point.reshape(EQUATIONS*LANES)"]
-    lines += ["    flat_slopes = slopes.reshape((STAGES, EQUATIONS*LANES))"]
+    unpacked = [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    return [_REGISTERS, "", *_STEP, *unpacked]
+
+
+def _staged(text: SceneText) -> list[str]:
+    """Lines of a step of order 8, which works in its slopes and a point.
+
+    With few equations, a stage is one loop over the lanes. With many, that loop would need more registers and a longer
+    compilation than it gains: the point of a stage is computed in a loop over all numbers of all lanes first, which
+    halves both times.
+    """
+    names, lanes = text.variables, lanes_of(text)
+    few, size = len(names) <= _FEW_EQUATIONS, len(names) * lanes
+    lines = []
+
+    def at(block: str, place: int, row: int) -> str:
+        return f"{block}[{place * size + row * lanes} + lane]"
+
     for stage, weights in enumerate(WEIGHTS):
-        places = [f"{index}, lane]" for index, _ in enumerate(names)]
         if few:
-            at = [f"z[{place}{_combined(weights, f'slopes[{{}}, {place}')}" for place in places]
+            point = [
+                at("z", 0, row) + _combined(weights, lambda s, row=row: at("room", s, row)) for row in range(len(names))
+            ]
         else:
-            lines += ["    for number in range(EQUATIONS*LANES):"]
-            lines += [f"        flat_point[number] = flat_z[number]{_combined(weights, 'flat_slopes[{}, number]')}"]
-            at = [f"point[{place}" for place in places]
+            lines += [f"    for number in range({size}):"]
+            moved = _combined(weights, lambda s: f"room[{s * size} + number]")
+            lines += [f"        room[{STAGES * size} + number] = z[number]{moved}"]
+            point = [at("room", STAGES, row) for row in range(len(names))]
         lines += [f"    force = forces[{stage}]"] * text.forced
-        force = ["force"] * text.forced
         lines += ["    for lane in range(LANES):"]
-        lines += [f"        {', '.join(f'slopes[{stage}, {place}' for place in places)} = \\"]
-        lines += [f"            derivative({', '.join([*at, *force, *text.parameters])})"]
-    lines += ["    for number in range(EQUATIONS*LANES):"]
-    lines += [f"        flat_z[number] += {_combined(RESULT, 'flat_slopes[{}, number]').removeprefix(' + ')}"]
-    return "\n".join([*lines, ""])
+        lines += [f"        {', '.join(at('room', stage, row) for row in range(len(names)))} = \\"]
+        lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
+    lines += [f"    for number in range({size}):"]
+    end = _combined(RESULT, lambda s: f"room[{s * size} + number]")
+    return [*lines, f"        z[number] += {end.removeprefix(' + ')}", ""]
 
 
-def _combined(weights: NDArray[np.float64], slope: str) -> str:
-    """Text that adds the weighted slopes of a step, if there are any; `slope` has braces for the stage."""
-    terms = [f"{float(weight)!r}*{slope.format(stage)}" for stage, weight in enumerate(weights) if weight]
+def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
+    """Text that adds the weighted slopes of a step, if there are any; `slope` gives the text of that of a stage."""
+    terms = [f"{float(weight)!r}*{slope(stage)}" for stage, weight in enumerate(weights) if weight]
     return f" + h*({' + '.join(terms)})" if terms else ""
 
 
-def _unrolled(text: SceneText) -> str:
-    """Function `step_lanes(z, forces, first, second, theta, h)`: a classical step of every lane.
+def _unrolled(text: SceneText) -> list[str]:
+    """Lines of a classical Runge–Kutta step, between two kicks where there is noise.
 
-    `z` has shape (EQUATIONS, LANES); `forces` has the forcing at the step's start, middle and end, the same for all
-    lanes because they share the phase; first, second are two standard normals for each lane. A scene without forcing
-    and a flow without noise have no such arguments. `draw_lanes(streams, first, second)` draws the normals.
-
-    LLVM turns loops into vector code before it inlines, so each function here asks for wide registers itself, and knows
-    the number of lanes.
-
-    The step is a classical Runge–Kutta step, between two kicks where there is noise. With U₁, U₂ standard normal,
-    ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
+    With U₁, U₂ standard normal, ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
     """
-    names = text.variables
+    names, lanes = text.variables, lanes_of(text)
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
-    arguments = ["z", *["forces"] * text.forced, *(_NORMALS if noisy else []), "theta", "h"]
-    lines = [*(_DRAWING if noisy else []), "", ""]
-    lines += ["@njit(**INLINED)", f"def step_lanes({', '.join(arguments)}):"]
-    lines += ["    use_widest_registers()"]
-    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    f0, f1, f2 = forces[0], forces[1], forces[2]"] if text.forced else []
+    lines = ["    f0, f1, f2 = forces[0], forces[1], forces[2]"] if text.forced else []
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
-    lines += [f"        {name} = z[{index}, lane]" for index, name in enumerate(names)]
+    lines += [f"        {name} = z[{row * lanes} + lane]" for row, name in enumerate(names)]
     lines += _kicks(driven, text) if noisy else []
     for stage, (factor, before) in enumerate(_STAGES, start=1):
         point = [f"{name} + {factor}{before}{name}" if before else name for name in names]
         force = [_FORCES[stage // 2]] if text.forced else []
         targets = ", ".join(f"k{stage}_{name}" for name in names)
         lines.append(f"        {targets} = derivative({', '.join([*point, *force, *text.parameters])})")
-    for index, name in enumerate(names):
+    for row, name in enumerate(names):
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
         after = " + _later" if noisy and name == driven else ""
-        lines.append(f"        z[{index}, lane] = {name} + h/6.0*({slopes}){after}")
-    return "\n".join([*lines, ""])
+        lines.append(f"        z[{row * lanes} + lane] = {name} + h/6.0*({slopes}){after}")
+    return [*lines, ""]
 
 
 def _kicks(driven: str, text: SceneText) -> list[str]:
     """Lines that kick the driven state before the step and keep the kick after it; Milstein's term is in the latter."""
-    milstein = " + _size*sqrt(h)*slope(x, v, theta)*(first[lane]*first[lane] - 1.0)" if text.slope else ""
+    milstein = " + _size*sqrt(h)*slope(x, v, theta)*(_first*_first - 1.0)" if text.slope else ""
     return [
+        "        _first, _second = normals[lane], normals[LANES + lane]",
         "        _size = _half*amplitude(x, v, theta)",
-        f"        _later = _size*(first[lane] - {_ROOT_THIRD!r}*second[lane]){milstein}",
-        f"        {driven} += _size*(first[lane] + {_ROOT_THIRD!r}*second[lane])",
+        f"        _later = _size*(_first - {_ROOT_THIRD!r}*_second){milstein}",
+        f"        {driven} += _size*(_first + {_ROOT_THIRD!r}*_second)",
     ]
 
 
 def tabulation(text: SceneText, nodes: Sequence[float]) -> str:
-    """Function `tabulate(start, h, theta, table)`: the forcing at the nodes of every step; nothing without forcing."""
+    """Function `tabulate(start, h, steps, theta, table)`: the forcing at the nodes of steps; empty without."""
     if not text.forced:
         return ""
-    lines = ["@njit(**INLINED)", "def tabulate(start, h, theta, table):", "    for step in range(table.shape[0]):"]
+    lines = ["@njit(**LINKED_LANES)", "def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
     lines += [
-        f"        table[step, {place}] = forcing(start + h*(step + {node!r}), theta)"
+        f"        table[{len(nodes)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
         for place, node in enumerate(nodes)
     ]
     return "\n".join([*lines, ""])

@@ -12,32 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import sizes, tabulation
+from vibrokit.kernels.lanes import lanes_of, sizes, step_head, tabulation
 from vibrokit.kernels.nystrom_tableau import NODES, POSITION, STAGES, VELOCITY, WEIGHTS
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.second_order_source import SecondOrderWriter
     from vibrokit.symbolic.source import SceneText
 
-_SCALE = """@njit(**OPTIONS)
-def scale(theta, h, factors):
+_SCALE = """@njit(**LINKED)
+def prepare(h, theta, room):
     constants = np.zeros((KINDS, 3))
     constants_of(theta, constants)
     for kind in range(KINDS):
         own, turned, damping = constants[kind, 0], constants[kind, 1], constants[kind, 2]
         half = 0.5*(own + damping)
+        place = kind*(STAGES + 2)*4
         for stage in range(STAGES + 1):
             after = h*FRACTIONS[stage]
             grown = exp(half*after)
-            factors[kind, stage, 0] = grown*(1.0 + after*(own - half))
-            factors[kind, stage, 1] = grown*after*turned
-            factors[kind, stage, 2] = grown*h*h
-            factors[kind, stage, 3] = 1.0/grown
-        factors[kind, STAGES, 3] = half*half
-        factors[kind, STAGES + 1, 0] = grown*(own - half)/turned
-        factors[kind, STAGES + 1, 1] = grown
-        factors[kind, STAGES + 1, 2] = grown*h/turned
-        factors[kind, STAGES + 1, 3] = (half - own)/turned
+            room[place] = grown*(1.0 + after*(own - half))
+            room[place + 1] = grown*after*turned
+            room[place + 2] = grown*h*h
+            room[place + 3] = half*half if stage == STAGES else 1.0/grown
+            place += 4
+        room[place] = grown*(own - half)/turned
+        room[place + 1] = grown
+        room[place + 2] = grown*h/turned
+        room[place + 3] = (half - own)/turned
 """
 """Of u and w at the start and of the forces, in u of a stage (rows 0 to STAGES) and in w of the end (the last row)."""
 
@@ -50,47 +51,57 @@ def nystrom_step(text: SceneText) -> list[str]:
             f"RKN12 needs forces that do not depend on the velocity, besides linear damping, and the "
             f"{text.flow.value} flow of this scene has others; use RK8 or Order8."
         )
-    head = f"{sizes(text, STAGES)}STAGES = {STAGES}\nKINDS = {writer.kinds}\n"
-    head += f"FRACTIONS = np.array({(*NODES.tolist(), 1.0)!r})\n"
+    head = f"STAGES = {STAGES}\nKINDS = {writer.kinds}\nFRACTIONS = np.array({(*NODES.tolist(), 1.0)!r})\n"
     accelerations = writer.text(tuple(text.parameters), forced=text.forced)
-    return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, _step(text, writer)]
+    step = "\n".join([*step_head(text), *_step(text, writer)])
+    return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, step]
 
 
-def _step(text: SceneText, writer: SecondOrderWriter) -> str:
-    """Function `step_lanes(z, forces, factors, theta, h)`: a step of every lane.
+def nystrom_sizes(text: SceneText) -> str:
+    """Constants of Runge–Kutta–Nyström steps, which read their factors."""
+    writer = text.second_order
+    return sizes(text, STAGES, room=_factor(0 if writer is None else writer.kinds, 0, 0))
+
+
+def _factor(kind: int, stage: int, number: int) -> int:
+    """Place of one of the four factors of a stage of a kind of pair."""
+    return (kind * (STAGES + 2) + stage) * 4 + number
+
+
+def _step(text: SceneText, writer: SecondOrderWriter) -> list[str]:
+    """Lines of a step.
 
     One loop over the lanes holds all stages: a loop for each stage takes twice as long to compile.
     """
-    lines = ["@njit(**INLINED)", f"def step_lanes(z, {'forces, ' * text.forced}factors, theta, h):"]
-    lines += ["    use_widest_registers()"]
-    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    for lane in range(LANES):"]
+    lanes = lanes_of(text)
+    lines = ["    for lane in range(LANES):"]
     for n, pair in enumerate(writer.pairs):
-        lines += [f"        _u{n}, _w{n} = z[{pair.position}, lane], z[{pair.velocity}, lane]"]
+        lines += [f"        _u{n}, _w{n} = z[{pair.position * lanes} + lane], z[{pair.velocity * lanes} + lane]"]
     for stage, weights in enumerate(WEIGHTS):
         lines += _stage(text, writer, stage, weights)
     for n, pair in enumerate(writer.pairs):
-        end, last = (f"factors[{pair.kind}, {row}, " for row in ("STAGES", "STAGES + 1"))
-        lines += [f"        _x{n} = {end}0]*_u{n} + {end}1]*_w{n}{_sum(POSITION, f'{end}2]', f'_g{{}}_{n}')}"]
-        lines += [f"        z[{pair.position}, lane] = _x{n}"]
-        moved = f"{last}0]*_u{n} + {last}1]*_w{n} + {last}3]*_x{n}"
-        lines += [f"        z[{pair.velocity}, lane] = {moved}{_sum(VELOCITY, f'{last}2]', f'_g{{}}_{n}')}"]
+        end, last = ([f"room[{_factor(pair.kind, row, k)}]" for k in range(4)] for row in (STAGES, STAGES + 1))
+        lines += [f"        _x{n} = {end[0]}*_u{n} + {end[1]}*_w{n}{_sum(POSITION, end[2], f'_g{{}}_{n}')}"]
+        lines += [f"        z[{pair.position * lanes} + lane] = _x{n}"]
+        moved = f"{last[0]}*_u{n} + {last[1]}*_w{n} + {last[3]}*_x{n}"
+        lines += [f"        z[{pair.velocity * lanes} + lane] = {moved}{_sum(VELOCITY, last[2], f'_g{{}}_{n}')}"]
     for n, place in enumerate(writer.integrals):
-        lines += [f"        z[{place}, lane] +={_sum(VELOCITY, 'h', f'_r{{}}_{n}').removeprefix(' +')}"]
-    return "\n".join([*lines, ""])
+        lines += [f"        z[{place * lanes} + lane] +={_sum(VELOCITY, 'h', f'_r{{}}_{n}').removeprefix(' +')}"]
+    return [*lines, ""]
 
 
 def _stage(text: SceneText, writer: SecondOrderWriter, stage: int, weights: NDArray[np.float64]) -> list[str]:
     """Lines of a stage: positions `_x`, and from them the scaled forces `_g` and the rates of the integrals `_r`."""
     lines, pairs = [], list(enumerate(writer.pairs))
     for n, pair in pairs:
-        row = f"factors[{pair.kind}, {stage}, "
-        lines += [f"        _x{n} = {row}0]*_u{n} + {row}1]*_w{n}{_sum(weights, f'{row}2]', f'_g{{}}_{n}')}"]
+        row = [f"room[{_factor(pair.kind, stage, k)}]" for k in range(4)]
+        lines += [f"        _x{n} = {row[0]}*_u{n} + {row[1]}*_w{n}{_sum(weights, row[2], f'_g{{}}_{n}')}"]
     targets = [*(f"_a{n}" for n, _ in pairs), *(f"_r{stage}_{n}" for n, _ in enumerate(writer.integrals))]
     arguments = [*(f"_x{n}" for n, _ in pairs), *[f"forces[{stage}]"] * text.forced, *text.parameters]
     lines += [f"        {', '.join(targets)}, = accelerations({', '.join(arguments)})"]
     for n, pair in pairs:
-        scaled = f"factors[{pair.kind}, {stage}, 3]*(_a{n} + factors[{pair.kind}, STAGES, 3]*_x{n})"
+        own, square = (f"room[{_factor(pair.kind, row, 3)}]" for row in (stage, STAGES))
+        scaled = f"{own}*(_a{n} + {square}*_x{n})"
         lines += [f"        _g{stage}_{n} = {scaled}"]
     return lines
 

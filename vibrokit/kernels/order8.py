@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.template import read_template
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -58,9 +59,21 @@ class LocatedStepper(Stepper):
         place = self.templates.index("landing")
         return (*self.templates[:place], *_CROSSING[text.flow], *self.templates[place:])
 
-    def located_part(self, text: SceneText) -> list[str]:
+    def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and attempts of all lanes."""
-        return [text.constants, text.forcing, text.rhs, text.stops, *AttemptWriter(text).text()]
+        writer = AttemptWriter(text)
+        extrapolation = [read_template("extrapolation")] if text.curved else []
+        constants = [text.constants, text.walls, writer.offsets()]
+        return [*constants, text.forcing, text.rhs, text.stops, *extrapolation, *writer.attempt()]
+
+    def driver_part(self, text: SceneText) -> list[str]:
+        """Where the numbers of the lanes are, and the errors of attempts."""
+        writer = AttemptWriter(text)
+        return [text.constants, writer.offsets(), self.series(text), *writer.misfit()]
+
+    def series(self, text: SceneText) -> str:
+        """Constants of the series of the flight, which has no terms where the flight is stepped."""
+        return "TERMS = 0\n"
 
     def refined(self) -> Self:
         """A hundredth of the tolerance."""
@@ -94,7 +107,3 @@ class Order8(LocatedStepper):
 
     name: ClassVar[str] = "order8"
     templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "order8", "sections")
-
-    def scene_part(self, text: SceneText) -> list[str]:
-        """The right-hand side with switched stops."""
-        return [*self.located_part(text), "TERMS = 0\n"]  # of a series of the flight

@@ -6,7 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.lanes import classical_step
+from vibrokit.kernels.lanes import classical_sizes, classical_step
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -37,3 +37,7 @@ class RK4(FixedSteps):
     def step_part(self, text: SceneText) -> list[str]:
         """The classical step, with kicks where there is noise."""
         return classical_step(text)
+
+    def sizes(self, text: SceneText) -> str:
+        """The lanes, and the three nodes of a step."""
+        return classical_sizes(text)

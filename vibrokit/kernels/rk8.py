@@ -6,7 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.lanes import staged_step
+from vibrokit.kernels.lanes import staged_sizes, staged_step
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -27,10 +27,13 @@ class RK8(FixedSteps):
     """
 
     name: ClassVar[str] = "rk8"
-    staged: ClassVar[bool] = True
 
     steps: int = 24
 
     def step_part(self, text: SceneText) -> list[str]:
         """The step of twelve stages."""
         return staged_step(text)
+
+    def sizes(self, text: SceneText) -> str:
+        """The lanes, the nodes of a step, and the room for its slopes."""
+        return staged_sizes(text)

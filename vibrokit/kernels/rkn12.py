@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.nystrom import nystrom_step
+from vibrokit.kernels.nystrom import nystrom_sizes, nystrom_step
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -31,7 +31,7 @@ class RKN12(FixedSteps):
     """
 
     name: ClassVar[str] = "rkn12"
-    scaled: ClassVar[bool] = True
+    prepared: ClassVar[bool] = True
 
     steps: int = 12
 
@@ -44,3 +44,7 @@ class RKN12(FixedSteps):
     def step_part(self, text: SceneText) -> list[str]:
         """The step of seventeen stages."""
         return nystrom_step(text)
+
+    def sizes(self, text: SceneText) -> str:
+        """The lanes, the nodes of a step, and the room for its factors."""
+        return nystrom_sizes(text)

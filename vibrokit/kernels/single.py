@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
+from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.streams import streams_of
 from vibrokit.parts.scene import Scene
@@ -31,13 +31,13 @@ def record(
 
     They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
-    module = kernel_for(scene, flow, stepper).module
+    kernel = kernel_for(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     settings = np.array(stepper.settings(scene, scene.time_unit))
     out = np.empty((count + 1, len(state)))
     noise: tuple[Any, ...] = ()
     if flow is Flow.NOISY:
         noise = (streams_of(seed or 0, np.zeros(1, dtype=np.int64)), np.empty((0, 2)) if normals is None else normals)
-    with first_call(module.record):
-        good = module.record(np.ascontiguousarray(state), theta_of(scene), start_time, spacing, settings, *noise, out)
+    start, theta = np.ascontiguousarray(state), theta_of(scene)
+    good = kernel.record(start, theta, start_time, spacing, settings, *noise, out)
     return out[:good]

@@ -1,4 +1,4 @@
-"""Emitter: what a generated module consists of. Stepper: how trajectories are integrated."""
+"""Emitter: what generated modules consist of. Stepper: how trajectories are integrated."""
 
 from __future__ import annotations
 
@@ -15,29 +15,33 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Emitter(ABC):
-    """What a generated module consists of: pieces of the scene, and templates below them.
+    """What generated modules consist of: that of the scene, and that of the driver, which scenes of a form share.
 
     For developers
     --------------
-    An emitter names its templates, files of `vibrokit/kernels/templates`, and says which pieces of the scene stand
-    above them.
+    An emitter says which pieces make the module of the scene. One that integrates names the templates of its driver
+    too, files of `vibrokit/kernels/templates`, and what stands above them.
     """
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
-    staged: ClassVar[bool] = False  # whether a step keeps the slopes of its stages
-    scaled: ClassVar[bool] = False  # whether factors of its stages are computed beforehand
+    prepared: ClassVar[bool] = False  # whether steps read what `prepare` writes
+    called: ClassVar[bool] = False  # whether Python calls functions that are otherwise only inlined
 
     @abstractmethod
     def scene_part(self, text: SceneText) -> list[str]:
-        """Return the pieces of the scene that stand above the templates."""
+        """Return the pieces of the scene."""
+
+    def driver_part(self, text: SceneText) -> list[str]:
+        """Return the pieces that stand above the templates: constants, and what depends on no formula of the scene."""
+        return []
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """Return the names of the templates that a scene needs, in the order in which they are pasted."""
+        """Return the names of the templates of the driver, in the order in which they are pasted; none without one."""
         return self.templates
 
     def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most take every scene
-        """Raise StepperError if the module cannot be made for this flow of this scene."""
+        """Raise StepperError if the modules cannot be made for this flow of this scene."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -53,5 +53,5 @@ class SecondOrderWriter:
     def _constants(self) -> list[str]:
         every = {f"out[{k}, {n}]": each for k, kind in enumerate(self._kinds) for n, each in enumerate(kind)}
         shared, texts = assignments(every, "c")
-        lines = ["@njit(**OPTIONS)", "def constants_of(theta, out):", *unpack(every.values(), self._places), *shared]
+        lines = ["@njit(**INNER)", "def constants_of(theta, out):", *unpack(every.values(), self._places), *shared]
         return [*lines, *(f"    {target} = {value}" for target, value in texts.items())]

@@ -14,7 +14,7 @@ import sympy
 
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact_source import ContactWriter
-from vibrokit.symbolic.flight import FlightWriter
+from vibrokit.symbolic.flight import ORDER, FlightWriter
 from vibrokit.symbolic.flow import derive_flow, model_for
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.printer import assignments, unpack
@@ -32,14 +32,8 @@ from math import acos, asin, atan, copysign, cos, cosh, exp, log, sin, sinh, sqr
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.options import INLINED, INLINED_AND_CALLED, INNER, LINKED, LINKED_LANES, OPTIONS
 from vibrokit.kernels.registers import keep_apart
-
-# Each operation rounds by itself, so that the bits do not depend on which functions the compiler inlines.
-OPTIONS = {{"nogil": True, "cache": True, "error_model": "numpy"}}
-# In lanes, contraction of a product and a sum saves a quarter of the time. A function that is compiled both inline and
-# on its own may then round differently in the two versions, so functions of lanes are either inlined or kept apart.
-CONTRACTED = {{**OPTIONS, "fastmath": {{"contract", "nsz", "arcp"}}}}
-INLINED = {{**CONTRACTED, "forceinline": True}}
 '''
 
 
@@ -80,7 +74,7 @@ class SceneText:
 
     @property
     def preamble(self) -> str:
-        """Module docstring, imports and compiler options."""
+        """Module docstring and imports."""
         symbols = enumerate(self._model.symbols.items())
         legend = "\n".join(f"    theta[{index}] = {path} ({symbol})" for index, (path, symbol) in symbols)
         return _PREAMBLE.format(title=f"The {self.flow.value} flow of a scene.", legend=legend)
@@ -110,6 +104,11 @@ class SceneText:
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
 
     @property
+    def walls(self) -> str:
+        """Constant WALLS: places of the positions of the stops in `theta`."""
+        return f"WALLS = {tuple(self._index[self._position(stop)] for stop in range(self.barriers))!r}\n"
+
+    @property
     def barriers(self) -> int:
         """Number of stops."""
         return len(self._model.contacts)
@@ -119,13 +118,16 @@ class SceneText:
         """Whether second derivatives of contact laws are integrated, which may be infinite at first touch."""
         return bool(self._model.contacts) and self.flow is Flow.HAMILTONIAN_VARIATIONAL
 
+    def _position(self, stop: int) -> sympy.Symbol:
+        return self._model.symbols[f"barriers.{stop}.position"]
+
     def _place_of(self, variable: str) -> int:
         return self.variables.index(variable) if variable in self.variables else 0
 
     @property
     def forcing(self) -> str:
         """Function `forcing(t, theta)`; empty for an autonomous scene."""
-        return self._function("forcing", "t", self._model.forcing) if self.forced else ""
+        return self._function("forcing", "t", self._model.forcing, "INLINED_AND_CALLED") if self.forced else ""
 
     @property
     def excitations(self) -> str:
@@ -171,13 +173,17 @@ class SceneText:
             return ""
         stop, law = ["@njit(**OPTIONS)", "def stop(i, theta):"], ["@njit(**OPTIONS)", "def law(i, depth, rate, theta):"]
         for index, contact in enumerate(self._model.contacts):
-            position = self._model.symbols[f"barriers.{index}.position"]
-            stop += [f"    if i == {index}:", f"        return theta[{self._index[position]}]"]
+            stop += [f"    if i == {index}:", f"        return theta[{self._index[self._position(index)]}]"]
             lines, texts = assignments({"force": contact.law}, "c", indent="        ")
             lines = [*unpack([contact.law], self._index, indent="        "), *lines]
             law += [f"    if i == {index}:", *lines, f"        return {texts['force']}"]
         nowhere = "    return np.nan"
         return "\n".join([*stop, nowhere, "", "", *law, nowhere, ""])
+
+    @property
+    def flight_sizes(self) -> str:
+        """Constants of the series of the free motion."""
+        return f"ORDER, TERMS = {ORDER}, {ORDER + 1}\n"
 
     @property
     def flight(self) -> str:
@@ -204,10 +210,10 @@ class SceneText:
     def _amplitude(self) -> sympy.Expr:
         return sympy.sqrt(self._model.symbols["noise.intensity"]) * self._model.amplitude[self.states - 1]
 
-    def _function(self, name: str, arguments: str, value: sympy.Expr) -> str:
+    def _function(self, name: str, arguments: str, value: sympy.Expr, options: str = "INLINED") -> str:
         lines, texts = assignments({name: value}, "c")
         body = [*unpack([value], self._index), *lines, f"    return {texts[name]}"]
-        return "\n".join(["@njit(**INLINED)", f"def {name}({arguments}, theta):", *body, ""])
+        return "\n".join([f"@njit(**{options})", f"def {name}({arguments}, theta):", *body, ""])
 
     def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:
         zeros = dict.fromkeys(zero, sympy.Integer(0))

@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class _Pieces(Emitter):
+class Pieces(Emitter):
     """Includes every piece of the scene part."""
 
     name: ClassVar[str] = "pieces"
+    called: ClassVar[bool] = True
 
     def scene_part(self, text: SceneText) -> list[str]:
         pieces = [text.constants, text.forcing, text.derivative, text.rhs, text.stops, text.amplitude, text.slope]
@@ -35,7 +36,7 @@ class Compiled:
     """Compiled pieces of one flow of one scene."""
 
     def __init__(self, scene: Oscillator, flow: Flow) -> None:
-        self._module = _guarded(lambda: kernel_for(scene, flow, _Pieces()).module)
+        self._module = _guarded(lambda: kernel_for(scene, flow, Pieces()).module)
         self.theta = theta_of(scene)
         self.size = self._module.EQUATIONS
         self._named = dict(zip(map(str, scene.model.symbols.values()), self.theta, strict=True))

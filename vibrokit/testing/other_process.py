@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.kernel import write_source
+from vibrokit.kernels.kernel import write_sources
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.streams import streams_of
 from vibrokit.oscillator import Oscillator
@@ -38,7 +38,7 @@ def outcome(scene: Oscillator) -> tuple[str, bytes]:
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])
     streams = None if scene.noise is None else streams_of(7, np.arange(len(starts)))
     ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, streams=streams)
-    return write_source(scene, flow, stepper), ended.states.tobytes()
+    return write_sources(scene, flow, stepper)[0], ended.states.tobytes()
 
 
 def outcomes_in_other_process(scenes: list[Oscillator]) -> list[tuple[str, bytes]]:

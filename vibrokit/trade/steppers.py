@@ -211,7 +211,7 @@ def _first_calls(
             refused[name] = str(error)
         else:
             elapsed = time.perf_counter() - began
-            compiled = kernel_for(osc, Flow.STATE, stepper).module.advance.stats.cache_misses
+            compiled = kernel_for(osc, Flow.STATE, stepper).compilations
             calls[name] = FirstCall(name, elapsed, bool(compiled))
     return calls, refused
 

@@ -9,30 +9,13 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
+from vibrokit.kernels.links import law, rhs
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
-from vibrokit.kernels.templates.landing import (
-    DEPTH_GOAL,
-    LAW_GOAL,
-    depth_at,
-    land,
-)
-from vibrokit.kernels.templates.scene import (
-    CLAMPED,
-    COURSE,
-    ERROR,
-    FACTOR,
-    LANES,
-    LENGTH,
-    SIDES,
-    SIGMA,
-    STATE,
-    TRIAL,
-    law,
-    rhs,
-    stop,
-)
+from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
+from vibrokit.kernels.templates.scene import CLAMPED, COURSE, ERROR, FACTOR, LANES, LENGTH, SIDES, SIGMA, STATE, TRIAL
 from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_of, settle
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -44,7 +27,6 @@ from vibrokit.kernels.templates.steps import (
     FIRST,
     FIRST_STEP,
     FLIPS,
-    INNER,
     LAST,
     PULLED,
     RELEASES,
@@ -67,6 +49,7 @@ from vibrokit.kernels.templates.steps import (
     plan,
     put,
     shortened,
+    stop,
     take,
 )
 

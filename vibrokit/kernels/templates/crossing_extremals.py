@@ -7,12 +7,14 @@ f⁻ before and f⁺ after the jump. A force that does not jump, but whose slope
 
 from numba import njit
 
+from vibrokit.kernels.links import rhs
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
-from vibrokit.kernels.templates.scene import STATES, rhs
+from vibrokit.kernels.templates.scene import STATES
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER, ROW, TOUCHED
+from vibrokit.kernels.templates.steps import CLOCK, ROW, TOUCHED
 
 # --- scene above, stepper below ---
 

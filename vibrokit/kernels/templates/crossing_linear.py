@@ -7,10 +7,12 @@ Chaos, Solitons & Fractals 5, 1671, 1995).
 
 from numba import njit
 
+from vibrokit.kernels.links import rhs
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED
-from vibrokit.kernels.templates.scene import COVARIANCE, DERIVATIVES, STATES, rhs
+from vibrokit.kernels.templates.scene import COVARIANCE, DERIVATIVES, STATES
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER
+from vibrokit.kernels.templates.steps import CLOCK
 
 # --- scene above, stepper below ---
 

@@ -6,11 +6,13 @@ Erdmann): q, p₂ and H = p₁ v + p₂ b₂ + ½ a p₂² are continuous, so p�
 
 from numba import njit
 
+from vibrokit.kernels.links import rhs
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
-from vibrokit.kernels.templates.scene import STATES, rhs
+from vibrokit.kernels.templates.scene import STATES
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, INNER, TOUCHED
+from vibrokit.kernels.templates.steps import CLOCK, TOUCHED
 
 # --- scene above, stepper below ---
 

@@ -9,26 +9,19 @@ increments. For additive noise that is weak order 2 in the noise and order 4 in 
 Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the amplitude depends on the state that
 it drives, Milstein's term makes it strong order 1.
 
-Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows, those marked "staged" only for
-steps that keep the slopes of their stages, and those marked "scaled" only for steps with factors of their stages.
+Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows, and those marked "prepared" only
+for steps that share factors.
 """
 
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.links import LINKS, prepare, step_lanes, tabulate
+from vibrokit.kernels.options import CONTRACTED
+from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
-from vibrokit.kernels.templates.scene import (
-    CONTRACTED,
-    EQUATIONS,
-    KINDS,
-    LANES,
-    NODES,
-    STAGES,
-    draw_lanes,
-    scale,
-    step_lanes,
-    tabulate,
-)
+from vibrokit.kernels.templates.drawing import draw_lanes
+from vibrokit.kernels.templates.scene import EQUATIONS, LANES, NODES, ROOM
 
 # --- scene above, stepper below ---
 
@@ -36,7 +29,7 @@ from vibrokit.kernels.templates.scene import (
 @njit(**CONTRACTED)
 def advance(
     states,
-    theta,
+    parameters,
     start_time,
     interval,
     settings,
@@ -64,23 +57,24 @@ def advance(
     cycle = int(settings[1])  # forced
     h = interval / steps
     count = states.shape[0]
-    table = np.zeros((max(cycle, 1), steps, NODES))  # forced
     z = np.zeros((EQUATIONS, LANES))
-    slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
-    point = np.zeros((EQUATIONS, LANES))  # staged
-    factors = np.zeros((KINDS, STAGES + 2, 4))  # scaled
-    scale(theta, h, factors)  # scaled
     before = np.zeros((EQUATIONS, LANES))
+    work = np.zeros(ROOM)
+    theta, lanes, room = offset_by(pointer_to(parameters), LINKS), pointer_to(z), pointer_to(work)
+    forces = normals = room  # where a scene or a flow has none
+    tabulated = np.zeros(max(cycle, 1) * steps * NODES)  # forced
+    table = pointer_to(tabulated)  # forced
+    prepare(h, theta, room)  # prepared
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
-    first = np.zeros(LANES)  # noisy
-    second = np.zeros(LANES)  # noisy
+    drawn = np.zeros(2 * LANES)  # noisy
+    normals = pointer_to(drawn)  # noisy
     holder = np.full(LANES, -1, dtype=np.int64)
     done = np.zeros(LANES, dtype=np.int64)
     waiting = 0
     active = 0
     elapsed = 0  # forced
     for phase in range(cycle):  # forced
-        tabulate(start_time + phase * interval, h, theta, table[phase])  # forced
+        tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * NODES))  # forced
     while waiting < count or active > 0:
         # Lanes that do not share the phase of a newcomer go on first.
         refill = True  # unforced
@@ -110,21 +104,12 @@ def advance(
                 break
         row = elapsed % cycle if cycle > 0 else 0  # forced
         if cycle == 0:  # forced
-            tabulate(start_time + elapsed * interval, h, theta, table[row])  # forced
+            tabulate(start_time + elapsed * interval, h, steps, theta, table)  # forced
         before[:, :] = z
         for step in range(steps):
-            draw_lanes(stream, first, second)  # noisy
-            step_lanes(
-                z,
-                slopes,  # staged
-                point,  # staged
-                table[row, step],  # forced
-                factors,  # scaled
-                first,  # noisy
-                second,  # noisy
-                theta,
-                h,
-            )
+            draw_lanes(stream, drawn)  # noisy
+            forces = offset_by(table, (row * steps + step) * NODES)  # forced
+            step_lanes(lanes, forces, normals, theta, room, h)
         elapsed += 1  # forced
         for lane in range(LANES):
             index = holder[lane]
@@ -163,12 +148,16 @@ def advance(
             out_label[index] = label
             holder[lane] = -1
             active -= 1
+    # Numba frees an array after its last use, which must not be before that of the pointers to it.
+    work[0] = 0.0
+    tabulated[0] = 0.0  # forced
+    drawn[0] = 0.0  # noisy
 
 
 @njit(**CONTRACTED)
 def record(
     state,
-    theta,
+    parameters,
     start_time,
     spacing,
     settings,
@@ -180,39 +169,37 @@ def record(
     steps = max(1, int(np.ceil(spacing / settings[2] - 1e-9)))
     h = spacing / steps
     z = np.zeros((EQUATIONS, LANES))
-    slopes = np.zeros((STAGES, EQUATIONS, LANES))  # staged
-    point = np.zeros((EQUATIONS, LANES))  # staged
-    factors = np.zeros((KINDS, STAGES + 2, 4))  # scaled
-    scale(theta, h, factors)  # scaled
-    table = np.zeros((steps, NODES))  # forced
+    work = np.zeros(ROOM)
+    theta, lanes, room = offset_by(pointer_to(parameters), LINKS), pointer_to(z), pointer_to(work)
+    forces = normals = room  # where a scene or a flow has none
+    tabulated = np.zeros(steps * NODES)  # forced
+    table = pointer_to(tabulated)  # forced
+    prepare(h, theta, room)  # prepared
     stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
-    first = np.zeros(LANES)  # noisy
-    second = np.zeros(LANES)  # noisy
+    drawn = np.zeros(2 * LANES)  # noisy
+    normals = pointer_to(drawn)  # noisy
     for k in range(4):  # noisy
         stream[k, 0] = streams[0, k]  # noisy
     for e in range(EQUATIONS):
         z[e, 0] = state[e]
     out[0] = state
+    good = out.shape[0]
     for sample in range(1, out.shape[0]):
-        tabulate(start_time + (sample - 1) * spacing, h, theta, table)  # forced
+        tabulate(start_time + (sample - 1) * spacing, h, steps, theta, table)  # forced
         for step in range(steps):
-            draw_lanes(stream, first, second)  # noisy
+            draw_lanes(stream, drawn)  # noisy
             if given.shape[0] > 0:  # noisy
-                first[0] = given[(sample - 1) * steps + step, 0]  # noisy
-                second[0] = given[(sample - 1) * steps + step, 1]  # noisy
-            step_lanes(
-                z,
-                slopes,  # staged
-                point,  # staged
-                table[step],  # forced
-                factors,  # scaled
-                first,  # noisy
-                second,  # noisy
-                theta,
-                h,
-            )
+                drawn[0] = given[(sample - 1) * steps + step, 0]  # noisy
+                drawn[LANES] = given[(sample - 1) * steps + step, 1]  # noisy
+            forces = offset_by(table, step * NODES)  # forced
+            step_lanes(lanes, forces, normals, theta, room, h)
         for e in range(EQUATIONS):
             if not np.isfinite(z[e, 0]):
-                return sample
+                good = min(good, sample)
             out[sample, e] = z[e, 0]
-    return out.shape[0]
+        if good == sample:
+            break
+    work[0] = 0.0
+    tabulated[0] = 0.0  # forced
+    drawn[0] = 0.0  # noisy
+    return good

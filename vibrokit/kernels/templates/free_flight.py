@@ -7,22 +7,14 @@ as bounds on the second and third derivative exclude a zero.
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.links import flight_rate, taylor
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import landed
-from vibrokit.kernels.templates.scene import (
-    BARRIERS,
-    EQUATIONS,
-    ORDER,
-    SIDES,
-    STATE,
-    TERMS,
-    flight_rate,
-    stop,
-    taylor,
-)
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, INNER, SERIES, STEPS, TASK, UNDERWAY, put, take
+from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, ORDER, SIDES, STATE, TERMS
+from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, SERIES, STEPS, TASK, UNDERWAY, put, stop, take
 
 # --- scene above, stepper below ---
 

@@ -2,9 +2,10 @@
 
 from numba import njit
 
-from vibrokit.kernels.templates.scene import CLAMPED, JUMPS, STATES, stop
+from vibrokit.kernels.options import INNER
+from vibrokit.kernels.templates.scene import CLAMPED, JUMPS, STATES
 from vibrokit.kernels.templates.settling import push_at
-from vibrokit.kernels.templates.steps import EPSILON, INNER
+from vibrokit.kernels.templates.steps import EPSILON, stop
 
 # --- scene above, stepper below ---
 

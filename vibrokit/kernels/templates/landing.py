@@ -3,8 +3,10 @@
 from numba import njit
 
 from vibrokit.kernels.cubic import crossing
+from vibrokit.kernels.links import rhs
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
-from vibrokit.kernels.templates.scene import COURSE, LENGTH, SIDES, STATE, TRIAL, rhs, stop
+from vibrokit.kernels.templates.scene import COURSE, LENGTH, SIDES, STATE, TRIAL
 from vibrokit.kernels.templates.settling import push_of
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -12,7 +14,6 @@ from vibrokit.kernels.templates.steps import (
     EPSILON,
     GOAL,
     HIGH,
-    INNER,
     LOW,
     RISING,
     ROW,
@@ -24,6 +25,7 @@ from vibrokit.kernels.templates.steps import (
     WHOLE,
     of,
     put,
+    stop,
     take,
 )
 

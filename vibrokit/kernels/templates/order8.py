@@ -4,15 +4,10 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
-from vibrokit.kernels.templates.landing import (
-    DEPTH_GOAL,
-    RATE_GOAL,
-    depth_at,
-    land,
-    landed,
-)
+from vibrokit.kernels.templates.landing import DEPTH_GOAL, RATE_GOAL, depth_at, land, landed
 from vibrokit.kernels.templates.scene import BARRIERS, ERROR, FACTOR, LANES, LENGTH, SIDES, SLOPES, STATE, TRIAL
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -22,7 +17,6 @@ from vibrokit.kernels.templates.steps import (
     FIRST,
     FLIPS,
     FREE_STEP,
-    INNER,
     LAST,
     SPAN,
     STEPS,

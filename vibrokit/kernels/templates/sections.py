@@ -3,20 +3,13 @@
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.links import LINKS, attempt_lanes
+from vibrokit.kernels.options import INNER, OPTIONS
 from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
 from vibrokit.kernels.templates.contact import press
 from vibrokit.kernels.templates.order8 import fly, judge
-from vibrokit.kernels.templates.scene import (
-    BARRIERS,
-    EQUATIONS,
-    LANES,
-    NUMBERS,
-    OPTIONS,
-    STATE,
-    attempt_lanes,
-    misfit_lanes,
-)
+from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, LANES, NUMBERS, STATE, misfit_lanes
 from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
@@ -26,7 +19,6 @@ from vibrokit.kernels.templates.steps import (
     END,
     FIRST_STEP,
     FREE_STEP,
-    INNER,
     MEMORIES,
     MEMORY,
     ROOM,
@@ -117,7 +109,7 @@ def advance(
 ):
     numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
     lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
-    theta, settings = pointer_to(parameters), pointer_to(options)
+    theta, settings = offset_by(pointer_to(parameters), BARRIERS + LINKS), pointer_to(options)
     y = room
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
     count, waiting, active = states.shape[0], 0, 0
@@ -185,7 +177,7 @@ def advance(
 def record(state, parameters, start_time, spacing, options, out):
     numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
     lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
-    theta, settings = pointer_to(parameters), pointer_to(options)
+    theta, settings = offset_by(pointer_to(parameters), BARRIERS + LINKS), pointer_to(options)
     lane = int(ZERO)
     own, y, samples = offset_by(room, MEMORIES), room, out.shape[0]
     span = spacing * (samples - 1)

@@ -3,18 +3,20 @@
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES, law, rhs, stop
+from vibrokit.kernels.links import law, rhs
+from vibrokit.kernels.options import INNER
+from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
     EPSILON,
     FIRST_STEP,
-    INNER,
     PULLED,
     SINCE,
     SPAN,
     TIMED,
     TOUCHED,
+    stop,
 )
 
 # --- scene above, stepper below ---

@@ -12,7 +12,8 @@ for the next attempt; so no lane waits for another, and what it does depends on 
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.links import LINKS
+from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import STALLED
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
@@ -22,8 +23,6 @@ from vibrokit.kernels.templates.scene import (
     GRAIN,
     LANES,
     LENGTH,
-    OPTIONS,
-    POINT,
     PUSHES,
     SIDE,
     SIDES,
@@ -32,8 +31,6 @@ from vibrokit.kernels.templates.scene import (
     TERMS,
     TRIAL,
     WALL,
-    rhs,
-    stop,
 )
 
 # --- scene above, stepper below ---
@@ -64,15 +61,18 @@ SERIES = MEMORIES + LANES * MEMORY
 ROOM = SERIES + TERMS * EQUATIONS
 ZERO = 0.0  # for int(ZERO), an integer that is no constant
 EPSILON = 2.220446049250313e-16
-LEAST_DEPTH = 64.0 * EPSILON
-# Functions that only kernels call: Numba need not wrap them for Python.
-INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 @njit(**INNER)
 def keep_alive(numbers, switches):
     """Numba frees an array after its last use, which must not be before that of the pointers to it."""
     numbers[0], switches[0] = 0.0, 0
+
+
+@njit(**INNER)
+def stop(i, theta):
+    """Position of a stop, which stands before the links and the parameters."""
+    return theta[i - (BARRIERS + LINKS)]
 
 
 @njit(**INNER)
@@ -147,27 +147,3 @@ def face(lane, memory, pushing, theta, lanes):
         lanes[PUSHES + i * LANES + lane] = 1.0 if pushing[i] else 0.0
     lanes[WALL + lane] = stop(touched, theta) if touched >= 0 else 0.0
     lanes[SIDE + lane] = SIDES[touched] if touched >= 0 else 1.0
-
-
-@njit(**INNER)
-def extrapolate(node, place, lane, lanes, pushing, theta, room):
-    """Replace a slope at a depth that x does not represent: extrapolate from two that it does.
-
-    The second derivative of a law is infinite at depth 0 while its product with sigma is not. `place` is where the
-    slope begins among the numbers of the lanes.
-    """
-    y, near, far, pushed = room, offset_by(room, ROW), offset_by(room, 2 * ROW), offset_by(pushing, lane * BARRIERS)
-    take(POINT, lane, lanes, y)
-    wall, side = lanes[WALL + lane], lanes[SIDE + lane]
-    sigma, depth, rate = lanes[SIGMA + lane] + node * lanes[LENGTH + lane], side * (y[0] - wall), side * y[1]
-    deep = lanes[COURSE + lane] == ROOT_DEPTH
-    along, scale = (1.0, 2.0 / rate) if deep else (rate, 2.0)  # depth = along sigma² near the stop
-    first = np.sqrt(depth / along)
-    rhs(y[CLOCK], y, pushed, theta, near)
-    y[0] = wall + 4.0 * (y[0] - wall)
-    second = np.sqrt(side * (y[0] - wall) / along)
-    rhs(y[CLOCK], y, pushed, theta, far)
-    near[CLOCK] = far[CLOCK] = 1.0
-    for e in range(CLOCK + 1):
-        low, high = scale * first * near[e], scale * second * far[e]
-        lanes[place + e * LANES] = low + (sigma - first) / (second - first) * (high - low)

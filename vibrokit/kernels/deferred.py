@@ -1,0 +1,85 @@
+"""Compiles functions only as a part of those that call them.
+
+Numba optimises each function together with all that it calls, and makes machine code of it, though only its callers
+use it. In a stepper of seventy small functions, each would be optimised as often as the calls above it are deep.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
+from numba.core.typed_passes import AnnotateTypes
+
+
+class _Unnamed:
+    """The code generator of a function without machine code, which has no place for its Python environment."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing refers to it: these functions do not raise exceptions."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+
+@ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.py_object, ctypes.py_object)
+def _refuse(*_arguments: Any) -> None:
+    raise TypeError("this function is compiled only as a part of those that call it; Python cannot call it.")
+
+
+_REFUSED = ctypes.cast(_refuse, ctypes.c_void_p).value
+
+
+class _DeferredLibrary(JITCodeLibrary):
+    """The code of a function and of all that it calls, as lowered."""
+
+    @property
+    def codegen(self) -> Any:
+        return _Unnamed(self._codegen)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return _REFUSED or 0
+
+    def finalize(self) -> None:
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._final_module.verify()
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Defer(LoweringPass):
+    """Gives a function a library that is not compiled."""
+
+    _name = "vibrokit_defer"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        codegen = state.targetctx.codegen()
+        state.library = _DeferredLibrary(codegen, state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return True
+
+
+class DeferredCompiler(CompilerBase):
+    """The compiler of a function that only compiled functions call: Python must not, for there is no code to call."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Numba's own passes, with a library that its callers compile."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_Defer, AnnotateTypes)
+        passes.finalize()
+        return [passes]

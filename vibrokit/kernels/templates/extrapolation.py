@@ -1,0 +1,36 @@
+"""Slopes at depths that x does not represent."""
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.options import INNER
+from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.templates.scene import BARRIERS, COURSE, EQUATIONS, LANES, LENGTH, POINT, SIDE, SIGMA, WALL, rhs
+
+# --- scene above, stepper below ---
+
+
+@njit(**INNER)
+def extrapolate(node, place, lane, lanes, pushing, theta, room):
+    """Replace a slope at a depth that x does not represent: extrapolate from two that it does.
+
+    The second derivative of a law is infinite at depth 0 while its product with sigma is not. `place` is where the
+    slope begins among the numbers of the lanes.
+    """
+    row = EQUATIONS + 1
+    y, near, far, pushed = room, offset_by(room, row), offset_by(room, 2 * row), offset_by(pushing, lane * BARRIERS)
+    for e in range(row):
+        y[e] = lanes[POINT + e * LANES + lane]
+    wall, side = lanes[WALL + lane], lanes[SIDE + lane]
+    sigma, depth, rate = lanes[SIGMA + lane] + node * lanes[LENGTH + lane], side * (y[0] - wall), side * y[1]
+    deep = lanes[COURSE + lane] > 1.5  # along the root of the depth
+    along, scale = (1.0, 2.0 / rate) if deep else (rate, 2.0)  # depth = along sigma² near the stop
+    first = np.sqrt(depth / along)
+    rhs(y[EQUATIONS], y, pushed, theta, near)
+    y[0] = wall + 4.0 * (y[0] - wall)
+    second = np.sqrt(side * (y[0] - wall) / along)
+    rhs(y[EQUATIONS], y, pushed, theta, far)
+    near[EQUATIONS] = far[EQUATIONS] = 1.0
+    for e in range(row):
+        low, high = scale * first * near[e], scale * second * far[e]
+        lanes[place + e * LANES] = low + (sigma - first) / (second - first) * (high - low)
