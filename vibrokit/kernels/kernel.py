@@ -188,6 +188,7 @@ def write_sources(scene: Scene, flow: Flow, stepper: Emitter) -> tuple[str, str]
         return with_needed_imports(source), ""
     bends = text.breaks and flow is Flow.HAMILTONIAN_VARIATIONAL
     conditions = {"forced": text.forced, "unforced": not text.forced, "noisy": flow is Flow.NOISY}
+    conditions |= {"noiseless": flow is not Flow.NOISY}
     conditions |= {"breaking": text.breaks, "unbroken": not text.breaks, "bending": bends, "unbent": not bends}
     conditions |= {"prepared": stepper.prepared}
     driver = _pasted([_DRIVER_TITLE, *stepper.driver_part(text), fitting(templates, conditions)])

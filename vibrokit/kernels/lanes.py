@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
 _REGISTERS = "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers\n"
 _STEP = (
-    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, room, h):",
+    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, room, h, steps):",
     "    promise_no_overlap(), use_widest_registers()",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
@@ -29,7 +30,7 @@ _CLASSICAL_NODES = (0.0, 0.5, 1.0)
 def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
     pieces = [tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope]
-    return [*pieces, "\n".join([*step_head(text), *_unrolled(text)])]
+    return [*pieces, steps_of(text, _unrolled(text), len(_CLASSICAL_NODES))]
 
 
 def classical_sizes(text: SceneText) -> str:
@@ -40,7 +41,7 @@ def classical_sizes(text: SceneText) -> str:
 def staged_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
     nodes = tuple(float(node) for node in NODES)
-    return [tabulation(text, nodes), text.derivative, "\n".join([*step_head(text), *_staged(text)])]
+    return [tabulation(text, nodes), text.derivative, steps_of(text, _staged(text), STAGES)]
 
 
 def staged_sizes(text: SceneText) -> str:
@@ -58,15 +59,17 @@ def lanes_of(text: SceneText) -> int:
     return 32 if len(text.variables) <= _FEW_EQUATIONS else 16
 
 
-def step_head(text: SceneText) -> list[str]:
-    """Lines that begin `step_lanes(z, forces, normals, theta, room, h)`: a step of every lane.
+def steps_of(text: SceneText, step: Sequence[str], nodes: int) -> str:
+    """Function `step_lanes(z, forces, normals, theta, room, h, steps)`, which takes steps of every lane.
 
-    `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of the step, the same for all lanes
-    because they share the phase; `normals` has two standard normals for each lane, in two rows; both only where a scene
-    and a flow need them.
+    `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
+    because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
+    only where a scene and a flow need them.
     """
-    unpacked = [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    return [_REGISTERS, "", *_STEP, *unpacked]
+    lines = [_REGISTERS, "", *_STEP]
+    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    for step in range(steps):", *[f"        _node = {nodes}*step"] * text.forced]
+    return "\n".join([*lines, *(f"    {line}" for line in step), ""])
 
 
 def _staged(text: SceneText) -> list[str]:
@@ -85,21 +88,20 @@ def _staged(text: SceneText) -> list[str]:
 
     for stage, weights in enumerate(WEIGHTS):
         if few:
-            point = [
-                at("z", 0, row) + _combined(weights, lambda s, row=row: at("room", s, row)) for row in range(len(names))
-            ]
+            before = [_combined(weights, functools.partial(at, "room", row=row)) for row in range(len(names))]
+            point = [at("z", 0, row) + moved for row, moved in enumerate(before)]
         else:
             lines += [f"    for number in range({size}):"]
             moved = _combined(weights, lambda s: f"room[{s * size} + number]")
             lines += [f"        room[{STAGES * size} + number] = z[number]{moved}"]
             point = [at("room", STAGES, row) for row in range(len(names))]
-        lines += [f"    force = forces[{stage}]"] * text.forced
+        lines += [f"    force = forces[_node + {stage}]"] * text.forced
         lines += ["    for lane in range(LANES):"]
         lines += [f"        {', '.join(at('room', stage, row) for row in range(len(names)))} = \\"]
         lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
     lines += [f"    for number in range({size}):"]
     end = _combined(RESULT, lambda s: f"room[{s * size} + number]")
-    return [*lines, f"        z[number] += {end.removeprefix(' + ')}", ""]
+    return [*lines, f"        z[number] += {end.removeprefix(' + ')}"]
 
 
 def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
@@ -116,7 +118,7 @@ def _unrolled(text: SceneText) -> list[str]:
     names, lanes = text.variables, lanes_of(text)
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
-    lines = ["    f0, f1, f2 = forces[0], forces[1], forces[2]"] if text.forced else []
+    lines = ["    f0, f1, f2 = forces[_node], forces[_node + 1], forces[_node + 2]"] if text.forced else []
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
     lines += [f"        {name} = z[{row * lanes} + lane]" for row, name in enumerate(names)]
@@ -130,7 +132,7 @@ def _unrolled(text: SceneText) -> list[str]:
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
         after = " + _later" if noisy and name == driven else ""
         lines.append(f"        z[{row * lanes} + lane] = {name} + h/6.0*({slopes}){after}")
-    return [*lines, ""]
+    return lines
 
 
 def _kicks(driven: str, text: SceneText) -> list[str]:

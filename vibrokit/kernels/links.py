@@ -26,7 +26,7 @@ _SIGNATURES = {
     "taylor": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "tabulate": types.none(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
     "prepare": types.none(_F8, _NUMBERS, _NUMBERS),
-    "step_lanes": types.none(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8),
+    "step_lanes": types.none(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8, _I8),
 }
 LINKS = len(_SIGNATURES)
 
@@ -107,6 +107,6 @@ def prepare(_context: Any, h: Any, theta: Any, room: Any) -> Any:
 
 
 @intrinsic
-def step_lanes(_context: Any, z: Any, forces: Any, normals: Any, theta: Any, room: Any, h: Any) -> Any:
-    """Take a step in each lane."""
+def step_lanes(_context: Any, z: Any, forces: Any, normals: Any, theta: Any, room: Any, h: Any, steps: Any) -> Any:
+    """Take steps in each lane."""
     return _call("step_lanes", 3)

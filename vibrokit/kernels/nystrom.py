@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import lanes_of, sizes, step_head, tabulation
+from vibrokit.kernels.lanes import lanes_of, sizes, steps_of, tabulation
 from vibrokit.kernels.nystrom_tableau import NODES, POSITION, STAGES, VELOCITY, WEIGHTS
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def nystrom_step(text: SceneText) -> list[str]:
         )
     head = f"STAGES = {STAGES}\nKINDS = {writer.kinds}\nFRACTIONS = np.array({(*NODES.tolist(), 1.0)!r})\n"
     accelerations = writer.text(tuple(text.parameters), forced=text.forced)
-    step = "\n".join([*step_head(text), *_step(text, writer)])
+    step = steps_of(text, _step(text, writer), STAGES)
     return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, step]
 
 
@@ -87,7 +87,7 @@ def _step(text: SceneText, writer: SecondOrderWriter) -> list[str]:
         lines += [f"        z[{pair.velocity * lanes} + lane] = {moved}{_sum(VELOCITY, last[2], f'_g{{}}_{n}')}"]
     for n, place in enumerate(writer.integrals):
         lines += [f"        z[{place * lanes} + lane] +={_sum(VELOCITY, 'h', f'_r{{}}_{n}').removeprefix(' +')}"]
-    return [*lines, ""]
+    return lines
 
 
 def _stage(text: SceneText, writer: SecondOrderWriter, stage: int, weights: NDArray[np.float64]) -> list[str]:
@@ -97,7 +97,7 @@ def _stage(text: SceneText, writer: SecondOrderWriter, stage: int, weights: NDAr
         row = [f"room[{_factor(pair.kind, stage, k)}]" for k in range(4)]
         lines += [f"        _x{n} = {row[0]}*_u{n} + {row[1]}*_w{n}{_sum(weights, row[2], f'_g{{}}_{n}')}"]
     targets = [*(f"_a{n}" for n, _ in pairs), *(f"_r{stage}_{n}" for n, _ in enumerate(writer.integrals))]
-    arguments = [*(f"_x{n}" for n, _ in pairs), *[f"forces[{stage}]"] * text.forced, *text.parameters]
+    arguments = [*(f"_x{n}" for n, _ in pairs), *[f"forces[_node + {stage}]"] * text.forced, *text.parameters]
     lines += [f"        {', '.join(targets)}, = accelerations({', '.join(arguments)})"]
     for n, pair in pairs:
         own, square = (f"room[{_factor(pair.kind, row, 3)}]" for row in (stage, STAGES))

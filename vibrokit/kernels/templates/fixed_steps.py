@@ -9,8 +9,8 @@ increments. For additive noise that is weak order 2 in the noise and order 4 in 
 Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the amplitude depends on the state that
 it drives, Milstein's term makes it strong order 1.
 
-Lines marked "forced", "unforced" or "noisy" are kept only for such scenes and flows, and those marked "prepared" only
-for steps that share factors.
+Lines marked "forced", "unforced", "noisy" or "noiseless" are kept only for such scenes and flows, and those marked
+"prepared" only for steps that share factors.
 """
 
 import numpy as np
@@ -106,10 +106,12 @@ def advance(
         if cycle == 0:  # forced
             tabulate(start_time + elapsed * interval, h, steps, theta, table)  # forced
         before[:, :] = z
-        for step in range(steps):
+        forces = offset_by(table, row * steps * NODES)  # forced
+        step_lanes(lanes, forces, normals, theta, room, h, steps)  # noiseless
+        for _step in range(steps):  # noisy
             draw_lanes(stream, drawn)  # noisy
-            forces = offset_by(table, (row * steps + step) * NODES)  # forced
-            step_lanes(lanes, forces, normals, theta, room, h)
+            step_lanes(lanes, forces, normals, theta, room, h, 1)  # noisy
+            forces = offset_by(forces, NODES)  # noisy
         elapsed += 1  # forced
         for lane in range(LANES):
             index = holder[lane]
@@ -186,13 +188,15 @@ def record(
     good = out.shape[0]
     for sample in range(1, out.shape[0]):
         tabulate(start_time + (sample - 1) * spacing, h, steps, theta, table)  # forced
-        for step in range(steps):
+        forces = table  # forced
+        step_lanes(lanes, forces, normals, theta, room, h, steps)  # noiseless
+        for step in range(steps):  # noisy
             draw_lanes(stream, drawn)  # noisy
             if given.shape[0] > 0:  # noisy
                 drawn[0] = given[(sample - 1) * steps + step, 0]  # noisy
                 drawn[LANES] = given[(sample - 1) * steps + step, 1]  # noisy
-            forces = offset_by(table, step * NODES)  # forced
-            step_lanes(lanes, forces, normals, theta, room, h)
+            step_lanes(lanes, forces, normals, theta, room, h, 1)  # noisy
+            forces = offset_by(forces, NODES)  # noisy
         for e in range(EQUATIONS):
             if not np.isfinite(z[e, 0]):
                 good = min(good, sample)
