@@ -47,14 +47,10 @@ class _DeferredLibrary(JITCodeLibrary):
         self._ensure_finalized()
         return _REFUSED or 0
 
-    def finalize(self) -> None:
-        self._raise_if_finalized()
-        for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        self._final_module.verify()
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
+    def _optimize_final_module(self) -> None:
+        """Left to the callers, which are optimised with all that is linked to them."""
+
+    def _finalize_final_module(self) -> None:
         self._finalized = True
 
 

@@ -145,8 +145,8 @@ def _kernel(fingerprint: str, flow: Flow, stepper: str, sources: _Sources) -> Ke
         with compiling():
             kernel = _written(name, sources.scene, flow, sources.stepper)
         for generated in (kernel.driver, kernel.scene):  # a scene that is stored has its driver stored
-            if generated is not None:
-                store.store(generated.name, generated.source)
+            if generated is not None and store.stored(generated.name) != generated.source:
+                store.store(generated.name, generated.source)  # a newer file would be compiled again
     return kernel
 
 
