@@ -52,18 +52,35 @@ def clamped():
     return kernel_for(scene, Flow.HAMILTONIAN, vk.Order8()), theta_of(scene)
 
 
-def advance(kernel, states, tolerance, intervals=1, interval=PERIOD, values=None, limit=1e5, region=EVERYWHERE):
+def advance(kernel, states, tolerance, intervals=1, values=None, **more):
+    out, done, status, _ = outputs(kernel, states, tolerance, intervals, values, **more)
+    return out, done, status
+
+
+def path(kernel, state, tolerance, spacing, samples, values=None):
+    """States after each sample of a motion that goes on."""
+    _, done, _, visits = outputs(
+        kernel, state, tolerance, samples, values, interval=spacing, cycle=0.0, span=samples * spacing, visits=samples
+    )
+    return visits[0, : done[0]]
+
+
+def outputs(
+    kernel, states, tolerance, intervals, values, interval=PERIOD, limit=1e5, region=EVERYWHERE, cycle=1.0, span=0.0,
+    visits=0,
+):  # fmt: skip
     states = np.atleast_2d(np.asarray(states, dtype=float))
     count = len(states)
     out, done, status, label = np.empty_like(states), *(np.zeros(count, dtype=np.int64) for _ in range(3))
     labels = EVERYWHERE, np.zeros((0, 0), dtype=np.int8), -1
     points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
-    outputs = out, done, status, label, np.zeros((count, 0, 5))
+    kept = np.zeros((count, visits, 5))
     kernel.advance(
-        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, 1.0, 1.0]),
-        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, *outputs,
+        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, cycle, 1.0, span]),
+        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points,
+        out, done, status, label, kept,
     )  # fmt: skip
-    return out, done, status
+    return out, done, status, kept
 
 
 def starts(count, momentum=1e-6):
@@ -255,12 +272,11 @@ def test_law_that_would_pull_is_let_go(clamped):
     assert coarse == pytest.approx(fine, abs=1e-7)
 
 
-def test_record_passes_through_the_sections(kernel):
-    out = np.empty((41, 5))
+def test_a_path_passes_through_the_sections(kernel):
     state = starts(1)[0]
-    assert kernel.record(state, theta(), 0.0, PERIOD / 20, np.array([1e-13, 1e5, 1.0, 1.0]), out) == 41
+    samples = path(kernel, state, 1e-13, PERIOD / 20, 40)
     sections = [advance(kernel, state, 1e-13, k)[0][0] for k in (1, 2)]
-    assert out[[20, 40], :2] == pytest.approx(np.array(sections)[:, :2], abs=1e-10)
+    assert samples[[19, 39], :2] == pytest.approx(np.array(sections)[:, :2], abs=1e-10)
 
 
 def test_intervals_are_memoryless(kernel):
@@ -281,5 +297,4 @@ def test_stops_are_reported(kernel):
     out, done, status = advance(kernel, states, 1e-6, 3, values=theta(damping=60.0))
     assert status[1] == DIVERGED
     assert np.isfinite(out).all()
-    samples = np.empty((9, 5))
-    assert kernel.record(states[1], theta(damping=60.0), 0.0, 1.0, np.array([1e-6, 1e5, 1.0, 1.0]), samples) < 9
+    assert len(path(kernel, states[1], 1e-6, 1.0, 8, theta(damping=60.0))) < 8

@@ -165,14 +165,14 @@ def run_ensemble(
         for block in _blocks(len(starts))
     ]
     steps, parts = stepper.steps_in(scene, span), []
-    with contextlib.closing(carry(_advance_block, tasks, executor)) as blocks:
+    with contextlib.closing(carry(advance_block, tasks, executor)) as blocks:
         for part in blocks:
             parts.append(part)
             passed = int(part.intervals.sum())
             count(trajectories=len(part.intervals), intervals=passed, steps=steps * passed)
             advance(len(part.intervals), TRAJECTORIES)
     if not parts:
-        parts = [_advance_block(kernel, starts, budgets, common, known, begun, test, visits, keep)]
+        parts = [advance_block(kernel, starts, budgets, common, known, begun, test, visits, keep)]
     names = [field.name for field in dataclasses.fields(Ensemble)]
     return Ensemble(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -184,7 +184,7 @@ def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
         common = (theta_of(scene), 0.0, 1.0, np.array(stepper.settings(scene, 1.0)))
         nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
         none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)
-        _advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
+        advance_block(kernel, *nothing, common, none, nothing[1], Stop(), 0, 1)
     return kernel
 
 
@@ -196,7 +196,7 @@ def _blocks(count: int) -> Iterator[slice]:
         yield slice(start, min(start + size, count))
 
 
-def _advance_block(
+def advance_block(
     kernel: Kernel,
     starts: Array,
     budget: Array,
@@ -206,7 +206,12 @@ def _advance_block(
     stop: Stop,
     visits: int,
     keep: int,
+    normals: Array | None = None,
 ) -> Ensemble:
+    """Advance a block of trajectories; those of noise have streams, and normals may replace what one of them draws.
+
+    `common` are the parameters, the start time, the interval and the settings of the stepper.
+    """
     count, equations = starts.shape
     streams = np.array(streams, dtype=np.uint64)  # the kernel advances them in place
     intervals, status, label = (np.zeros(count, dtype=np.int64) for _ in range(3))
@@ -217,8 +222,9 @@ def _advance_block(
     region, area, points, metrics = (_plain(array, float) for array in bounds)
     labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
     budget, phases = _plain(budget, np.int64), _plain(phases, np.int64)
+    noise = (streams, np.empty((0, 2)) if normals is None else _plain(normals, float)) if streams.shape[1] else ()
     kernel.advance(
-        _plain(starts, float), *common, *((streams,) if streams.shape[1] else ()), budget, phases,
+        _plain(starts, float), *common, *noise, budget, phases,
         stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
         ended.states, ended.intervals, ended.status, ended.label, ended.visits,
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -45,9 +46,12 @@ class FixedSteps(Stepper):
             raise StepperError(f"{type(self).__name__} integrates smooth motion only; use RK4 for noisy trajectories.")
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Steps in this interval, after how many of them the forcing repeats, and the step length."""
-        steps = self.steps_in(scene, interval)
-        return float(steps), float(scene.intervals_in_period(interval)), scene.time_unit / self.steps
+        """Steps in this interval, and after how many intervals the forcing repeats."""
+        return float(self.steps_in(scene, interval)), float(scene.intervals_in_period(interval))
+
+    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
+        """Steps from sample to sample, none longer than those of an ensemble, under a forcing that never repeats."""
+        return float(max(1, math.ceil(spacing * self.steps / scene.time_unit - 1e-9))), 0.0
 
     def steps_in(self, scene: Scene, interval: float) -> int:
         """Return the number of steps in an interval (s), 1 or more."""

@@ -68,16 +68,14 @@ class Kernel:
 
     def advance(self, states: NDArray[np.float64], theta: NDArray[np.float64], *rest: Any) -> None:
         """Call the function `advance` of the driver with the parameters of a scene."""
-        self._call("advance", states, theta, rest)
-
-    def record(self, state: NDArray[np.float64], theta: NDArray[np.float64], *rest: Any) -> int:
-        """Call the function `record` of the driver with the parameters of a scene."""
-        return int(self._call("record", state, theta, rest))
+        function, links = self._advance, _addresses(self.scene)
+        with first_call(function):
+            function(states, linked(theta, links, getattr(self.module, "WALLS", ())), *rest)
 
     @property
     def compiled(self) -> bool:
         """Whether this process has compiled or loaded what `advance` needs."""
-        return bool(self._driver("advance").overloads)
+        return bool(self._advance.overloads)
 
     @property
     def compilations(self) -> int:
@@ -86,16 +84,11 @@ class Kernel:
         functions = [value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)]
         return sum(len(function.stats.cache_misses) for function in functions)
 
-    def _driver(self, name: str) -> Any:
+    @property
+    def _advance(self) -> Any:
         if self.driver is None:
             raise ValueError(f"the code of {self.scene.name} has no driver.")
-        return getattr(self.driver.module, name)
-
-    def _call(self, name: str, state: NDArray[np.float64], theta: NDArray[np.float64], rest: tuple[Any, ...]) -> Any:
-        function = self._driver(name)
-        links = _addresses(self.scene)
-        with first_call(function):
-            return function(state, linked(theta, links, getattr(self.module, "WALLS", ())), *rest)
+        return self.driver.module.advance
 
 
 @functools.lru_cache(maxsize=1024)

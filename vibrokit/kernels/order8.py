@@ -48,9 +48,13 @@ class LocatedStepper(Stepper):
             )
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, largest number of steps in an interval, after how many of them the forcing repeats, and 1/ω_n."""
+        """Tolerance, most steps in an interval, intervals until the forcing repeats, 1/ω_n; 0: each begins anew."""
         cycle = scene.intervals_in_period(interval)
-        return float(self.tolerance), _MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency
+        return float(self.tolerance), _MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, 0.0
+
+    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
+        """The same, under a forcing that never repeats, and the time over which the motion goes on."""
+        return float(self.tolerance), _MOST_STEPS, 0.0, 1.0 / scene.natural_frequency, spacing * samples
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:
         """The templates, with those for jumps at events before those that locate events."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.ensemble import Stop, advance_block, compiled_kernel
+from vibrokit.kernels.kernel import theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.streams import streams_of
 from vibrokit.parts.scene import Scene
@@ -31,13 +30,10 @@ def record(
 
     They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
-    kernel = kernel_for(scene, flow, stepper)
+    kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
-    settings = np.array(stepper.settings(scene, scene.time_unit))
-    out = np.empty((count + 1, len(state)))
-    noise: tuple[Any, ...] = ()
-    if flow is Flow.NOISY:
-        noise = (streams_of(seed or 0, np.zeros(1, dtype=np.int64)), np.empty((0, 2)) if normals is None else normals)
-    start, theta = np.ascontiguousarray(state), theta_of(scene)
-    good = kernel.record(start, theta, start_time, spacing, settings, *noise, out)
-    return out[:good]
+    common = (theta_of(scene), start_time, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
+    streams = streams_of(seed or 0, np.zeros(1, dtype=np.int64)) if flow is Flow.NOISY else np.empty((1, 0), np.uint64)
+    budget, phase = np.full(1, count), np.zeros(1, dtype=np.int64)
+    path = advance_block(kernel, state[None], budget, common, streams, phase, Stop(), count, 1, normals)
+    return np.concatenate([state[None], path.visits[0, : path.intervals[0]]])

@@ -55,7 +55,11 @@ class Stepper(Emitter):
 
     @abstractmethod
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Return the numbers that the templates read."""
+        """Return the numbers that the templates read, for motion from section to section."""
+
+    @abstractmethod
+    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
+        """Return the numbers that the templates read, for motion that goes on through the samples of a path."""
 
     def steps_in(self, scene: Scene, interval: float) -> int:
         """Return the number of fixed steps in an interval (s); 0 if the stepper chooses its own steps."""

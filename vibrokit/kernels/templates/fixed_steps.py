@@ -7,7 +7,8 @@ With noise, a step of length h draws ΔW and ΔZ = ∫W dt exactly and gives the
 step of the drift and ΔW − ΔZ/h after it, so that the driven state and its integral both receive the right
 increments. For additive noise that is weak order 2 in the noise and order 4 in the drift (cf. small-noise methods in
 Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the amplitude depends on the state that
-it drives, Milstein's term makes it strong order 1.
+it drives, Milstein's term makes it strong order 1. `given` normals, if any, replace those that a single trajectory
+draws.
 
 Lines marked "forced", "unforced", "noisy" or "noiseless" are kept only for such scenes and flows, and those marked
 "prepared" only for steps that share factors.
@@ -34,6 +35,7 @@ def advance(
     interval,
     settings,
     streams,  # noisy
+    given,  # noisy
     budget,
     phases,
     every,
@@ -108,8 +110,11 @@ def advance(
         before[:, :] = z
         forces = offset_by(table, row * steps * NODES)  # forced
         step_lanes(lanes, forces, normals, theta, room, h, steps)  # noiseless
-        for _step in range(steps):  # noisy
+        for step in range(steps):  # noisy
             draw_lanes(stream, drawn)  # noisy
+            if given.shape[0] > 0:  # noisy
+                drawn[0] = given[done[0] * steps + step, 0]  # noisy
+                drawn[LANES] = given[done[0] * steps + step, 1]  # noisy
             step_lanes(lanes, forces, normals, theta, room, h, 1)  # noisy
             forces = offset_by(forces, NODES)  # noisy
         elapsed += 1  # forced
@@ -154,56 +159,3 @@ def advance(
     work[0] = 0.0
     tabulated[0] = 0.0  # forced
     drawn[0] = 0.0  # noisy
-
-
-@njit(**CONTRACTED)
-def record(
-    state,
-    parameters,
-    start_time,
-    spacing,
-    settings,
-    streams,  # noisy
-    given,  # noisy
-    out,
-):
-    # One trajectory in lane 0, by the code of the ensembles. `given` normals, if any, replace drawn ones.
-    steps = max(1, int(np.ceil(spacing / settings[2] - 1e-9)))
-    h = spacing / steps
-    z = np.zeros((EQUATIONS, LANES))
-    work = np.zeros(ROOM)
-    theta, lanes, room = offset_by(pointer_to(parameters), LINKS), pointer_to(z), pointer_to(work)
-    forces = normals = room  # where a scene or a flow has none
-    tabulated = np.zeros(steps * NODES)  # forced
-    table = pointer_to(tabulated)  # forced
-    prepare(h, theta, room)  # prepared
-    stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
-    drawn = np.zeros(2 * LANES)  # noisy
-    normals = pointer_to(drawn)  # noisy
-    for k in range(4):  # noisy
-        stream[k, 0] = streams[0, k]  # noisy
-    for e in range(EQUATIONS):
-        z[e, 0] = state[e]
-    out[0] = state
-    good = out.shape[0]
-    for sample in range(1, out.shape[0]):
-        tabulate(start_time + (sample - 1) * spacing, h, steps, theta, table)  # forced
-        forces = table  # forced
-        step_lanes(lanes, forces, normals, theta, room, h, steps)  # noiseless
-        for step in range(steps):  # noisy
-            draw_lanes(stream, drawn)  # noisy
-            if given.shape[0] > 0:  # noisy
-                drawn[0] = given[(sample - 1) * steps + step, 0]  # noisy
-                drawn[LANES] = given[(sample - 1) * steps + step, 1]  # noisy
-            step_lanes(lanes, forces, normals, theta, room, h, 1)  # noisy
-            forces = offset_by(forces, NODES)  # noisy
-        for e in range(EQUATIONS):
-            if not np.isfinite(z[e, 0]):
-                good = min(good, sample)
-            out[sample, e] = z[e, 0]
-        if good == sample:
-            break
-    work[0] = 0.0
-    tabulated[0] = 0.0  # forced
-    drawn[0] = 0.0  # noisy
-    return good

@@ -27,7 +27,6 @@ from vibrokit.kernels.templates.steps import (
     TIMED,
     TOUCHED,
     UNDERWAY,
-    ZERO,
     face,
     keep_alive,
     of,
@@ -112,6 +111,8 @@ def advance(
     theta, settings = offset_by(pointer_to(parameters), BARRIERS + LINKS), pointer_to(options)
     y = room
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
+    goes_on = settings[4] > 0.0  # for this time; otherwise each interval begins anew
+    span = settings[4] if goes_on else interval
     count, waiting, active = states.shape[0], 0, 0
     holder, done = np.zeros(LANES, dtype=np.int64), np.zeros(LANES, dtype=np.int64)
     for lane in range(LANES):  # compiles faster than np.full
@@ -124,8 +125,9 @@ def advance(
                 status = judge(lane, own, pushed, theta, settings, lanes, room)
                 status = proceed(status, lane, own, pushed, theta, settings, lanes, room)
             while status != UNDERWAY or (holder[lane] < 0 and waiting < count):
+                begins = True
                 if holder[lane] >= 0:  # an interval has ended
-                    index, label = holder[lane], -1
+                    index, label, begins = holder[lane], -1, not goes_on
                     if status == COMPLETED:
                         x, v = out_states[index, 0], out_states[index, 1]
                         for e in range(EQUATIONS):
@@ -161,42 +163,14 @@ def advance(
                 # Where the forcing repeats, so do the times: the phase cannot drift.
                 passed = phases[index] + done[lane]
                 start = start_time + (passed % cycle if cycle > 0 else passed) * interval
-                for e in range(EQUATIONS):
-                    y[e] = out_states[index, e]
-                y[CLOCK] = start
-                begin(y, interval, lane, own, pushed, theta, settings, lanes, room)
+                if begins:
+                    for e in range(EQUATIONS):
+                        y[e] = out_states[index, e]
+                    y[CLOCK] = start
+                    begin(y, span, lane, own, pushed, theta, settings, lanes, room)
                 travel(start + interval, own)
                 status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
         if active > 0:
             attempt_lanes(lanes, theta, pushing, room)
-            misfit_lanes(lanes, settings[0], abs(interval))
-    keep_alive(numbers, switches)
-
-
-@njit(**OPTIONS)
-def record(state, parameters, start_time, spacing, options, out):
-    numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
-    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
-    theta, settings = offset_by(pointer_to(parameters), BARRIERS + LINKS), pointer_to(options)
-    lane = int(ZERO)
-    own, y, samples = offset_by(room, MEMORIES), room, out.shape[0]
-    span = spacing * (samples - 1)
-    for e in range(EQUATIONS):
-        out[0, e] = y[e] = state[e]
-    y[CLOCK] = start_time
-    begin(y, span, lane, own, pushing, theta, settings, lanes, room)
-    sample, status = 1, COMPLETED
-    while sample < samples and status == COMPLETED:
-        travel(start_time + sample * spacing, own)
-        status = proceed(COMPLETED, lane, own, pushing, theta, settings, lanes, room)
-        while status == UNDERWAY:
-            attempt_lanes(lanes, theta, pushing, room)
             misfit_lanes(lanes, settings[0], abs(span))
-            status = judge(lane, own, pushing, theta, settings, lanes, room)
-            status = proceed(status, lane, own, pushing, theta, settings, lanes, room)
-        if status == COMPLETED:
-            for e in range(EQUATIONS):
-                out[sample, e] = of(STATE, e, lane, lanes)
-            sample += 1
     keep_alive(numbers, switches)
-    return sample

@@ -59,7 +59,6 @@ ROW = CLOCK + 1
 MEMORIES = 5 * ROW
 SERIES = MEMORIES + LANES * MEMORY
 ROOM = SERIES + TERMS * EQUATIONS
-ZERO = 0.0  # for int(ZERO), an integer that is no constant
 EPSILON = 2.220446049250313e-16
 
 
