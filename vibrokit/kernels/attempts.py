@@ -18,10 +18,11 @@ from vibrokit.kernels.tableau import FIFTH, NODES, RESULT, STAGES, THIRD, WEIGHT
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
+_CLOCK = -1  # row of the time, before those of the variables
 _LANES = 8  # those of one register; more were not faster, and fewer trajectories would fill them
-_LEAST_DEPTH = 64.0 * 2.0**-52  # of the position of a stop
+_EPSILON = 2.0**-52
+_LEAST_DEPTH = 64.0 * _EPSILON  # of the position of a stop
 _ASSUMED = "    keep_apart(), use_widest_registers()"
-_EACH_NUMBER = "    for _k in range((EQUATIONS + 1)*LANES):"
 _IMPORTS = """from math import sqrt
 
 import numpy as np
@@ -35,7 +36,13 @@ _WAVES = "from vibrokit.kernels.waves import cos, sin\n"
 
 
 class AttemptWriter:
-    """Writes `attempt_lanes` for the scene and `misfit_lanes` for the driver; `templates/scene.py` says what they do.
+    """Writes `attempt_lanes(lanes, theta, pushing, room)` and `misfit_lanes(lanes, tolerance, span, theta)`.
+
+    The first takes a step from STATE to TRIAL in each lane, along its course. The second finds the ERROR of each
+    attempt in units of the tolerance, the largest over the components. Each block is measured by its own size; a
+    velocity near 0 by a hundredth of x over `span`, the time to integrate over. No step must be more accurate than the
+    rounding of x allows: GRAIN is the uncertainty of the acceleration from it. So is that of the second derivative of a
+    law, which affects only derivatives of the momenta.
 
     The slopes of a stage are one function, and all else are loops over the numbers of all variables. Written out for
     each stage and variable, an attempt took a tenth less time, and up to 2.4 times as long to compile.
@@ -45,29 +52,36 @@ class AttemptWriter:
         self._text = text
         self._count = len(text.variables)
         self._stops = text.barriers
-        size = self._count + 1  # with the time
-        rows = {"STATE": size, "TRIAL": size, "LENGTH": 1, "ERROR": 1, "FACTOR": 1}
-        rows |= {"LENGTHS": size, "POINT": size, "SLOPES": STAGES * size, "SIZES": size, "FIFTHS": size, "THIRDS": size}
-        if self._stops:
-            rows |= {"SIGMA": 1, "COURSE": 1, "WALL": 1, "SIDE": 1, "PUSHES": self._stops, "GRAIN": 1, "DEPTH": 1}
-            rows |= {"NEAR": 1}
+        # Rows of a state, enough for every flow of a scene with as many states: they share their drivers.
+        self._rows = 2 + 2 * text.states + 4 * text.states**2
+        states = ["STATE", "TRIAL", "LENGTHS", "POINT", "SIZES", "FIFTHS", "THIRDS"]
+        scalars = ["LENGTH", "ERROR", "FACTOR"]
+        scalars += ["SIGMA", "COURSE", "WALL", "SIDE", "GRAIN", "DEPTH", "NEAR"] if self._stops else []
+        blocks = [*((name, self._rows) for name in states), ("SLOPES", STAGES * self._rows)]
         self._places, self._numbers = {}, 0
-        for name, height in rows.items():
-            self._places[name] = self._numbers
+        for name, height in (*blocks, *((name, 1) for name in scalars), ("PUSHES", self._stops)):
+            time = -_CLOCK if height >= self._rows else 0  # rows before that of the first variable
+            self._places[name] = self._numbers + time * _LANES
             self._numbers += height * _LANES
 
     def offsets(self) -> str:
         """Where the numbers of a block are."""
         offsets = [f"{name} = {place}" for name, place in self._places.items()]
-        return "\n".join([f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", *offsets, ""])
+        sizes = [f"LANES = {_LANES}", f"NUMBERS = {self._numbers}", f"ROW, CLOCK = {self._rows}, {_CLOCK}"]
+        return "\n".join([*sizes, *offsets, ""])
 
     def attempt(self) -> list[str]:
         """Pieces of the scene: the slopes, and the attempt."""
         return [_IMPORTS + _WAVES, *("\n".join(lines) for lines in (self._slopes(), self._attempt()))]
 
     def misfit(self) -> list[str]:
-        """Pieces of the driver: the error of an attempt."""
-        return [_IMPORTS, "\n".join(self._misfit())]
+        """Pieces of the measure: the error of an attempt."""
+        return [_IMPORTS, f"LANES = {_LANES}\n", "\n".join(self._misfit())]
+
+    @property
+    def _each_number(self) -> str:
+        """Text of the loop over the numbers of a state."""
+        return f"    for _k in range({(self._count - _CLOCK) * _LANES}):"
 
     def _at(self, name: str, row: int = 0) -> str:
         """Text of the number of a lane in a row of a block of rows."""
@@ -75,7 +89,7 @@ class AttemptWriter:
 
     def _each(self, name: str, stage: int = 0) -> str:
         """Text of the number `_k` of a block of rows for all variables."""
-        return f"lanes[{self._places[name] + stage * (self._count + 1) * _LANES} + _k]"
+        return f"lanes[{self._places[name] + (_CLOCK + stage * self._rows) * _LANES} + _k]"
 
     def _combined(self, weights: NDArray[np.float64]) -> str:
         """Text of the weighted slopes; empty if all weights are 0."""
@@ -85,16 +99,16 @@ class AttemptWriter:
         """Lines that put a point of the step in a block of rows."""
         slopes = self._combined(weights)
         text = self._each("STATE") + (f" + {self._each('LENGTHS')}*({slopes})" if slopes else "")
-        return [_EACH_NUMBER, f"        {self._each(target)} = {text}"]
+        return [self._each_number, f"        {self._each(target)} = {text}"]
 
     def _slopes(self) -> list[str]:
         """Function `slopes_lanes(node, lanes, slopes, theta)`: the slopes at POINT along each course."""
-        names = (*self._text.variables, "_now")
+        names = enumerate(("_now", *self._text.variables), start=_CLOCK)
         lines = ["@njit(**INNER_LANES)", "def slopes_lanes(node, lanes, slopes, theta):"]
         lines += [_ASSUMED, "    promise_no_overlap()"]
         lines += [f"    {name} = theta[{place}]" for name, place in self._text.parameters.items()]
         lines += ["    for lane in range(LANES):"]
-        lines += [f"        {name} = {self._at('POINT', row)}" for row, name in enumerate(names)]
+        lines += [f"        {name} = {self._at('POINT', row)}" for row, name in names]
         lines += self._on_course() if self._stops else []
         lines += ["        f = forcing(_now, theta)"] * self._text.forced
         pushing = [f"{self._at('PUSHES', stop)} > 0.5" for stop in range(self._stops)]
@@ -102,8 +116,8 @@ class AttemptWriter:
         slopes = [f"_slope{row}" for row in range(self._count)]
         lines += [f"        {', '.join(slopes)} = rates({', '.join(values)})"]
         weight = "_weight*" if self._stops else ""
-        rates = [*(f"{weight}{slope}" for slope in slopes), "_weight" if self._stops else "1.0"]
-        lines += [f"        slopes[{row * _LANES} + lane] = {rate}" for row, rate in enumerate(rates)]
+        rates = ["_weight" if self._stops else "1.0", *(f"{weight}{slope}" for slope in slopes)]
+        lines += [f"        slopes[{row * _LANES} + lane] = {rate}" for row, rate in enumerate(rates, start=_CLOCK)]
         return [*lines, ""]
 
     def _on_course(self) -> list[str]:
@@ -131,10 +145,10 @@ class AttemptWriter:
 
     def _attempt(self) -> list[str]:
         lines = ["@njit(**LINKED_LANES)", "def attempt_lanes(lanes, theta, pushing, room):", _ASSUMED]
-        lines += ["    for _e in range(EQUATIONS + 1):", "        for lane in range(LANES):"]
+        lines += [f"    for _e in range({_CLOCK}, {self._count}):", "        for lane in range(LANES):"]
         lines += ["            lanes[LENGTHS + _e*LANES + lane] = lanes[LENGTH + lane]"]
         for stage in range(STAGES):
-            node, place = float(NODES[stage]), self._places["SLOPES"] + stage * (self._count + 1) * _LANES
+            node, place = float(NODES[stage]), self._places["SLOPES"] + stage * self._rows * _LANES
             lines += self._moved("POINT", WEIGHTS[stage])
             lines += [f"    slopes_lanes({node!r}, lanes, offset_by(lanes, {place}), theta)"]
             if self._text.curved:
@@ -148,21 +162,21 @@ class AttemptWriter:
         return [*lines, ""]
 
     def _misfit(self) -> list[str]:
-        text, clock = self._text, self._count
-        blocks = error_blocks(text.states, text.states * text.flow.has_momenta, clock)
-        lines = ["@njit(**INNER_LANES)", "def misfit_lanes(lanes, tolerance, span):", _ASSUMED]
+        text = self._text
+        blocks = error_blocks(text.states, text.states * text.flow.has_momenta, self._count)
+        lines = ["@njit(**LINKED_LANES)", "def misfit_lanes(lanes, tolerance, span, theta):", _ASSUMED]
         values = self._each("STATE"), self._each("TRIAL"), f"{self._each('LENGTHS')}*{self._each('SLOPES')}"
-        lines += [_EACH_NUMBER, f"        _one, _two, _three = {', '.join(f'abs({value})' for value in values)}"]
+        lines += [self._each_number, f"        _one, _two, _three = {', '.join(f'abs({value})' for value in values)}"]
         lines += ["        _one = _one if _one > _two else _two"]
         lines += [f"        {self._each('SIZES')} = _one if _one > _three else _three"]
         for name, weights in (("FIFTHS", FIFTH), ("THIRDS", THIRD)):
-            lines += [_EACH_NUMBER, f"        {self._each(name)} = abs({self._combined(weights)})"]
+            lines += [self._each_number, f"        {self._each(name)} = abs({self._combined(weights)})"]
         lines += ["    for lane in range(LANES):", "        _fifth, _third, _broken = 0.0, 0.0, 0.0"]
         lines += [f"        _reach, _speed = {self._at('SIZES', 0)}, {self._at('SIZES', 1)}"]
         lines += ["        _least = 0.01*_reach/span", "        _speed = _speed if _speed > _least else _least"]
         lines += ["        _allowed, _haze = tolerance, 1.0", *(self._rounding() if self._stops else [])]
         lines += [f"        _lapse = _reach/(abs({self._at('TRIAL', 1)}) + _reach/span)"]
-        lines += ["        _lapse = _lapse if _lapse < span else span", *self._compare([clock], "_lapse")]
+        lines += ["        _lapse = _lapse if _lapse < span else span", *self._compare([_CLOCK], "_lapse")]
         for block in dict.fromkeys(blocks.tolist()):
             rows = [int(row) for row in np.flatnonzero(blocks == block)]
             unit = ("_reach", "_speed")[block] if block < 2 else "_unit"
@@ -174,13 +188,13 @@ class AttemptWriter:
 
     def _rounding(self) -> list[str]:
         """Lines that loosen the tolerance to what the rounding of x allows."""
-        lapse = f"abs({self._at('TRIAL', self._count)} - {self._at('STATE', self._count)})"
+        lapse = f"abs({self._at('TRIAL', _CLOCK)} - {self._at('STATE', _CLOCK)})"
         lines = [
             f"_blur = {self._at('GRAIN')}*{lapse}",
             "_allowed = _blur/_speed if _blur > tolerance*_speed else tolerance",
             f"_depth = {self._at('SIDE')}*({self._at('TRIAL')} - {self._at('WALL')})",
             f"_depth = _depth if _depth > {self._at('DEPTH')} else {self._at('DEPTH')}",
-            f"_haze = 4.0*EPSILON*abs({self._at('STATE')})/_depth",
+            f"_haze = 4.0*{_EPSILON!r}*abs({self._at('STATE')})/_depth",
             "_haze = _haze/_allowed if _haze > _allowed else 1.0",
         ]
         return [f"        {line}" for line in lines]

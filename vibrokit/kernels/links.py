@@ -2,12 +2,11 @@
 
 A driver holds what the scenes of a form have in common: the loop over trajectories, and the events. It is compiled once
 for all of them, and finds the code of a scene through addresses that stand before the parameters in memory. Before the
-addresses are the positions of the stops, if the driver locates contacts.
+addresses is what the driver needs to know of the stops, if it locates contacts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ _SIGNATURES = {
     "rhs": types.none(_F8, _NUMBERS, _SWITCHES, _NUMBERS, _NUMBERS),
     "law": _F8(_I8, _F8, _F8, _NUMBERS),
     "attempt_lanes": types.none(_NUMBERS, _NUMBERS, _SWITCHES, _NUMBERS),
+    "misfit_lanes": types.none(_NUMBERS, _F8, _F8, _NUMBERS),
     "flight_rate": _F8(_NUMBERS),
     "taylor": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "tabulate": types.none(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
@@ -43,9 +43,9 @@ def addresses(functions: dict[str, Any]) -> NDArray[np.int64]:
     return found
 
 
-def linked(theta: NDArray[np.float64], links: NDArray[np.int64], walls: Sequence[int]) -> NDArray[np.float64]:
-    """Put the positions of the stops, at these places of `theta`, and the addresses before the parameters."""
-    return np.concatenate([theta[list(walls)], links.view(np.float64), theta])
+def linked(theta: NDArray[np.float64], links: NDArray[np.int64], stops: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put what a driver knows of the stops, and the addresses, before the parameters."""
+    return np.concatenate([stops, links.view(np.float64), theta])
 
 
 def _call(name: str, parameters: int) -> tuple[Any, Any]:
@@ -80,6 +80,12 @@ def law(_context: Any, i: Any, depth: Any, rate: Any, theta: Any) -> Any:
 def attempt_lanes(_context: Any, lanes: Any, theta: Any, pushing: Any, room: Any) -> Any:
     """Take a step from STATE to TRIAL in each lane, along its course."""
     return _call("attempt_lanes", 1)
+
+
+@intrinsic
+def misfit_lanes(_context: Any, lanes: Any, tolerance: Any, span: Any, theta: Any) -> Any:
+    """Find the ERROR of each attempt."""
+    return _call("misfit_lanes", 3)
 
 
 @intrinsic

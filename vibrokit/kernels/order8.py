@@ -71,9 +71,12 @@ class LocatedStepper(Stepper):
         return [*constants, text.forcing, text.rhs, text.stops, *extrapolation, *writer.attempt()]
 
     def driver_part(self, text: SceneText) -> list[str]:
-        """Where the numbers of the lanes are, and the errors of attempts."""
-        writer = AttemptWriter(text)
-        return [text.constants, writer.offsets(), self.series(text), *writer.misfit()]
+        """Where the numbers of the lanes are."""
+        return [text.constants, AttemptWriter(text).offsets(), self.series(text)]
+
+    def measure_part(self, text: SceneText) -> list[str]:
+        """The errors of attempts."""
+        return AttemptWriter(text).misfit()
 
     def series(self, text: SceneText) -> str:
         """Constants of the series of the flight, which has no terms where the flight is stepped."""

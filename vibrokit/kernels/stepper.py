@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class Emitter(ABC):
-    """What generated modules consist of: that of the scene, and that of the driver, which scenes of a form share.
+    """What generated modules consist of: that of the scene, and those that scenes of a form share.
 
     For developers
     --------------
@@ -33,7 +33,11 @@ class Emitter(ABC):
         """Return the pieces of the scene."""
 
     def driver_part(self, text: SceneText) -> list[str]:
-        """Return the pieces that stand above the templates: constants, and what depends on no formula of the scene."""
+        """Return the constants that stand above the templates."""
+        return []
+
+    def measure_part(self, text: SceneText) -> list[str]:
+        """Return what measures the error of a step, which flows with the same variables share; or nothing."""
         return []
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:

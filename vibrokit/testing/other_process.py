@@ -38,7 +38,7 @@ def outcome(scene: Oscillator) -> tuple[str, bytes]:
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])
     streams = None if scene.noise is None else streams_of(7, np.arange(len(starts)))
     ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, streams=streams)
-    return write_sources(scene, flow, stepper)[0], ended.states.tobytes()
+    return write_sources(scene, flow, stepper).scene, ended.states.tobytes()
 
 
 def outcomes_in_other_process(scenes: list[Oscillator]) -> list[tuple[str, bytes]]:

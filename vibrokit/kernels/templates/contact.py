@@ -15,7 +15,7 @@ from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
-from vibrokit.kernels.templates.scene import CLAMPED, COURSE, ERROR, FACTOR, LANES, LENGTH, SIDES, SIGMA, STATE, TRIAL
+from vibrokit.kernels.templates.scene import CLAMPED, COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL
 from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_of, settle
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -32,7 +32,6 @@ from vibrokit.kernels.templates.steps import (
     RELEASES,
     ROOT_DEPTH,
     ROOT_TIME,
-    ROW,
     SINCE,
     SPAN,
     STEPS,
@@ -49,6 +48,8 @@ from vibrokit.kernels.templates.steps import (
     plan,
     put,
     shortened,
+    side_of,
+    size_of,
     stop,
     take,
 )
@@ -64,7 +65,8 @@ AFTER_TOUCH, NEAR_TURN = 0.7, 0.35
 @njit(**INNER)
 def press(i, lane, memory, pushing, theta, settings, lanes, room):
     """Ask for a step in contact, on the course that is chosen for it."""
-    now, x, rate = of(STATE, CLOCK, lane, lanes), of(STATE, 0, lane, lanes), SIDES[i] * of(STATE, 1, lane, lanes)
+    now, x = of(STATE, CLOCK, lane, lanes), of(STATE, 0, lane, lanes)
+    rate = side_of(i, theta) * of(STATE, 1, lane, lanes)
     course, sigma = course_of(i, lane, memory, pushing, theta, lanes, room)
     remaining = memory[END] - now
     last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
@@ -80,12 +82,12 @@ def press(i, lane, memory, pushing, theta, settings, lanes, room):
 @njit(**INNER)
 def course_of(i, lane, memory, pushing, theta, lanes, room):
     """Choose the course of the next step in contact, and where on it the state lies."""
-    depth, rate = depth_at(STATE, i, lane, lanes, theta), SIDES[i] * of(STATE, 1, lane, lanes)
+    depth, rate = depth_at(STATE, i, lane, lanes, theta), side_of(i, theta) * of(STATE, 1, lane, lanes)
     if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
         slope = offset_by(room, ROW)
         take(STATE, lane, lanes, room)
         rhs(room[CLOCK], room, pushing, theta, slope)
-        acceleration = SIDES[i] * slope[1]
+        acceleration = side_of(i, theta) * slope[1]
         if rate * rate > (4.0 if acceleration > 0.0 else -1.0) * acceleration * depth:
             return ROOT_DEPTH, np.sqrt(depth)
     if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
@@ -123,7 +125,7 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
     if not np.isfinite(error):
         return DIVERGED
     if course == ROOT_DEPTH:
-        if then > memory[END] or SIDES[i] * of(TRIAL, 1, lane, lanes) >= 0.0:
+        if then > memory[END] or side_of(i, theta) * of(TRIAL, 1, lane, lanes) >= 0.0:
             memory[TIMED] = 2.0 if then > memory[END] else 1.0
             return COMPLETED
     elif memory[PULLED] == 0.0 and not tiny and leaves(i, then - now, lane, lanes, theta):
@@ -141,7 +143,7 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
 def leaves(i, lapse, lane, lanes, theta):
     """Whether a step in time ends outside the stop, or may have been outside between."""
     wall = stop(i, theta)
-    before, after = SIDES[i] * of(STATE, 1, lane, lanes), SIDES[i] * of(TRIAL, 1, lane, lanes)
+    before, after = side_of(i, theta) * of(STATE, 1, lane, lanes), side_of(i, theta) * of(TRIAL, 1, lane, lanes)
     end = depth_at(TRIAL, i, lane, lanes, theta)
     if end < -4.0 * EPSILON * abs(wall):
         return True
@@ -163,7 +165,7 @@ def turn(i, lane, memory, pushing, theta, settings, lanes, room):
         land(FLIPS, LAW_GOAL, i, length, lane, memory, theta, lanes)
         return UNDERWAY
     if turned:
-        for e in range(CLOCK + 1):
+        for e in range(CLOCK, size_of(lanes)):
             lanes[TRIAL + e * LANES + lane] = lanes[STATE + e * LANES + lane]
         length = 0.0
     return turned_at(i, length, turned, lane, memory, pushing, theta, settings, lanes, room)

@@ -12,9 +12,9 @@ from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.grazing import grazes
-from vibrokit.kernels.templates.scene import STATES
+from vibrokit.kernels.templates.scene import ROW, STATES
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK, ROW, TOUCHED
+from vibrokit.kernels.templates.steps import CLOCK, TOUCHED
 
 # --- scene above, stepper below ---
 

@@ -5,7 +5,20 @@ from numba import njit
 
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
-from vibrokit.kernels.templates.scene import BARRIERS, COURSE, EQUATIONS, LANES, LENGTH, POINT, SIDE, SIGMA, WALL, rhs
+from vibrokit.kernels.templates.scene import (
+    BARRIERS,
+    CLOCK,
+    COURSE,
+    EQUATIONS,
+    LANES,
+    LENGTH,
+    POINT,
+    ROW,
+    SIDE,
+    SIGMA,
+    WALL,
+    rhs,
+)
 
 # --- scene above, stepper below ---
 
@@ -17,20 +30,19 @@ def extrapolate(node, place, lane, lanes, pushing, theta, room):
     The second derivative of a law is infinite at depth 0 while its product with sigma is not. `place` is where the
     slope begins among the numbers of the lanes.
     """
-    row = EQUATIONS + 1
-    y, near, far, pushed = room, offset_by(room, row), offset_by(room, 2 * row), offset_by(pushing, lane * BARRIERS)
-    for e in range(row):
+    y, near, far, pushed = room, offset_by(room, ROW), offset_by(room, 2 * ROW), offset_by(pushing, lane * BARRIERS)
+    for e in range(CLOCK, EQUATIONS):
         y[e] = lanes[POINT + e * LANES + lane]
     wall, side = lanes[WALL + lane], lanes[SIDE + lane]
     sigma, depth, rate = lanes[SIGMA + lane] + node * lanes[LENGTH + lane], side * (y[0] - wall), side * y[1]
     deep = lanes[COURSE + lane] > 1.5  # along the root of the depth
     along, scale = (1.0, 2.0 / rate) if deep else (rate, 2.0)  # depth = along sigma² near the stop
     first = np.sqrt(depth / along)
-    rhs(y[EQUATIONS], y, pushed, theta, near)
+    rhs(y[CLOCK], y, pushed, theta, near)
     y[0] = wall + 4.0 * (y[0] - wall)
     second = np.sqrt(side * (y[0] - wall) / along)
-    rhs(y[EQUATIONS], y, pushed, theta, far)
-    near[EQUATIONS] = far[EQUATIONS] = 1.0
-    for e in range(row):
+    rhs(y[CLOCK], y, pushed, theta, far)
+    near[CLOCK] = far[CLOCK] = 1.0
+    for e in range(CLOCK, EQUATIONS):
         low, high = scale * first * near[e], scale * second * far[e]
         lanes[place + e * LANES] = low + (sigma - first) / (second - first) * (high - low)

@@ -13,8 +13,22 @@ from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import landed
-from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, ORDER, SIDES, STATE, TERMS
-from vibrokit.kernels.templates.steps import CLOCK, COUNT, END, EPSILON, SERIES, STEPS, TASK, UNDERWAY, put, stop, take
+from vibrokit.kernels.templates.scene import BARRIERS, ORDER, STATE, TERMS
+from vibrokit.kernels.templates.steps import (
+    CLOCK,
+    COUNT,
+    END,
+    EPSILON,
+    SERIES,
+    STEPS,
+    TASK,
+    UNDERWAY,
+    put,
+    side_of,
+    size_of,
+    stop,
+    take,
+)
 
 # --- scene above, stepper below ---
 
@@ -34,7 +48,7 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
         taylor(y[CLOCK], y, theta, series)
         if BARRIERS > 0:
             touched, length = first_touch(length, theta, series)
-        for e in range(EQUATIONS):
+        for e in range(size_of(lanes)):
             value = series[e * TERMS + ORDER]
             for k in range(ORDER - 1, -1, -1):
                 value = value * length + series[e * TERMS + k]
@@ -84,7 +98,7 @@ def touch_of(i, length, size, second, third, theta, c):
 
     `size`, `second` and `third` bound x and its derivatives. A contact too shallow for x to represent does not count.
     """
-    wall, side, s = stop(i, theta), SIDES[i], 0.0
+    wall, side, s = stop(i, theta), side_of(i, theta), 0.0
     rounding = EPSILON * (4.0 * abs(wall) + 2.0 * size)
     for _ in range(300):
         x, v, a = c[ORDER], 0.0, 0.0

@@ -6,7 +6,7 @@ from vibrokit.kernels.cubic import crossing
 from vibrokit.kernels.links import rhs
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
-from vibrokit.kernels.templates.scene import COURSE, LENGTH, SIDES, STATE, TRIAL
+from vibrokit.kernels.templates.scene import COURSE, LENGTH, ROW, STATE, TRIAL
 from vibrokit.kernels.templates.settling import push_of
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -16,7 +16,6 @@ from vibrokit.kernels.templates.steps import (
     HIGH,
     LOW,
     RISING,
-    ROW,
     SHORTER,
     TASK,
     TIME,
@@ -25,6 +24,8 @@ from vibrokit.kernels.templates.steps import (
     WHOLE,
     of,
     put,
+    side_of,
+    size_of,
     stop,
     take,
 )
@@ -36,7 +37,7 @@ DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0.0, 1.0, 2.0
 
 @njit(**INNER)
 def depth_at(offset, i, lane, lanes, theta):
-    return SIDES[i] * (of(offset, 0, lane, lanes) - stop(i, theta))
+    return side_of(i, theta) * (of(offset, 0, lane, lanes) - stop(i, theta))
 
 
 @njit(**INNER)
@@ -44,7 +45,7 @@ def goal_at(goal, i, offset, lane, lanes, theta):
     if goal == DEPTH_GOAL:
         return depth_at(offset, i, lane, lanes, theta)
     if goal == RATE_GOAL:
-        return SIDES[i] * of(offset, 1, lane, lanes)
+        return side_of(i, theta) * of(offset, 1, lane, lanes)
     return push_of(i, of(offset, 0, lane, lanes), of(offset, 1, lane, lanes), theta)
 
 
@@ -68,10 +69,10 @@ def aim(length, value, lane, memory, theta, lanes):
     """
     i, h = int(memory[AIM]), memory[WHOLE]
     if memory[GOAL] == DEPTH_GOAL and lanes[COURSE + lane] == TIME:
-        rate = SIDES[i] * of(TRIAL, 1, lane, lanes)
+        rate = side_of(i, theta) * of(TRIAL, 1, lane, lanes)
         move = -value / rate
         if length == h:
-            before = SIDES[i] * of(STATE, 1, lane, lanes)
+            before = side_of(i, theta) * of(STATE, 1, lane, lanes)
             move = crossing(memory[VALUE], before, value, rate, h) - h
     else:
         move = -value * (length - memory[SHORTER]) / (value - memory[VALUE])
@@ -99,10 +100,10 @@ def landed(lane, memory, pushing, theta, lanes, room):
     rate = of(TRIAL, 1, lane, lanes)
     if goal == DEPTH_GOAL and lanes[COURSE + lane] == TIME and abs(value) < 1e-9 * abs(h * rate):
         # One more Newton step is exact to rounding here and needs no new attempt.
-        y, slope, move = room, offset_by(room, ROW), -value / (SIDES[i] * rate)
+        y, slope, move = room, offset_by(room, ROW), -value / (side_of(i, theta) * rate)
         take(TRIAL, lane, lanes, y)
         rhs(y[CLOCK], y, pushing, theta, slope)
-        for e in range(CLOCK):
+        for e in range(size_of(lanes)):
             y[e] += move * slope[e]
         y[CLOCK] += move
         put(y, TRIAL, lane, lanes)

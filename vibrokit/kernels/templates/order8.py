@@ -8,7 +8,7 @@ from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, RATE_GOAL, depth_at, land, landed
-from vibrokit.kernels.templates.scene import BARRIERS, ERROR, FACTOR, LANES, LENGTH, SIDES, SLOPES, STATE, TRIAL
+from vibrokit.kernels.templates.scene import BARRIERS, ERROR, FACTOR, LANES, LENGTH, ROW, SLOPES, STATE, TRIAL
 from vibrokit.kernels.templates.steps import (
     AIM,
     CLOCK,
@@ -33,6 +33,7 @@ from vibrokit.kernels.templates.steps import (
     of,
     plan,
     shortened,
+    side_of,
 )
 
 # --- scene above, stepper below ---
@@ -119,7 +120,7 @@ def flown_to(lane, memory, pushing, theta, settings, lanes, room):
 def watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room):
     """Find a touch within the attempt, and shorten the step to end on it."""
     for i in range(BARRIERS):
-        side = SIDES[i]
+        side = side_of(i, theta)
         before, after = depth_at(STATE, i, lane, lanes, theta), depth_at(TRIAL, i, lane, lanes, theta)
         turns, up = turns_of(side, lane, lanes)
         if turns > 1 and not tiny:
@@ -146,7 +147,7 @@ def watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room):
 @njit(**INNER)
 def turns_of(side, lane, lanes):
     """Number of turns within a step, by its stages, and whether the first is away from a stop."""
-    row, final = (CLOCK + 1) * LANES, of(TRIAL, 1, lane, lanes)
+    row, final = ROW * LANES, of(TRIAL, 1, lane, lanes)
     largest = max(abs(lanes[SLOPES + lane]), abs(lanes[SLOPES + 5 * row + lane]), abs(final))
     turns, up, before = 0, False, 0.0
     for s in (0, 3, 5, 9, 10, 12):

@@ -3,13 +3,13 @@
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.links import LINKS, attempt_lanes
+from vibrokit.kernels.links import LINKS, attempt_lanes, misfit_lanes
 from vibrokit.kernels.options import INNER, OPTIONS
 from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
 from vibrokit.kernels.templates.contact import press
 from vibrokit.kernels.templates.order8 import fly, judge
-from vibrokit.kernels.templates.scene import BARRIERS, EQUATIONS, LANES, NUMBERS, STATE, misfit_lanes
+from vibrokit.kernels.templates.scene import BARRIERS, LANES, NUMBERS, ROW, STATE
 from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
@@ -22,15 +22,17 @@ from vibrokit.kernels.templates.steps import (
     MEMORIES,
     MEMORY,
     ROOM,
-    ROW,
+    SIZE,
     SPAN,
     TIMED,
     TOUCHED,
     UNDERWAY,
+    WORK,
     face,
     keep_alive,
     of,
     put,
+    size_of,
 )
 
 # --- scene above, stepper below ---
@@ -68,7 +70,7 @@ def proceed(status, lane, memory, pushing, theta, settings, lanes, room):
         else:
             status = fly(lane, memory, pushing, theta, settings, lanes, room)
     if status == COMPLETED:
-        for e in range(EQUATIONS):
+        for e in range(size_of(lanes)):
             if not np.isfinite(of(STATE, e, lane, lanes)):
                 return DIVERGED
     return status
@@ -106,10 +108,11 @@ def advance(
     out_label,
     visits,
 ):
-    numbers, switches = np.zeros(NUMBERS + ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
-    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[NUMBERS:]), pointer_to(switches)
-    theta, settings = offset_by(pointer_to(parameters), BARRIERS + LINKS), pointer_to(options)
-    y = room
+    numbers, switches = np.zeros(ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
+    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[WORK:]), pointer_to(switches)
+    theta, settings = offset_by(pointer_to(parameters), 3 * BARRIERS + LINKS), pointer_to(options)
+    y, equations = room, states.shape[1]
+    lanes[SIZE] = equations
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
     goes_on = settings[4] > 0.0  # for this time; otherwise each interval begins anew
     span = settings[4] if goes_on else interval
@@ -130,14 +133,14 @@ def advance(
                     index, label, begins = holder[lane], -1, not goes_on
                     if status == COMPLETED:
                         x, v = out_states[index, 0], out_states[index, 1]
-                        for e in range(EQUATIONS):
+                        for e in range(equations):
                             out_states[index, e] = of(STATE, e, lane, lanes)
                         done[lane] += 1
                         passed = phases[index] + done[lane]
                         at_section = passed % every == 0
                         if visits.shape[1] > 0 and passed % keep == 0:
                             visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
-                            for e in range(EQUATIONS):
+                            for e in range(equations):
                                 visits[index, visit, e] = out_states[index, e]
                         here = out_states[index, 0], out_states[index, 1]
                         status, label = stop_status(
@@ -153,7 +156,7 @@ def advance(
                         continue
                 else:
                     index, waiting = waiting, waiting + 1
-                    for e in range(EQUATIONS):
+                    for e in range(equations):
                         out_states[index, e] = states[index, e]
                     out_intervals[index], out_status[index], out_label[index] = 0, COMPLETED, -1
                     if budget[index] <= 0:
@@ -164,7 +167,7 @@ def advance(
                 passed = phases[index] + done[lane]
                 start = start_time + (passed % cycle if cycle > 0 else passed) * interval
                 if begins:
-                    for e in range(EQUATIONS):
+                    for e in range(equations):
                         y[e] = out_states[index, e]
                     y[CLOCK] = start
                     begin(y, span, lane, own, pushed, theta, settings, lanes, room)
@@ -172,5 +175,5 @@ def advance(
                 status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
         if active > 0:
             attempt_lanes(lanes, theta, pushing, room)
-            misfit_lanes(lanes, settings[0], abs(span))
+            misfit_lanes(lanes, settings[0], abs(span), theta)
     keep_alive(numbers, switches)

@@ -5,7 +5,7 @@ from numba import njit
 
 from vibrokit.kernels.links import law, rhs
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED, ROOTED, SIDES
+from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
@@ -16,6 +16,8 @@ from vibrokit.kernels.templates.steps import (
     SPAN,
     TIMED,
     TOUCHED,
+    is_rooted,
+    side_of,
     stop,
 )
 
@@ -30,18 +32,18 @@ def settle(y, memory, pushing, theta, slope):
     memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
     switch_off(pushing)
     for i in range(BARRIERS):
-        wall, rate = stop(i, theta), SIDES[i] * y[1]
-        depth = SIDES[i] * (y[0] - wall)
+        wall, rate = stop(i, theta), side_of(i, theta) * y[1]
+        depth = side_of(i, theta) * (y[0] - wall)
         touched = depth > 0.0
         if depth == 0.0:
             switch_off(pushing)
             rhs(y[CLOCK], y, pushing, theta, slope)
-            acceleration = SIDES[i] * slope[1]
+            acceleration = side_of(i, theta) * slope[1]
             # A contact too shallow for x to represent does not count.
             seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
             seen = seen and abs(rate) * memory[SPAN] > EPSILON * abs(wall)
             touched = rate > 0.0 if seen else acceleration > 0.0
-            if touched and ROOTED[i]:
+            if touched and is_rooted(i, theta):
                 memory[SINCE] = y[CLOCK]
         if touched:
             memory[TOUCHED] = i
@@ -66,4 +68,4 @@ def push_at(i, y, theta):
 
 @njit(**INNER)
 def push_of(i, x, v, theta):
-    return law(i, max(SIDES[i] * (x - stop(i, theta)), 1e-30), SIDES[i] * v, theta)
+    return law(i, max(side_of(i, theta) * (x - stop(i, theta)), 1e-30), side_of(i, theta) * v, theta)

@@ -2,7 +2,7 @@
 
 A half-integer law makes the force go like (t − t_c)^(3/2) after a touch at t_c: every method loses its order there. In
 τ = √(t − t_c) the motion is analytic from the touch through the turning point, and in u = √depth it is analytic down
-to the moment the mass leaves, which is at u = 0 exactly. So the time is the last component of the state, y = (z, t),
+to the moment the mass leaves, which is at u = 0 exactly. So the time is a component of the state, y = (t, z),
 and a step may run along any of three courses.
 
 Between attempts each lane decides for itself how its motion goes on. It keeps in its memory what it is about, and asks
@@ -17,15 +17,16 @@ from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import STALLED
 from vibrokit.kernels.templates.scene import (
     BARRIERS,
+    CLOCK,
     COURSE,
     DEPTH,
-    EQUATIONS,
     GRAIN,
     LANES,
     LENGTH,
+    NUMBERS,
     PUSHES,
+    ROW,
     SIDE,
-    SIDES,
     SIGMA,
     STATE,
     TERMS,
@@ -37,7 +38,6 @@ from vibrokit.kernels.templates.scene import (
 
 # Numba compiles a function again for each integer constant that it is called with, so these are no integers.
 TIME, ROOT_TIME, ROOT_DEPTH = 0.0, 1.0, 2.0
-CLOCK = EQUATIONS  # place of the time in y
 UNDERWAY = -1  # the status of a lane that waits for an attempt
 # Memory of a lane between attempts. Durations of the next step in free flight, in contact and at the next touch, the
 # stop that is touched (−1: none), since when (nan: unknown), whether its law would pull, whether the next step must run
@@ -55,10 +55,11 @@ MEMORY = 26
 # The tasks: to take steps, or to land on an event, which says what follows.
 STEPS, TOUCHES, TURNS, FLIPS, RELEASES = 0.0, 1.0, 2.0, 3.0, 4.0
 # Room beside the numbers of the lanes: a state, rows for slopes that events work in, the memories, and a series.
-ROW = CLOCK + 1
 MEMORIES = 5 * ROW
 SERIES = MEMORIES + LANES * MEMORY
-ROOM = SERIES + TERMS * EQUATIONS
+SIZE = NUMBERS  # where the number of variables is
+WORK = NUMBERS + 2  # where the room is, after the time of its first state
+ROOM = WORK + SERIES + TERMS * ROW
 EPSILON = 2.220446049250313e-16
 
 
@@ -70,28 +71,46 @@ def keep_alive(numbers, switches):
 
 @njit(**INNER)
 def stop(i, theta):
-    """Position of a stop, which stands before the links and the parameters."""
+    """Position of a stop. What is known of the stops stands before the links and the parameters."""
     return theta[i - (BARRIERS + LINKS)]
+
+
+@njit(**INNER)
+def side_of(i, theta):
+    """1 for a stop on the right, −1 for one on the left."""
+    return theta[i - (2 * BARRIERS + LINKS)]
+
+
+@njit(**INNER)
+def is_rooted(i, theta):
+    """Whether the law of a stop is smooth in the root of the depth only."""
+    return theta[i - (3 * BARRIERS + LINKS)] > 0.0
+
+
+@njit(**INNER)
+def size_of(lanes):
+    """Number of variables."""
+    return int(lanes[SIZE])
 
 
 @njit(**INNER)
 def take(offset, lane, lanes, y):
     """Copy a state of a lane."""
-    for e in range(CLOCK + 1):
+    for e in range(CLOCK, size_of(lanes)):
         y[e] = lanes[offset + e * LANES + lane]
 
 
 @njit(**INNER)
 def put(y, offset, lane, lanes):
     """Replace a state of a lane."""
-    for e in range(CLOCK + 1):
+    for e in range(CLOCK, size_of(lanes)):
         lanes[offset + e * LANES + lane] = y[e]
 
 
 @njit(**INNER)
 def accept(lane, lanes):
     """Make the end of the attempt the state."""
-    for e in range(CLOCK + 1):
+    for e in range(CLOCK, size_of(lanes)):
         lanes[STATE + e * LANES + lane] = lanes[TRIAL + e * LANES + lane]
 
 
@@ -145,4 +164,4 @@ def face(lane, memory, pushing, theta, lanes):
     for i in range(BARRIERS):
         lanes[PUSHES + i * LANES + lane] = 1.0 if pushing[i] else 0.0
     lanes[WALL + lane] = stop(touched, theta) if touched >= 0 else 0.0
-    lanes[SIDE + lane] = SIDES[touched] if touched >= 0 else 1.0
+    lanes[SIDE + lane] = side_of(touched, theta) if touched >= 0 else 1.0
