@@ -180,7 +180,7 @@ def run_ensemble(
 def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
     """Return the kernel of an ensemble, compiled here rather than in several threads at once; marked as compilation."""
     kernel = kernel_for(scene, flow, stepper)
-    if not kernel.compiled:
+    if not kernel.link():
         common = (theta_of(scene), 0.0, 1.0, np.array(stepper.settings(scene, 1.0)))
         nothing = np.empty((0, kernel.module.EQUATIONS)), np.empty(0, dtype=np.int64)
         none = np.empty((0, 4 if flow is Flow.NOISY else 0), dtype=np.uint64)

@@ -81,9 +81,9 @@ class Kernel:
         with first_call(function):
             function(states, linked(theta, links, _stops(self.module, theta)), *rest)
 
-    @property
-    def compiled(self) -> bool:
-        """Whether this process has compiled or loaded what `advance` needs."""
+    def link(self) -> bool:
+        """Compile or load what the driver calls; return whether the driver is compiled or loaded already."""
+        _addresses(self)
         return bool(self._advance.overloads)
 
     @property
