@@ -21,6 +21,7 @@ from vibrokit.structure.boundaries.edges import Straddles, meeting_cells, spread
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.trade.reference import reference_map
 
 
 def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
@@ -340,3 +341,21 @@ def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
     periods = {attractor.period: attractor.label for attractor in structure.attractors}
     (saddle,) = (saddle for saddle in structure.saddles if saddle.period == 6)
     assert set(saddle.leads_to) == {periods[2], periods[6]}
+
+
+@pytest.mark.slow
+def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_strip():
+    """Nothing settles near a symmetric orbit with a multiplier of 1.008, so that the boundary cannot be followed."""
+    stops = vk.Barrier(vk.Hertz(2000.0), 0.5, "right"), vk.Barrier(vk.Hertz(2000.0), -0.5, "left")
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.1, barriers=stops, excitations=(vk.Harmonic(0.4, 0.8),)
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False, rng=0)
+    (saddle,) = structure.saddles
+    assert set(saddle.leads_to) == {0, 1}
+    step = 1e-6
+    near = saddle.points[0] + step * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    still, *moved = reference_map(osc, near)
+    np.testing.assert_allclose(still, saddle.points[0], atol=1e-10)
+    slopes = np.column_stack([(moved[0] - moved[1]), (moved[2] - moved[3])]) / (2 * step)
+    np.testing.assert_allclose(np.sort(np.linalg.eigvals(slopes)), np.sort(saddle.multipliers.real), rtol=1e-5)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
@@ -50,6 +50,17 @@ class EdgeTrack:
     stretches: Array
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Strip:
+    """A strip of states that do not settle between two basins, of which one state (n,) is given.
+
+    A motion next to a weakly unstable orbit leaves it later than the budget allows.
+    """
+
+    labels: tuple[int, int]
+    state: Array
+
+
 class Straddles:
     """Pairs of states on two sides of a boundary, integrated together.
 
@@ -78,6 +89,7 @@ class Straddles:
         self.end_labels = np.zeros(self.ends.shape[:2], dtype=np.int64)
         self.numbers = np.arange(len(self.ends))  # of each pair among the initial ones
         self.sections = 0  # that classifications took
+        self.strips: list[Strip] = []  # that hide the boundary
         self._points: list[Array] = []  # at each section, of all pairs
         self._stretches: list[Array] = []
         self._bring_together(np.arange(len(self.ends)))
@@ -156,6 +168,9 @@ class Straddles:
             piece = known[changes[picked] : changes[picked] + 2]
             self.ends[index], self.end_labels[index] = corners[row, piece], labels[row, piece]
             shrunk[row] = piece[1] - piece[0] < pieces
+            if not shrunk[row] and (labels[row, 1:-1] == UNSETTLED).all():
+                ends = sorted(int(label) for label in labels[row, piece])
+                self.strips.append(Strip((ends[0], ends[1]), corners[row, pieces // 2]))
         return shrunk
 
     def _labels(self, states: Array) -> NDArray[np.int64]:

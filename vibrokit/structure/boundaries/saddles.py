@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
+from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import report, stage
-from vibrokit.results.basins import Basins
+from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.finding import Code, Finding
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibria, refine_cycle
@@ -47,6 +49,7 @@ _MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer 
 _SOON = 128  # sections within which motions on most boundaries converge
 _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer where they need longer
 _QUICK = 2000
+_WATCHED = 64  # sections of a motion that has not settled
 _LEAST_MOTIONS = 16
 _BLOCKS = 6  # of a motion, for the standard error
 _ORBITS_INSIDE, _LONGEST_INSIDE = 8, 16  # unstable orbits inside a chaotic set, and their longest period
@@ -116,6 +119,7 @@ class SaddleSearch:
                     each = max(2, min(self.trackers, most // len(unexplained)))
                     straddles = Straddles(classifier, self.basins, each, rng, only=unexplained)
                     self._follow(straddles, tracked)
+                    self._look_into_strips(straddles)
                     tracked += len(straddles.origins)
                 unexplained = pairs - self._explained
         self._lost = tuple(sorted(unexplained))
@@ -151,6 +155,20 @@ class SaddleSearch:
         self._describe_wandering(straddles)
         report(tracked + motions)
 
+    def _look_into_strips(self, straddles: Straddles) -> None:
+        """Search for an orbit in a strip of states that do not settle, where the boundary cannot be followed."""
+        strips = [strip for strip in straddles.strips if strip.labels not in self._explained]
+        if not strips or self.osc.autonomous:
+            return
+        run = functools.partial(run_ensemble, self.osc, Flow.STATE, self.classifier.stepper)
+        ended = run(np.array([strip.state for strip in strips]), self.classifier.budget)
+        visits = run(ended.states, _WATCHED, visits=_WATCHED).visits
+        for strip, points in zip(strips, visits, strict=True):
+            period = recurrence(self.region.scaled(points), _LONGEST_PERIOD)
+            with contextlib.suppress(StructureError):
+                if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0)), period):
+                    self._explained.add(strip.labels)
+
     def _explain(self, straddles: Straddles, which: NDArray[np.bool_]) -> None:
         """Note the boundaries that lead to a saddle: between the labels there, and between the labels at the start."""
         both = np.concatenate([straddles.end_labels[which], straddles.origins[straddles.numbers[which]]])
@@ -183,7 +201,7 @@ class SaddleSearch:
         if any(same_place(self.region.scaled(orbit.point[None]), places, EQUAL) for places in self._places):
             return True
         limits = branch_limits(self.classifier, orbit)
-        if len(set(limits)) < 2:
+        if len(set(limits)) < 2 or UNSETTLED in limits:
             limits = track.labels
         self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
         return True
