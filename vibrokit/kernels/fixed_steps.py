@@ -8,6 +8,7 @@ from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
+from vibrokit.kernels.lanes import lanes_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
@@ -31,6 +32,7 @@ class FixedSteps(Stepper):
     """
 
     takes_noise: ClassVar[bool] = False
+    nodes: ClassVar[int]  # of a step, at which the forcing is evaluated
 
     steps: int = 256
 
@@ -69,16 +71,17 @@ class FixedSteps(Stepper):
                 f"{type(self).__name__} steps across contacts, and where a contact force jumps at first touch, the "
                 f"{what} jump too; use FreeFlight or Order8, which locate contacts."
             )
+        step = self.step_part(text)
         # The laws are compiled only if contact times are needed.
-        return [text.constants, self.sizes(text), text.forcing, *self.step_part(text), text.stops]
+        return [*self.driver_part(text), "WALLS = ()  # steps go across contacts\n", text.forcing, *step, text.stops]
 
     def driver_part(self, text: SceneText) -> list[str]:
-        """The sizes."""
-        return [text.constants, self.sizes(text)]
+        """The sizes: lanes of a block, values of the forcing in a step, and numbers that a step works in."""
+        return [text.constants, f"LANES = {lanes_of(text)}\nNODES = {self.nodes}\nROOM = {self.room(text)}\n"]
 
-    @abstractmethod
-    def sizes(self, text: SceneText) -> str:
-        """Return the constants LANES, NODES of a step and ROOM, the numbers that a step works in."""
+    def room(self, text: SceneText) -> int:
+        """Return how many numbers a step works in; an array cannot be empty."""
+        return 1
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:
         """The loop over trajectories, and what draws the noise."""

@@ -109,8 +109,8 @@ def _addresses(kernel: Kernel) -> NDArray[np.int64]:
 
 
 def _stops(module: types.ModuleType, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a driver that locates contacts knows of the stops: smoothness, side and position."""
-    if "WALLS" not in vars(module) or not module.WALLS:
+    """What a driver knows of the stops, if it locates contacts: smoothness, side and position."""
+    if not module.WALLS:
         return np.zeros(0)
     return np.array([*module.ROOTED, *module.SIDES, *theta[list(module.WALLS)]], dtype=float)
 
@@ -156,8 +156,7 @@ def _kernel(fingerprint: str, flow: Flow, stepper: str, sources: _Sources) -> Ke
         with compiling():
             kernel = _written(name, sources.scene, flow, sources.stepper)
         for part in kernel.parts:  # a scene that is stored has the others stored
-            if store.stored(part.name) != part.source:
-                store.store(part.name, part.source)  # a newer file would be compiled again
+            store.store(part.name, part.source)
     return kernel
 
 

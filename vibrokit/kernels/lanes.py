@@ -24,18 +24,13 @@ _STEP = (
     "    promise_no_overlap(), use_widest_registers()",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
-_CLASSICAL_NODES = (0.0, 0.5, 1.0)
+CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 
 def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    pieces = [tabulation(text, _CLASSICAL_NODES), text.derivative, text.amplitude, text.slope]
-    return [*pieces, steps_of(text, _unrolled(text), len(_CLASSICAL_NODES))]
-
-
-def classical_sizes(text: SceneText) -> str:
-    """Constants of classical Runge–Kutta steps."""
-    return sizes(text, len(_CLASSICAL_NODES))
+    pieces = [tabulation(text, CLASSICAL_NODES), text.derivative, text.amplitude, text.slope]
+    return [*pieces, steps_of(text, _unrolled(text), len(CLASSICAL_NODES))]
 
 
 def staged_step(text: SceneText) -> list[str]:
@@ -44,14 +39,9 @@ def staged_step(text: SceneText) -> list[str]:
     return [tabulation(text, nodes), text.derivative, steps_of(text, _staged(text), STAGES)]
 
 
-def staged_sizes(text: SceneText) -> str:
-    """Constants of Dormand–Prince steps, which work in their slopes and a point."""
-    return sizes(text, STAGES, room=(STAGES + 1) * len(text.variables) * lanes_of(text))
-
-
-def sizes(text: SceneText, nodes: int, room: int = 1) -> str:
-    """Lanes of a block, values of the forcing in a step, and numbers that a step works in."""
-    return f"LANES = {lanes_of(text)}\nNODES = {nodes}\nROOM = {room}\n"
+def staged_room(text: SceneText) -> int:
+    """Numbers that a Dormand–Prince step works in: its slopes, and a point."""
+    return (STAGES + 1) * len(text.variables) * lanes_of(text)
 
 
 def lanes_of(text: SceneText) -> int:

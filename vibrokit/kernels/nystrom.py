@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import lanes_of, sizes, steps_of, tabulation
+from vibrokit.kernels.lanes import lanes_of, steps_of, tabulation
 from vibrokit.kernels.nystrom_tableau import NODES, POSITION, STAGES, VELOCITY, WEIGHTS
 
 if TYPE_CHECKING:
@@ -57,10 +57,11 @@ def nystrom_step(text: SceneText) -> list[str]:
     return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, step]
 
 
-def nystrom_sizes(text: SceneText) -> str:
-    """Constants of Runge–Kutta–Nyström steps, which read their factors."""
+def nystrom_room(text: SceneText) -> int:
+    """Numbers that a step reads: its factors."""
     writer = text.second_order
-    return sizes(text, STAGES, room=_factor(0 if writer is None else writer.kinds, 0, 0))
+    assert writer is not None, "the step is written first, and refuses such a flow"
+    return _factor(writer.kinds, 0, 0)
 
 
 def _factor(kind: int, stage: int, number: int) -> int:

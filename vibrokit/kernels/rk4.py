@@ -6,7 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.lanes import classical_sizes, classical_step
+from vibrokit.kernels.lanes import CLASSICAL_NODES, classical_step
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -32,12 +32,9 @@ class RK4(FixedSteps):
     """
 
     name: ClassVar[str] = "rk4"
+    nodes: ClassVar[int] = len(CLASSICAL_NODES)
     takes_noise: ClassVar[bool] = True
 
     def step_part(self, text: SceneText) -> list[str]:
         """The classical step, with kicks where there is noise."""
         return classical_step(text)
-
-    def sizes(self, text: SceneText) -> str:
-        """The lanes, and the three nodes of a step."""
-        return classical_sizes(text)

@@ -6,7 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.lanes import staged_sizes, staged_step
+from vibrokit.kernels.lanes import staged_room, staged_step
+from vibrokit.kernels.tableau import STAGES
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -27,6 +28,7 @@ class RK8(FixedSteps):
     """
 
     name: ClassVar[str] = "rk8"
+    nodes: ClassVar[int] = STAGES
 
     steps: int = 24
 
@@ -34,6 +36,6 @@ class RK8(FixedSteps):
         """The step of twelve stages."""
         return staged_step(text)
 
-    def sizes(self, text: SceneText) -> str:
-        """The lanes, the nodes of a step, and the room for its slopes."""
-        return staged_sizes(text)
+    def room(self, text: SceneText) -> int:
+        """The slopes, and a point."""
+        return staged_room(text)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.nystrom import nystrom_sizes, nystrom_step
+from vibrokit.kernels.nystrom import nystrom_room, nystrom_step
+from vibrokit.kernels.nystrom_tableau import STAGES
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -31,6 +32,7 @@ class RKN12(FixedSteps):
     """
 
     name: ClassVar[str] = "rkn12"
+    nodes: ClassVar[int] = STAGES
     prepared: ClassVar[bool] = True
 
     steps: int = 12
@@ -45,6 +47,6 @@ class RKN12(FixedSteps):
         """The step of seventeen stages."""
         return nystrom_step(text)
 
-    def sizes(self, text: SceneText) -> str:
-        """The lanes, the nodes of a step, and the room for its factors."""
-        return nystrom_sizes(text)
+    def room(self, text: SceneText) -> int:
+        """The factors of the stages."""
+        return nystrom_room(text)

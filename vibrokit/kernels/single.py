@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.ensemble import Stop, advance_block, compiled_kernel
-from vibrokit.kernels.kernel import theta_of
+from vibrokit.kernels.ensemble import Stop, advance_block
+from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.streams import streams_of
 from vibrokit.parts.scene import Scene
@@ -30,7 +30,7 @@ def record(
 
     They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
-    kernel = compiled_kernel(scene, flow, stepper)
+    kernel = kernel_for(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     common = (theta_of(scene), start_time, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
     streams = streams_of(seed or 0, np.zeros(1, dtype=np.int64)) if flow is Flow.NOISY else np.empty((1, 0), np.uint64)

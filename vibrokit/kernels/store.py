@@ -44,7 +44,12 @@ def stored(name: str) -> str | None:
 
 
 def store(name: str, text: str) -> None:
-    """Write a generated module so that another process sees all of it or nothing."""
+    """Write a generated module so that another process sees all of it or nothing.
+
+    One that is there with the same text is left alone: Numba would compile a newer file again.
+    """
+    if stored(name) == text:
+        return
     folder = cache_directory()
     with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8") as file:
         try:
@@ -69,8 +74,7 @@ _LOADED: dict[tuple[str, str], types.ModuleType] = {}
 
 
 def _imported(name: str, text: str) -> types.ModuleType:
-    if stored(name) != text:
-        store(name, text)
+    store(name, text)
     specification = importlib.util.spec_from_file_location(name, cache_directory() / f"{name}.py")
     if specification is None or specification.loader is None:
         raise ImportError(f"cannot import the generated kernel {name} from {cache_directory()}.")
