@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 from vibrokit import __version__
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 project = "vibrokit"
 author = "The vibrokit developers"

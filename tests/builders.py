@@ -24,9 +24,10 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.bifurcation import Bifurcation
+from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record

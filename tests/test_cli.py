@@ -18,8 +18,9 @@ from vibrokit.analyzers.settings import configured, setting
 from vibrokit.cli import main, parsed
 from vibrokit.errors import StructureError
 from vibrokit.progress import OutOfTime, advance, stage
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 
 PLOT = ["--analyzer", "action-plot"]
 TOY = ["run", "double-well", "--analyzer", "toy"]

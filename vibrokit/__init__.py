@@ -48,14 +48,14 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.results.codes import Code as Code
+    from vibrokit.results.codes import Severity as Severity
     from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
     from vibrokit.results.energy import Bound as Bound
     from vibrokit.results.energy_continuation import EnergyContinuation as EnergyContinuation
     from vibrokit.results.exit_rate import ExitRate as ExitRate
     from vibrokit.results.files import load_result as load_result
-    from vibrokit.results.finding import Code as Code
     from vibrokit.results.finding import Finding as Finding
-    from vibrokit.results.finding import Severity as Severity
     from vibrokit.results.record import Record as Record
     from vibrokit.results.result import Result as Result
     from vibrokit.results.structure import Structure as Structure
@@ -117,9 +117,9 @@ _MODULES = {
     "EnergyContinuation": "vibrokit.results.energy_continuation",
     "ExitRate": "vibrokit.results.exit_rate",
     "load_result": "vibrokit.results.files",
-    "Code": "vibrokit.results.finding",
+    "Code": "vibrokit.results.codes",
     "Finding": "vibrokit.results.finding",
-    "Severity": "vibrokit.results.finding",
+    "Severity": "vibrokit.results.codes",
     "Record": "vibrokit.results.record",
     "Result": "vibrokit.results.result",
     "Structure": "vibrokit.results.structure",

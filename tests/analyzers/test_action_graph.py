@@ -15,8 +15,8 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 
 pytestmark = pytest.mark.slow
 

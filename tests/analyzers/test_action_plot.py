@@ -11,8 +11,8 @@ from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.analyzers.shooting.starts import Ring
 from vibrokit.errors import SceneError, StructureError
 from vibrokit.progress import TRAJECTORIES
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 from vibrokit.structure.orbits import refine_orbit
 
 

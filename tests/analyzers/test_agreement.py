@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from vibrokit.analyzers.agreement import combined
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
-from vibrokit.results.finding import Code
 
 ORBIT = SimpleNamespace(label=0, repeats=True)
 CHAOS = SimpleNamespace(label=0, repeats=False)

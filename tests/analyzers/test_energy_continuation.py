@@ -7,8 +7,8 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.errors import ParameterError, ResultFileError, SceneError, StructureError
+from vibrokit.results.codes import Code
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation, LeastPathChange
-from vibrokit.results.finding import Code
 from vibrokit.scene_file import scene_data
 
 QUICK = vk.LeastAction(graph=None, shooting=vk.Shooting(points=2000, rounds=6))

@@ -9,8 +9,8 @@ import vibrokit as vk
 from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code
 
 OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
 EXACT = 4 * 0.3 * 0.25

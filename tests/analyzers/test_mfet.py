@@ -20,8 +20,8 @@ from vibrokit.analyzers.mfet.direct import Exits
 from vibrokit.analyzers.mfet.estimates import exponential_p_value, mean_tests, rate_of
 from vibrokit.errors import CheckpointError, SceneError, StructureError
 from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.codes import Code
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.finding import Code
 
 WELL = scene(damping_ratio=0.2, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(intensity=0.04))
 QUICK = {"source": 0, "target_error": 0.1, "escapes": 8}

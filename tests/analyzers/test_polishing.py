@@ -24,8 +24,8 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.progress import working
 from vibrokit.results.basins import ESCAPED
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 from vibrokit.symbolic.flow_kind import Flow
 
 DAMPING = 0.3

@@ -15,7 +15,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ import vibrokit as vk
 from tests.extremes.scenes_of_action import ActionScene, scenes
 from vibrokit.errors import VibrokitError
 from vibrokit.progress import Update
-from vibrokit.results.finding import Code, Severity
+from vibrokit.results.codes import Code, Severity
 
 HEADER = (
     "scene",

@@ -18,7 +18,7 @@ import time
 import vibrokit as vk
 from vibrokit.errors import VibrokitError
 from vibrokit.results.basins import ESCAPED
-from vibrokit.results.finding import Severity
+from vibrokit.results.codes import Severity
 
 SCENES = {}
 NOISE = vk.WhiteNoise(intensity=1e-4)

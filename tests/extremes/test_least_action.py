@@ -6,8 +6,8 @@ import pytest
 import vibrokit as vk
 from tests.extremes.scenes_of_action import damped_wells, first_contact, paper_scene, pressed_wells, tilted_wells
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import vibrokit as vk
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ import scipy.integrate
 
 import vibrokit as vk
 from vibrokit.results.basins import ESCAPED
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 QUICK = vk.LeastAction(shooting=None, graph=vk.GraphSearch(nodes=(60, 60)))
 DAMPING, PUSH = 0.1, 0.3

@@ -16,7 +16,7 @@ from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
 

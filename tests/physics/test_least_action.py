@@ -9,8 +9,8 @@ import pytest
 import vibrokit as vk
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Code
 
 pytestmark = pytest.mark.slow
 

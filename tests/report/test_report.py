@@ -13,9 +13,10 @@ from vibrokit.cli import main
 from vibrokit.progress import Stats
 from vibrokit.report.data import plain, run_data
 from vibrokit.report.text import energy_table, findings_text, rate_table, record_text, stats_text
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
 

@@ -31,8 +31,9 @@ from tests.builders import (
 from vibrokit import registry
 from vibrokit.errors import UnknownNameError, VibrokitError
 from vibrokit.registry import Group, names
+from vibrokit.results.codes import Code, Severity
 from vibrokit.results.files import ResultFileError
-from vibrokit.results.finding import Code, Finding, Severity
+from vibrokit.results.finding import Finding
 from vibrokit.results.pictures import save_figure
 from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record

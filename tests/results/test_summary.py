@@ -14,7 +14,8 @@ from tests.builders import (
     full_structure,
     spiral,
 )  # fmt: skip
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 from vibrokit.results.trajectory import Trajectory
 
 

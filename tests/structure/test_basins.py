@@ -12,7 +12,7 @@ import vibrokit as vk
 from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, classify_grid

@@ -7,7 +7,7 @@ import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
 from vibrokit.progress import OutOfTime
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.grid import cell_findings
 from vibrokit.structure.orbits import refine_orbit

@@ -11,7 +11,7 @@ import vibrokit as vk
 from tests.scenes import Coloured, double_well, scene
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.basins import ESCAPED, Basins
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import equilibria, find_cycle

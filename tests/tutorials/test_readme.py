@@ -14,7 +14,7 @@ import vibrokit as vk
 from vibrokit import cli
 from vibrokit.analyzers.settings import configured, setting
 from vibrokit.registry import Group, load
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import vibrokit as vk
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
 

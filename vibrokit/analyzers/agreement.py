@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 
 VAGUE = 0.5
 """Of a path's action: with a larger error the graph cannot exclude a path of half the action."""

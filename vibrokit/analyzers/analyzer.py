@@ -22,8 +22,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import NOT_FOLLOWED
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding, check_findings
+from vibrokit.results.finding import Finding, check_findings
 from vibrokit.results.record import versions
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure

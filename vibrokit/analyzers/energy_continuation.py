@@ -16,9 +16,10 @@ from vibrokit.analyzers.settings import settings_of
 from vibrokit.errors import ParameterError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, stage, working
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure

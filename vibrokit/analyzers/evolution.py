@@ -23,8 +23,9 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.codes import Code
 from vibrokit.results.density_history import DensityHistory
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.validation import check_means, gibibytes, plain

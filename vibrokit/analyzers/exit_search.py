@@ -23,8 +23,9 @@ from vibrokit.analyzers.polishing.polish import Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
 from vibrokit.progress import stage
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.structure.boundaries.edges import meeting_cells
 from vibrokit.structure.orbits import Orbit
 from vibrokit.structure.orbits_inside import orbits_inside

@@ -19,9 +19,10 @@ from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
 from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.result import Result
 from vibrokit.structure.validation import intensities, share, whole

@@ -17,8 +17,9 @@ from vibrokit.analyzers.sgcm.energies import extrapolated
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.structure.validation import gibibytes, intensities, whole

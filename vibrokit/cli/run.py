@@ -138,7 +138,8 @@ def source_of(text: str) -> int | str:
 def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outcome: Outcome) -> None:
     """Find the structure and run the analyzers; keep each of them in the outcome as soon as it is there."""
     from vibrokit.progress import working
-    from vibrokit.results.finding import Code, Finding
+    from vibrokit.results.codes import Code
+    from vibrokit.results.finding import Finding
     from vibrokit.structure.find import find_structure
 
     def not_run(name: str, reason: str) -> None:

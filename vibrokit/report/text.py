@@ -10,8 +10,9 @@ from typing import Any
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.progress import Stats
 from vibrokit.results.basins import ESCAPED
+from vibrokit.results.codes import Severity
 from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.finding import Finding, Severity
+from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
 from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record

@@ -8,8 +8,9 @@ import xarray
 
 from vibrokit.errors import ResultFileError, UnknownNameError
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, read_energies
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.summary import Summary, counted
 

@@ -13,7 +13,8 @@ import numpy as np
 from vibrokit.errors import ResultFileError, shown
 from vibrokit.progress import Stats
 from vibrokit.results.arrays import taken
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 
 if TYPE_CHECKING:
     from vibrokit.results.record import Record

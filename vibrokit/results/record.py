@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.progress import Stats
 from vibrokit.registry import load_attribute
-from vibrokit.results.finding import Code, Finding, Severity, check_findings
+from vibrokit.results.codes import Code, Severity
+from vibrokit.results.finding import Finding, check_findings
 from vibrokit.results.summary import Summary
 
 if TYPE_CHECKING:

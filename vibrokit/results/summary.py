@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 from html import escape
 
-from vibrokit.results.finding import Finding, Severity
+from vibrokit.results.codes import Severity
+from vibrokit.results.finding import Finding
 
 _ROWS = 3  # with the title and a finding, five lines
 _WIDTH = 160

@@ -20,8 +20,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
 from vibrokit.progress import Progress, Work, advance, stage, working
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.scene_file import scene_data

@@ -19,7 +19,8 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, stage, working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure

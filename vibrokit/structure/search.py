@@ -17,7 +17,8 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, UNSETTLED
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch

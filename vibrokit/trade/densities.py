@@ -14,7 +14,7 @@ from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.errors import SceneError, StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
-from vibrokit.results.finding import Code
+from vibrokit.results.codes import Code
 from vibrokit.results.labels import exit_between
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure

@@ -20,8 +20,9 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -21,7 +21,8 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 
 # Direct simulation costs e^Λ relaxations for each exit, splitting about 2 Λ² (Λ is ln of the mean exit time in
 # relaxations), times what its importance function and its density cost: they break even near Λ = 7.

@@ -21,8 +21,9 @@ from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ExitPath
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.structure.orbits import Orbit
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -16,8 +16,9 @@ from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ExitPath
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 
 _ROUNDING = 1e-9  # of a path's extent: samples this far beyond the face still count as inside
 _SHORT = 1e-4  # of a piece: time over which ∂H/∂t is taken

@@ -15,8 +15,9 @@ from vibrokit.analyzers.polishing.sensitivity import sensitivities
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.progress import advance, stage
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.structure.orbits import Orbit
 
 METHOD = "least action"

@@ -16,8 +16,9 @@ from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.kernels.single import record
 from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.finding import Finding
 from vibrokit.symbolic.flow_kind import Flow
 
 FINDER = "action plot"

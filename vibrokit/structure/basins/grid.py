@@ -15,7 +15,8 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
 from vibrokit.structure.basins.stop_cells import agreeing, centres

@@ -16,7 +16,8 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import report, stage
 from vibrokit.results.basins import UNSETTLED, Basins
-from vibrokit.results.finding import Code, Finding
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier

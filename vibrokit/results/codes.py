@@ -1,0 +1,358 @@
+"""Codes of findings: for each what it means, how much it matters, and what to do. Their sentences are here only."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a finding matters."""
+
+    INFO = "info"
+    """It explains a number."""
+    WARNING = "warning"
+    """A number may be less certain, or something less complete, than its user expects."""
+    ERROR = "error"
+    """Something that was asked for is missing."""
+
+
+INFO, WARNING, ERROR = Severity
+_SEE_REASON = "The reason says what to change."
+_RAISE_BUDGET = "Raise the budget."
+_FINER_STEPPER = "Use a finer stepper."
+
+
+class Code(StrEnum):
+    """What can be found. Each code has a severity, a sentence and advice on what to do.
+
+    The sentence is a template of the finding's values; ``{state}`` and ``{goal}`` in it are the finding's source and
+    target, by name where names are known.
+    """
+
+    severity: Severity
+    sentence: str
+    advice: str
+
+    def __new__(cls, value: str, severity: Severity, sentence: str, advice: str = "") -> Code:
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.severity, member.sentence, member.advice = severity, sentence, advice
+        return member
+
+    # Any analysis
+    REMARK = "remark", INFO, "{text}", "Read it: a plug-in wrote it."
+    STOPPED = (
+        "stopped", ERROR, "The work was stopped during {stage} ({reason}); what was found before is kept.",
+        "Run it again with more time.",
+    )  # fmt: skip
+    UNKNOWN_KIND = (
+        "unknown-kind", WARNING,
+        "No installed package registers results of kind {kind}; the file is opened as plain data.",
+        "Install the package that wrote the file.",
+    )  # fmt: skip
+    SOURCE_FAILED = "source-failed", ERROR, "{state} could not be analyzed: {reason}", _SEE_REASON
+    ANALYZER_NOT_RUN = "analyzer-not-run", ERROR, "The analyzer {analyzer} was not run: {reason}", _SEE_REASON
+
+    # Structure
+    STEADY_STATES = "steady-states", INFO, "Steady states: {count}, from {starts} starts."
+    SHIFTED_COPIES = (
+        "shifted-copies", INFO,
+        "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, the "
+        "one nearest to x = 0 is kept; motion that ends at a copy of it has left the region.",
+        "Give a region to keep all of them.",
+    )  # fmt: skip
+    STARTS_DIVERGED = (
+        "starts-diverged", WARNING, "{count} of {starts} starts diverged.",
+        "Narrow the region, or check the signs of the forces.",
+    )  # fmt: skip
+    STARTS_UNSETTLED = (
+        "starts-unsettled", WARNING, "At least {count} starts did not settle on an equilibrium or a limit cycle.",
+        _RAISE_BUDGET,
+    )  # fmt: skip
+    SURVIVAL = (
+        "survival", INFO,
+        "Starts that had not settled after {periods} periods with {stepper}: {survivors} of {starts}.",
+    )  # fmt: skip
+    CHAOTIC_TRANSIENT = (
+        "chaotic-transient", INFO,
+        "Motion that persists with the coarser steps does not persist with the finer ones: it is a chaotic transient.",
+    )  # fmt: skip
+    SLOW_SETTLING = (
+        "slow-settling", WARNING,
+        "{count} starts still approach an orbit of period above {period}, or one with a multiplier close to 1.",
+        _RAISE_BUDGET,
+    )  # fmt: skip
+    CELLS_UNSETTLED = (
+        "cells-unsettled", WARNING, "{fraction:.2%} of the cells did not settle within the budget.", _RAISE_BUDGET,
+    )  # fmt: skip
+    CELLS_LEFT_REGION = (
+        "cells-left-region", INFO, "{fraction:.2%} of the cells escaped from the region.",
+        "Widen the region if this matters.",
+    )  # fmt: skip
+    CELLS_NOT_FOLLOWED = (
+        "cells-not-followed", WARNING, "{fraction:.2%} of the cells were not followed.", "Run it again with more time.",
+    )  # fmt: skip
+    COARSE_GRID = (
+        "coarse-grid", INFO,
+        "The basins have {nx} × {nv} cells: transients are long, and a finer grid would take some {sections:.1e} "
+        "section-map iterations.",
+        "Give cells for a finer one.",
+    )  # fmt: skip
+    SADDLES = "saddles", INFO, "Unstable orbits on basin boundaries: {count}."
+    BOUNDARIES_SKIPPED = (
+        "boundaries-skipped", WARNING,
+        "{skipped} of {total} basin boundaries, the shortest on the grid, were not followed.",
+        "Refine the basin grid on a smaller region.",
+    )  # fmt: skip
+    MOTIONS_NOT_CONVERGED = (
+        "motions-not-converged", WARNING,
+        "{count} motions on the boundary between {state} and {goal} almost repeat, but Newton's method did not "
+        "converge to an orbit.", _FINER_STEPPER,
+    )  # fmt: skip
+    CHAOTIC_EDGE = (
+        "chaotic-edge", INFO,
+        "The edge state between {state} and {goal} is chaotic: largest Lyapunov exponent {exponent:.3g} ± {error:.1g} "
+        "s⁻¹, from {count} motions. Unstable orbits found inside it: {orbits}.",
+        "Exit paths are polished to these orbits; without one the graph gives an estimate.",
+    )  # fmt: skip
+    EDGE_NOT_CONVERGED = (
+        "edge-not-converged", WARNING, "Edge tracking between {state} and {goal} did not converge within the budget.",
+        _RAISE_BUDGET,
+    )  # fmt: skip
+    BOUNDARY_LOST = (
+        "boundary-lost", WARNING,
+        "No orbit was found on the boundary between {state} and {goal}: edge tracking lost the boundary.",
+        "Refine the basin grid.",
+    )  # fmt: skip
+    LARGE_RESIDUAL = (
+        "large-residual", WARNING, "The largest residual of an unstable orbit is {residual:.1e}, above {accepted:g}.",
+        _FINER_STEPPER,
+    )  # fmt: skip
+    SADDLES_OUTSIDE = (
+        "saddles-outside", INFO, "{count} of the unstable orbits lie outside the region.",
+        "Widen the region to show them.",
+    )  # fmt: skip
+    NO_MANIFOLDS = "no-manifolds", WARNING, "Saddle {saddle} has no manifolds: {reason}", _SEE_REASON
+
+    # Continuation
+    BRANCHES = "branches", INFO, "{branches} branches of steady states at {values} values of {parameter}."
+    BIFURCATION = "bifurcation", INFO, "{kind} of branch {state} at {value:.8g} ± {error:.1g}."
+    BRANCH_ENDS = (
+        "branch-ends", WARNING,
+        "Branch {state} {change} between {low:.8g} and {high:.8g}, where {located} was located.",
+        "Add values between the two.",
+    )  # fmt: skip
+    FOUND_BY_NEIGHBOUR = (
+        "found-by-neighbour", INFO, "{count} steady states were found from a neighbouring value and not by the search.",
+    )  # fmt: skip
+    ENERGY_BRANCHES = (
+        "energy-branches",
+        INFO,
+        "{branches} exit paths were followed over {values} values of {parameter}.",
+    )
+    PATH_LOST = (
+        "path-lost", INFO, "The exit path {state} could not be followed from {parameter} = {value:.8g} to {next:.8g}: "
+        "{reason}", "The path folds, grazes a stop or meets another path; pass a value beyond in search=.",
+    )  # fmt: skip
+    LEAST_PATH_CHANGES = (
+        "least-path-changes", INFO,
+        "Below {parameter} = {value:.8g} the path {state} has the least action, and above it the path {goal}.",
+    )  # fmt: skip
+    NOTHING_AT = "nothing-at", WARNING, "At {value:g} no steady state was found: {reason}", _SEE_REASON
+
+    # Energies
+    AT_EXIT = "at-exit", INFO, "{state} already satisfies the exit condition: ΔU = 0."
+    NOISE_NOT_WEAK = (
+        "noise-not-weak", WARNING,
+        "ΔU/D = {ratio:.2g} from {state} to {goal} at D = {intensity:g}, below {least:g}: the noise is not weak, and "
+        "exp(ΔU/D) does not describe the mean exit time.",
+        "Lower the noise intensity, or look at the exit times of MFET.",
+    )  # fmt: skip
+    NO_EXIT_FOUND = (
+        "no-exit-found", ERROR, "No exit path from {state} was found.",
+        "Raise the budget or the number of points, or widen the region.",
+    )  # fmt: skip
+    METHOD_FAILED = "method-failed", WARNING, "The {method} could not be used for {state}: {reason}", _SEE_REASON
+
+    # Action plot
+    SHOTS = (
+        "shots", INFO,
+        "Action plot from {state}: {escaped} of {paths} paths reached the exit, {left_region} left the region without "
+        "an exit, {remaining} remained inside, {diverged} diverged; {branches} distinct exit paths.",
+    )  # fmt: skip
+    REFINEMENT = (
+        "refinement", INFO,
+        "Action plot from {state}: over the last {last} of {rounds} refinement rounds the least action changed by "
+        "{change:.1e} (relative).", "If the change is above the error you accept, raise rounds or points.",
+    )  # fmt: skip
+    REFINEMENT_TOO_SHORT = (
+        "refinement-too-short", WARNING,
+        "Action plot from {state}: {rounds} refinement rounds are too few to tell how the least action changes.",
+        "Raise rounds.",
+    )  # fmt: skip
+
+    # Graph
+    GRAPH = "graph", INFO, "Graph from {state}: {nodes_x} × {nodes_v} nodes, {steps} steps per period by {stepper}."
+    GRAPH_PATH_LOST = (
+        "graph-path-lost", WARNING, "The graph's path from {state} to {goal} could not be traced back.",
+        "Raise the number of nodes.",
+    )  # fmt: skip
+
+    # Exit times
+    CHECKPOINT_NOT_WRITTEN = (
+        "checkpoint-not-written", WARNING, "The checkpoint {path} could not be written: {reason}",
+        "Free some space, or choose another place.",
+    )  # fmt: skip
+    INTENSITY_FAILED = "intensity-failed", WARNING, "{state} at D = {intensity:g}: {reason}", _SEE_REASON
+    NO_EXIT_SEEN = (
+        "no-exit-seen", WARNING,
+        "No walker left {state} at D = {intensity:g}: with 95 % confidence the mean exit time is above {time:.3g} s.",
+        "Give more time, raise the noise intensity, or use splitting=True.",
+    )  # fmt: skip
+    NOT_METASTABLE = (
+        "not-metastable", WARNING,
+        "{state} is left after {ratio:.2g} relaxation times on average at D = {intensity:g}, below {least:g}: it "
+        "is not metastable.", "Lower the noise intensity.",
+    )  # fmt: skip
+    TARGET_NOT_METASTABLE = (
+        "target-not-metastable", WARNING,
+        "Only {share:.0%} of the motion that begins on {goal} is still there after some relaxation times at "
+        "D = {intensity:g}: arrivals from {state} do not stay.", "Lower the noise intensity.",
+    )  # fmt: skip
+    NOT_EXPONENTIAL = (
+        "not-exponential", WARNING,
+        "The exit times of {state} at D = {intensity:g} are not exponential (p = {p_value:.1e}): one rate does not "
+        "describe them.", "Look at their distribution with plot_exit_times.",
+    )  # fmt: skip
+    STEPS_CHANGE_RATE = (
+        "steps-change-rate", WARNING,
+        "Steps twice as long change ln of the exit rate of {state} at D = {intensity:g} by {change:.2g} ± {error:.1g}: "
+        "the steps are too long.", _FINER_STEPPER,
+    )  # fmt: skip
+    SPLITTING_NOT_CONVERGED = (
+        "splitting-not-converged", WARNING,
+        "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas} replicas; {wanted:.0%} "
+        "was wanted.", "Raise replicas, or expect an error of that size.",
+    )  # fmt: skip
+    ARRHENIUS_NOT_REACHED = (
+        "arrhenius-not-reached", WARNING,
+        "From {state} to {goal} the slope d ln τ/d(1/D) changes from {first:.3g} to {last:.3g} m² s⁻³ over the noise "
+        "intensities: it is not yet the activation energy.", "Lower the noise intensities.",
+    )  # fmt: skip
+
+    # Density
+    DENSITY_NOT_CONVERGED = (
+        "density-not-converged", WARNING,
+        "The density of {state} at D = {intensity:g} had not converged after {intervals} section intervals: ln rate "
+        "still changes by about {change:.1e}.", "Expect an error of that size, or raise the noise intensity.",
+    )  # fmt: skip
+    DENSITY_AT_EDGE = (
+        "density-at-edge", WARNING,
+        "At D = {intensity:g}, {share:.1e} of the probability of {state} is at the edge of the region, so that exits "
+        "beyond it may be missing.", "Find the structure on a wider region.",
+    )  # fmt: skip
+    MASS_NOT_KEPT = (
+        "mass-not-kept", WARNING,
+        "At t = {time:.4g} s the probability on the nodes is {mass:.4g}; the rest has left the region.",
+        "Widen the region.",
+    )  # fmt: skip
+    DENSITY_TRUNCATED = (
+        "density-truncated", WARNING,
+        "Until t = {time:.4g} s truncation errors changed the probability by {change:+.1%}, which was divided out.",
+        "Raise the number of nodes: the density is narrow compared with their spacing.",
+    )  # fmt: skip
+    RATE_UNCERTAIN = (
+        "rate-uncertain", WARNING,
+        "ln of the rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.2g}, above "
+        "{accepted:g}.", "Raise the number of nodes or of steps, or the noise intensity.",
+    )  # fmt: skip
+    RATE_UNKNOWN = (
+        "rate-unknown", WARNING,
+        "The rate from {state} to {goal} at D = {intensity:g} is not known: the outflow did not become steady above "
+        "the numerical errors.", "Raise the number of nodes or of steps, or the noise intensity.",
+    )  # fmt: skip
+
+    # Polishing
+    SADDLE_NOT_USABLE = (
+        "saddle-not-usable", WARNING,
+        "Saddle {saddle} on the basin boundary of {state} is {kind}; no path is polished to it.",
+        "Use the graph's estimate for this exit.",
+    )  # fmt: skip
+    CHAOTIC_BOUNDARY = (
+        "chaotic-boundary", INFO,
+        "The basin boundary of {state} contains a chaotic set. Paths were polished to unstable orbits inside it, which "
+        "are saddles {saddles}; their actions are upper bounds.",
+    )  # fmt: skip
+    SADDLES_OF_OTHERS = (
+        "saddles-of-others", WARNING,
+        "On the basin boundary of {state} no usable saddle is known that lies outside chaotic sets; paths were "
+        "polished to saddles between other basins.",
+        "Refine the basin grid, so that edge tracking can follow this boundary.",
+    )  # fmt: skip
+    CANDIDATES_SKIPPED = (
+        "candidates-skipped", INFO,
+        "{skipped} of {total} candidate paths from {state} cost more than {factor:g} times the least polished action "
+        "and were not polished.",
+    )  # fmt: skip
+    CANDIDATE_FAILED = (
+        "candidate-failed", INFO,
+        "A candidate path of the {finder} from {state} with action {action:.4g} did not converge: {reason}",
+    )  # fmt: skip
+    NO_CERTIFICATE = (
+        "no-certificate", WARNING,
+        "A path from {state} converged but could not be certified: {reason} Its action {action:.6g} is an upper bound.",
+        _FINER_STEPPER,
+    )  # fmt: skip
+    STARTS_ON_ORBIT = (
+        "starts-on-orbit", WARNING,
+        "The path from {state} with action {action:.6g} starts on the orbit itself, {periods:.0f} periods before its "
+        "end, because linearization fails near the orbit. Its action is an upper bound.",
+    )  # fmt: skip
+    COMPETING_PATHS = (
+        "competing-paths", INFO,
+        "Paths from {state} that cost at most {percent:g} % more than the least action {least:.6g}: {actions}.",
+        "At finite noise all of them carry exits.",
+    )  # fmt: skip
+    FLAT_VALLEY = (
+        "flat-valley", INFO,
+        "The stable and unstable manifolds of the best path from {state} meet at a sine of only {sine:.1e}: the action "
+        "hardly changes along a family of paths.", "At finite noise the whole family carries exits.",
+    )  # fmt: skip
+    CHAOTIC_SOURCE = (
+        "chaotic-source", INFO,
+        "{state} is chaotic: paths were polished from {count} unstable orbits inside it (periods: {periods}).",
+        "Its energies are brackets.",
+    )  # fmt: skip
+    GRAPH_ONLY_SOURCE = "graph-only-source", INFO, "{state} is {kind}: only the graph gives its energies."
+
+    # Agreement of graph and path
+    AGREEMENT = (
+        "agreement", INFO,
+        "From {state} to {goal} the graph gives {graph:.4g} ± {error:.1g} and the polished path {path:.6g}: they "
+        "agree.",
+    )  # fmt: skip
+    CHEAPER_PATH_EXPECTED = (
+        "cheaper-path-expected", WARNING,
+        "From {state} to {goal} the graph gives {graph:.4g} ± {error:.1g}, less than the polished path's {path:.6g}: a "
+        "cheaper path probably exists.", "Raise the graph's nodes or the action plot's points.",
+    )  # fmt: skip
+    GRAPH_TOO_COARSE = (
+        "graph-too-coarse", WARNING,
+        "From {state} to {goal} the graph gives {graph:.4g} ± {error:.1g} and the polished path {path:.6g}: the graph "
+        "is too coarse to exclude a cheaper path.", "Raise the graph's nodes.",
+    )  # fmt: skip
+    NO_POLISHED_PATH = (
+        "no-polished-path", WARNING,
+        "From {state} to {goal} only the graph's estimate {graph:.4g} ± {error:.1g} is available; no path was "
+        "polished.",
+    )  # fmt: skip
+    NOT_SEARCHED = (
+        "not-searched", WARNING,
+        "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "
+        "exists.", "Run LeastAction with a graph search.",
+    )  # fmt: skip
+    BRACKET = (
+        "bracket", INFO,
+        "From {state} to {goal}: at most {path:.6g}, by a path that begins or ends in a chaotic set; the graph gives "
+        "{graph:.4g} ± {error:.1g}.",
+    )  # fmt: skip
