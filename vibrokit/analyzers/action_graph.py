@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
-from vibrokit.analyzers.graph.search import GraphSearch, GraphSolution
+from vibrokit.analyzers.graph.search import GraphSearch
+from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.action_graph import ActionGraphResult

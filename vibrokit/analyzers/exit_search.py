@@ -12,7 +12,7 @@ import xarray
 
 from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
-from vibrokit.analyzers.graph.search import GraphSolution
+from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.paths import closest_approach, reversed_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate

@@ -15,8 +15,8 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate, resampled
 from vibrokit.analyzers.polishing.ends import ending_at
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
-from vibrokit.analyzers.polishing.newton import ExtremalPath
 from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

@@ -9,7 +9,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.newton import ExtremalPath, extremal_path
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
+from vibrokit.analyzers.polishing.newton import extremal_path
 from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
 from vibrokit.results.energy import Certificate
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.paths.sparse_blocks import sparse_blocks
 from vibrokit.analyzers.polishing.ending import Ending
+from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
+from vibrokit.analyzers.polishing.undetermined import Pin, Soft
 from vibrokit.errors import StructureError
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
@@ -23,73 +25,12 @@ _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may grow without bound
 _SHORTEST_STEP = 1e-4  # share of a Newton step
-ACCEPTED = 1e-9
-"""Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
 _LONGEST_LAST = 3.0  # pieces
 _NEARER = 10.0  # times as near to its source: start of a path that nearly converges
-_SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
 _GAINING = 10.0  # ratio of the misfits before and after a step in all but that direction that is worth another one
-_FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
-_INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
-_LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
 _MATCHED = 1e-4  # of that step: length of what is left of Newton's step when all else is matched
 
 Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class ExtremalPath:
-    """A path that solves Hamilton's equations between an orbit and an ending."""
-
-    source: LinearizedOrbit  # the orbit that it leaves
-    first: int  # phase of the first node, in pieces from node 0 of that orbit
-    ending: Ending
-    points: Array  # (nodes, 2n): (q, p), a piece apart, except the last
-    last: float  # duration of the last piece (s)
-    slopes: Array  # (nodes − 1, 2n, 2n): derivatives of the pieces
-    actions: Array  # (nodes − 1,): action of each piece
-    # Where a piece ends at q and the next one begins at q + δ, a path without the jump costs p·δ more. With this the
-    # action is stationary, so that misfits change it by their squares even along a family of paths.
-    over_jumps: float
-    residual: float  # largest misfit, relative to the size of what is matched
-    # Without forcing H is constant along the path, so that one condition follows from the others, and a path between
-    # two equilibria may be shifted in time. The time is fixed, and the path may jump at one node in the direction of
-    # ∇H. The jump is as small as the errors of the linearized ends.
-    slack: float  # of that jump, relative to the path's size
-    scale: Array  # (2n,): that size
-    flat: bool  # whether it is one of a family of paths, all of which solve the equations to the accepted misfit
-
-    @property
-    def action(self) -> float:
-        """From the source on: the pieces, and the action of the linearized equations before and after them."""
-        return self.head + float(np.sum(self.actions)) + self.over_jumps + self.ending.tail(self.points[-1])
-
-    @property
-    def head(self) -> float:
-        """½ p δq at the first node."""
-        n = self.points.shape[1] // 2
-        offset = self.points[0] - self.source.point(self.first)
-        return 0.5 * float(offset[n:] @ offset[:n])
-
-    def accepted(self, farther: float = 1.0) -> float:
-        """Return the misfit that is accepted of the path solved for again, from some times as far from its orbits.
-
-        Where it is one of a family, no shift makes up for the error of the linearized equations at its ends, which is
-        of the second order in their distance.
-        """
-        left = max(float(self.distances[0]), self.ending.distance_left(self.points[-1])) / self.extent
-        return max(ACCEPTED, (farther * left) ** 2) if self.flat else ACCEPTED
-
-    @property
-    def distances(self) -> Array:
-        """Distances in (x, v) from the source, node by node."""
-        orbit = self.source.along(self.first, len(self.points))
-        return np.asarray(np.linalg.norm(self.points[:, :2] - orbit[:, :2], axis=1))
-
-    @property
-    def extent(self) -> float:
-        """Largest distance from the source in (x, v)."""
-        return float(self.distances.max())
 
 
 def extremal_path(
@@ -137,59 +78,6 @@ class _Evaluation:
     largest: float
 
 
-class _Pin:
-    """The node where the time is fixed and H may jump; both are determined best where the path is fastest."""
-
-    def __init__(self, propagator: SegmentPropagator, points: Array, scale: Array) -> None:
-        if len(points) < 3:
-            raise StructureError("the guessed path is shorter than three pieces.")
-        self.node = 1 + int(np.argmax(np.linalg.norm((points[2:] - points[:-2]) / scale, axis=1)))
-        self.point = points[self.node] / scale
-        n, rate = len(scale) // 2, propagator.rate(points[self.node], 0.0)
-        normal = np.concatenate([-rate[n:], rate[:n]]) * scale  # ∇H = (−p′, q′)
-        self.rate, self.normal = (each / np.linalg.norm(each) for each in (rate / scale, normal))
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Soft:
-    """The direction in which the misfits change least, of length 1, if it is nearly undetermined; else 0."""
-
-    direction: Array
-    value: float  # the singular value
-
-    @classmethod
-    def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> _Soft:
-        """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value."""
-        direction, value = guess, math.inf
-        if not np.any(guess):
-            return cls(guess, math.inf)
-        for _ in range(_INVERSE_ITERATIONS):
-            left = factors.solve(direction / np.linalg.norm(direction), trans="T")
-            direction = factors.solve(left / np.linalg.norm(left))
-            value = 1 / float(np.linalg.norm(direction))
-        return cls(direction * value if value < _SOFT else 0.0 * direction, value)
-
-    @property
-    def flat(self) -> bool:
-        """Whether a shift as long as the path itself makes no misfit, so that rounding decides on its length."""
-        return self.value < _FLAT
-
-    @property
-    def most(self) -> float:
-        """Length of the longest step in this direction."""
-        largest = float(np.abs(self.direction).max())
-        return _LONGEST_SHIFT / largest if largest else math.inf
-
-    def limited(self, step: Array) -> float:
-        """Return how far a step goes in this direction, or the longest way."""
-        return min(max(float(self.direction @ step), -self.most), self.most)
-
-    def without(self, step: Array) -> Array:
-        """Return a step less what it is in this direction."""
-        rest: Array = step - (self.direction @ step) * self.direction
-        return rest
-
-
 class _Matching:
     """The equations, their derivatives, and Newton's method on them.
 
@@ -208,10 +96,10 @@ class _Matching:
         last: float,
     ) -> None:
         self.propagator, self.source, self.first, self.ending, self.last = propagator, source, first, ending, last
-        self.pin: _Pin | None = None
+        self.pin: Pin | None = None
         self.scale = _sizes(guess[self._unknown(guess)], source.point(first))
         if propagator.osc.autonomous and ending.period_nodes > 0:
-            self.pin = _Pin(propagator, guess, self.scale)
+            self.pin = Pin(propagator, guess, self.scale)
         self.start_of_last = float((first + len(guess) - 2) % propagator.pieces) * propagator.piece
 
     def _unknown(self, points: Array) -> NDArray[np.intp]:
@@ -301,7 +189,7 @@ class _Matching:
             except RuntimeError:  # singular: the guess is far from any path
                 break
             step = -factors.solve(current.misfits)
-            soft = _Soft.of(factors, step)
+            soft = Soft.of(factors, step)
             rest = soft.without(step)
             if soft.flat or soft.most < np.abs(soft.direction @ step):
                 if np.linalg.norm(rest) > _MATCHED * soft.most or accepted < current.largest < before / _GAINING:

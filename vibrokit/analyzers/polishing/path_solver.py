@@ -12,13 +12,9 @@ from vibrokit.analyzers.paths.action_descent import FEW_ITERATIONS, MANY_ITERATI
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
+from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import (
-    ACCEPTED,
-    MOST_EVALUATIONS,
-    ExtremalPath,
-    extremal_path,
-)
+from vibrokit.analyzers.polishing.newton import MOST_EVALUATIONS, extremal_path
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.newton import ExtremalPath
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import ParameterError, SceneError
 from vibrokit.oscillator import Oscillator

@@ -21,6 +21,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
 from vibrokit.structure.boundaries.edges import (
     PARTS_OF_A_TURN,
     EdgeTrack,
@@ -43,7 +44,6 @@ _NEAR = 1e-3  # of the region's widths: distance from a saddle within which a mo
 _MOST_TRIES = 4
 _FEW_POINTS = 12  # last points of a motion that must all be within that distance
 _SAMPLES = 8192  # of a cycle
-_APPROACH = 0.25  # fraction of a motion that does not recur which is its transient
 _SEVERAL = 32  # sections after which only a few motions go on for each pair of labels
 _FEW, _FEWEST = 6, 2
 _MANY_SECTIONS = 1_000_000  # that classifications took, after which even fewer go on; as many again after _SOON
@@ -52,7 +52,6 @@ _MOST = 128  # motions in all, where states settle within _QUICK sections; fewer
 _QUICK = 2000
 _WATCHED = 64  # sections of a motion that has not settled
 _LEAST_MOTIONS = 16
-_BLOCKS = 6  # of a motion, for the standard error
 _ORBITS_INSIDE, _LONGEST_INSIDE = 8, 16  # unstable orbits inside a chaotic set, and their longest period
 _RESIDUAL = 1e-10
 
@@ -238,8 +237,8 @@ class SaddleSearch:
                 count = len(motions) - len(wandering)
                 self._findings.append(_on_boundary(Code.MOTIONS_NOT_CONVERGED, pair, count=count))
             if wandering and not self.osc.autonomous:
-                exponent, error = _growth(wandering, straddles.interval)
-                chaotic = _chaotic(wandering, exponent)
+                exponent, error = growth(wandering, straddles.interval)
+                chaotic = chaotic_set(wandering, exponent)
                 self._found.append(chaotic)
                 inside = self._add_orbits_inside(chaotic)
                 self._findings.append(
@@ -277,21 +276,6 @@ def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:
     return Finding(code, first, second, values)
 
 
-def _chaotic(tracks: list[EdgeTrack], exponent: float) -> Saddle:
-    """Return the record of a set on which motions on a boundary never repeat."""
-    return Saddle(
-        kind="chaotic",
-        period=0,
-        duration=np.nan,
-        points=np.concatenate([track.points[_transient(track) :] for track in tracks]),
-        multipliers=np.empty(0, dtype=complex),
-        exponents=np.array([exponent], dtype=complex),
-        leads_to=tracks[0].labels,
-        residual=np.nan,
-        error=np.nan,
-    )
-
-
 def _first_few(labels: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
     """Keep a few motions for each pair of labels."""
     seen: defaultdict[tuple[int, ...], int] = defaultdict(int)
@@ -300,15 +284,3 @@ def _first_few(labels: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
         seen[tuple(pair)] += 1
         kept[index] = seen[tuple(pair)] <= most
     return kept
-
-
-def _transient(track: EdgeTrack) -> int:
-    return int(_APPROACH * len(track.points))
-
-
-def _growth(tracks: list[EdgeTrack], interval: float) -> tuple[float, float]:
-    """Mean rate at which neighbours on two sides of a boundary separate, and its standard error from blocks."""
-    blocks = np.concatenate(
-        [[block.mean() for block in np.array_split(track.stretches[_transient(track) :], _BLOCKS)] for track in tracks]
-    )
-    return float(blocks.mean()) / interval, float(blocks.std(ddof=1)) / len(blocks) ** 0.5 / interval

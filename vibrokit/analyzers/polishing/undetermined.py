@@ -1,0 +1,73 @@
+"""What the equations of a path leave undetermined: the time without forcing (`Pin`), and nearly a family (`Soft`)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.errors import StructureError
+
+_SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
+_FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
+_INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
+_LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
+
+Array = NDArray[np.float64]
+
+
+class Pin:
+    """The node where the time is fixed and H may jump; both are determined best where the path is fastest."""
+
+    def __init__(self, propagator: SegmentPropagator, points: Array, scale: Array) -> None:
+        if len(points) < 3:
+            raise StructureError("the guessed path is shorter than three pieces.")
+        self.node = 1 + int(np.argmax(np.linalg.norm((points[2:] - points[:-2]) / scale, axis=1)))
+        self.point = points[self.node] / scale
+        n, rate = len(scale) // 2, propagator.rate(points[self.node], 0.0)
+        normal = np.concatenate([-rate[n:], rate[:n]]) * scale  # ∇H = (−p′, q′)
+        self.rate, self.normal = (each / np.linalg.norm(each) for each in (rate / scale, normal))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Soft:
+    """The direction in which the misfits change least, of length 1, if it is nearly undetermined; else 0."""
+
+    direction: Array
+    value: float  # the singular value
+
+    @classmethod
+    def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> Soft:
+        """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value."""
+        direction, value = guess, math.inf
+        if not np.any(guess):
+            return cls(guess, math.inf)
+        for _ in range(_INVERSE_ITERATIONS):
+            left = factors.solve(direction / np.linalg.norm(direction), trans="T")
+            direction = factors.solve(left / np.linalg.norm(left))
+            value = 1 / float(np.linalg.norm(direction))
+        return cls(direction * value if value < _SOFT else 0.0 * direction, value)
+
+    @property
+    def flat(self) -> bool:
+        """Whether a shift as long as the path itself makes no misfit, so that rounding decides on its length."""
+        return self.value < _FLAT
+
+    @property
+    def most(self) -> float:
+        """Length of the longest step in this direction."""
+        largest = float(np.abs(self.direction).max())
+        return _LONGEST_SHIFT / largest if largest else math.inf
+
+    def limited(self, step: Array) -> float:
+        """Return how far a step goes in this direction, or the longest way."""
+        return min(max(float(self.direction @ step), -self.most), self.most)
+
+    def without(self, step: Array) -> Array:
+        """Return a step less what it is in this direction."""
+        rest: Array = step - (self.direction @ step) * self.direction
+        return rest

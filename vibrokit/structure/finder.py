@@ -1,0 +1,271 @@
+"""Finder: goes through the stages of `find_structure`, and keeps what each has found."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.errors import StructureError
+from vibrokit.kernels.choice import LOCATED, ensemble_stepper, single_stepper
+from vibrokit.kernels.named import name_of
+from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Work, stage
+from vibrokit.results.attractor import Attractor
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
+from vibrokit.results.manifold import Manifold
+from vibrokit.results.region import Region
+from vibrokit.results.structure import Structure
+from vibrokit.results.survival import Survival
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.attractors.names import labelled
+from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.grid import BasinGrid, with_fractions
+from vibrokit.structure.boundaries.saddles import SaddleSearch
+from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
+from vibrokit.structure.regions import frame_of, lies_in, search_region, with_barrier_tops, without_copies
+from vibrokit.structure.scales import states_at
+from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
+from vibrokit.structure.validation import Request
+from vibrokit.symbolic.flow_kind import Flow
+
+_FOLDS = 30  # e-foldings of the linear damping for a transient
+_LEAST_WAIT = 200
+_LONGEST_WAIT = 20_000
+_LIFETIMES = 5  # of chaotic transients for a cell
+_EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a motion on a boundary converges to its saddle
+_SEARCH_SETTLING = 1e-3
+_MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
+_MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
+
+Array = NDArray[np.float64]
+
+
+class Finder:
+    """Goes through the stages and keeps what each has found; arguments and errors as of `find_structure`."""
+
+    def __init__(self, osc: Oscillator, request: Request, executor: concurrent.futures.Executor | None) -> None:
+        self.osc, self.request, self.region, self.executor = osc, request, request.region, executor
+        self.rng = np.random.default_rng(request.rng)
+        self.wait = _wait(osc)
+        self.budget = request.budget or self.wait
+        self.orbit_stepper = request.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
+        self.stepper = request.stepper or ensemble_stepper(osc, Flow.STATE)
+        self.searched = self.region or search_region(osc)
+        self.search = Search(
+            osc, _SEARCH_SETTLING * self.searched.widths, self._search_stepper(), self.orbit_stepper, executor
+        )
+        self.attractors: tuple[Attractor, ...] = ()
+        self.shift = 0.0  # along x, between copies of the attractors (m); 0 for none
+        self.grid: BasinGrid | None = None
+        self.saddle_search: SaddleSearch | None = None
+        self.manifolds: tuple[Manifold, ...] = ()
+        self.without_manifolds: list[Finding] = []
+        self.stopped: Finding | None = None
+        self.doing = ""
+
+    def run(self) -> None:
+        """Go through the stages; an interrupt ends them once an attractor is known, and is raised before that."""
+        stages = {"attractors": self._find_attractors, "basins": self._find_basins}
+        stages |= {"saddles": self._find_saddles} if self.request.saddles else {}
+        stages |= {"manifolds": self._grow_manifolds} if self.request.saddles and self.request.manifolds else {}
+        try:
+            for self.doing, find in stages.items():
+                find()
+        except KeyboardInterrupt as interrupt:
+            if not self.search.attractors:
+                raise
+            self.stopped = Finding.stopped(self.doing, interrupt)
+            self._order()
+
+    def _search_stepper(self) -> Stepper:
+        """A stepper finer than the basins need: too few steps can destroy a weak attractor."""
+        if self.request.stepper is not None or not isinstance(self.stepper, RK4):
+            return self.stepper
+        finer = self.stepper.refined().refined()
+        return finer if finer.steps <= _MOST_STEPS else LOCATED
+
+    def _find_attractors(self) -> None:
+        """Search from a grid of starts, and choose a stepper with which every attractor persists."""
+        starts = np.concatenate(
+            [_starts(self.osc, each, self.request.starts, self.rng) for each in self._start_regions()]
+        )
+        self.search.run(starts, self.budget, self.budget >= self.wait)
+        if not self.search.attractors:
+            raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
+        self._order()
+        if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
+            raise StructureError(_none_inside(self.region, self.attractors))
+        if self.request.stepper is None:
+            self.stepper = persistent_stepper(
+                self.osc, self.attractors, self.stepper, self.request.settling * self.frame.widths
+            )
+        lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
+        if self.request.budget is None and lifetimes:
+            self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
+
+    def _start_regions(self) -> list[Region]:
+        """Regions of starts: that of the expected motion, and one that contains the tops of barriers around it."""
+        narrow = self.searched
+        if self.region is not None or self.osc.barriers:
+            return [narrow]
+        wide = with_barrier_tops(self.osc, *narrow.x)
+        reach = self.osc.natural_frequency * max(-wide[0], wide[1])
+        return [narrow] if wide == narrow.x else [narrow, Region(wide, (-reach, reach))]
+
+    def _order(self) -> None:
+        """Sort the attractors and name them, unless that was done."""
+        if self.attractors:
+            return
+        kept, self.shift = (
+            (self.search.attractors, 0.0) if self.region else without_copies(self.osc, self.search.attractors)
+        )
+        found = sorted(kept, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
+        self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
+
+    @cached_property
+    def frame(self) -> Region:
+        """Region of the basin grid."""
+        return self.region or frame_of(self.osc, self.search.attractors)
+
+    @property
+    def classifier(self) -> BasinClassifier:
+        """Finds the attractor that a state leads to."""
+        return BasinClassifier(
+            self.osc, self.attractors, self.frame, self.request.settling, self.budget, self.stepper, self.executor,
+            shift=self.shift,
+        )  # fmt: skip
+
+    def _find_basins(self) -> None:
+        """Classify every cell of the grid, and set the basin fraction of each attractor."""
+        request = self.request
+        self.grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
+        try:
+            self.grid.fill()
+        finally:
+            self.attractors = with_fractions(self.attractors, self.grid.basins)
+
+    def _find_saddles(self) -> None:
+        """Track the boundaries between basins to the saddles on them."""
+        assert self.grid is not None
+        basins = self.grid.basins
+        classifier = self.classifier.sharing(basins, self.request.margin or 2)
+        sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
+        self.saddle_search = SaddleSearch(classifier, basins, self.orbit_stepper, sections=sections)
+        self.saddle_search.run(self.rng)
+
+    def _grow_manifolds(self) -> None:
+        """Grow the manifolds of each saddle that is an orbit."""
+        assert self.saddle_search is not None
+        saddles = {
+            n: s
+            for n, s in enumerate(self.saddle_search.saddles)
+            if s.kind in ("saddle", "flip saddle") and not s.embedded
+        }
+        count = sum(map(branch_count, saddles.values()))
+        length = default_arc_length(self.frame, max(count, 1))
+        with stage("manifolds", unit=BRANCHES, total=count):
+            for index, saddle in saddles.items():
+                known = self.manifolds
+                try:
+                    for branch in grow_manifolds(
+                        self.osc, index, saddle,
+                        region=self.frame, arc_length=length, most_sections=_MANIFOLD_SECTIONS / count,
+                        stepper=self.request.stepper, executor=self.executor,
+                    ):  # fmt: skip
+                        self.manifolds += (branch,)
+                except StructureError as error:
+                    self.manifolds = known
+                    self.without_manifolds.append(Finding.of(Code.NO_MANIFOLDS, saddle=index, reason=str(error)))
+
+    def structure(self, work: Work) -> Structure:
+        """Return the record of all that was found."""
+        saddles = self.saddle_search
+        grid = self.grid or BasinGrid(self.classifier, self.request.cells)
+        return Structure(
+            attractors=self.attractors,
+            saddles=saddles.saddles if saddles else (),
+            manifolds=self.manifolds,
+            basins=grid.basins,
+            survival=self.search.survival,
+            settling=self.request.settling,
+            budget=self.budget,
+            stepper=name_of(self.stepper),
+            shift=self.shift,
+            complete=self.stopped is None,
+            scene=scene_data(self.osc),
+            settings=self.request.settings,
+            findings=self._findings(grid),
+            stats=work.stats,
+            seed=self.request.rng,
+            seconds=work.seconds,
+        )
+
+    def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
+        search, saddles = self.search, self.saddle_search
+        found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
+        if self.shift:
+            found.append(Finding.of(Code.SHIFTED_COPIES, shift=self.shift))
+        if search.diverged:
+            found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
+        found += search.findings
+        found += [_survival_finding(survival) for survival in search.survival]
+        found += grid.findings
+        if saddles is not None:
+            found += saddles.findings
+            outside = sum(not lies_in(grid.basins.region, saddle) for saddle in saddles.saddles)
+            found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
+        return (*found, *self.without_manifolds, *([self.stopped] if self.stopped else []))
+
+
+def _survival_finding(survival: Survival) -> Finding:
+    names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
+    return Finding(Code.SURVIVAL, values={name: getattr(survival, name) for name in names})
+
+
+def _wait(osc: Oscillator) -> int:
+    """Return the periods that a transient needs, by the damping."""
+    rate = osc.damping_ratio * osc.natural_frequency
+    if rate == 0 and osc.model.undamped:
+        raise StructureError(
+            "the scene has no damping (damping_ratio is 0, the stops are elastic), and undamped motion has no "
+            "attractors; give it damping."
+        )
+    slowest = rate if osc.damping_ratio < 1 else osc.natural_frequency / (2 * osc.damping_ratio)
+    if slowest == 0:
+        return _LEAST_WAIT
+    return min(_LONGEST_WAIT, _LEAST_WAIT + math.ceil(_FOLDS / (slowest * osc.section_interval)))
+
+
+def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.random.Generator) -> Array:
+    low, high = region.bounds.T
+    shift = (rng.random(2) - 0.5) * (high - low) / np.array(counts)
+    return states_at(osc, region.cell_centres(counts) + shift)
+
+
+def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> str:
+    """Return why there is no structure, and what to change; `wait` is the budget that the damping requires."""
+    advice = "raise budget" if budget < wait else "widen the region or raise budget"
+    if search.diverged > search.starts / 2:
+        advice = "most motions grow without bound; narrow the region, or check the signs of the forces"
+    return (
+        f"no steady state was found from {search.starts} starts in x ∈ {region.x}, v ∈ {region.v}: within {budget} "
+        f"periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "
+        f"{search.diverged} diverged; {advice}."
+    )
+
+
+def _none_inside(region: Region, attractors: Sequence[Attractor]) -> str:
+    """Return that steady states were found, but none in the region."""
+    places = ", ".join(f"({a.points[0, 0]:.6g}, {a.points[0, 1]:.6g})" for a in attractors)
+    return (
+        f"no steady state lies in x ∈ {region.x}, v ∈ {region.v}; starts from there reach those at {places}. Give a "
+        "region that contains one of them, or no region."
+    )
