@@ -17,8 +17,8 @@ from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.paths import closest_approach, reversed_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.candidate_polisher import PIECES
 from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.polishing.leg import PIECES
 from vibrokit.analyzers.polishing.polish import Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError

@@ -308,6 +308,11 @@ class Code(StrEnum):
         "The path from {state} with action {action:.6g} starts on the orbit itself, {periods:.0f} periods before its "
         "end, because linearization fails near the orbit. Its action is an upper bound.",
     )  # fmt: skip
+    PASSES_ORBITS = (
+        "passes-orbits", INFO,
+        "The path from {state} to {goal} with action {action:.6g} passes {through}: its action is the sum over the "
+        "paths between these.", "Where it passes an attractor, exits lead to that attractor first.",
+    )  # fmt: skip
     COMPETING_PATHS = (
         "competing-paths", INFO,
         "Paths from {state} that cost at most {percent:g} % more than the least action {least:.6g}: {actions}.",

@@ -79,6 +79,8 @@ class ExitPath:
 class Certificate:
     """Evidence for a polished exit path: how well it solves its equations, and how the action depends on the settings.
 
+    A path of several legs has the weakest evidence of all.
+
     Attributes
     ----------
     residual : float
@@ -108,6 +110,21 @@ class Certificate:
     by_length: float
     by_stepper: float
     transversality: float
+
+    @classmethod
+    def combined(cls, legs: Sequence[Certificate]) -> Certificate:
+        """Return the evidence for a path of several legs: the weakest of all, and the sizes of the changes added."""
+        changes = {
+            name: sum(abs(getattr(leg, name)) for leg in legs) for name in ("by_start", "by_length", "by_stepper")
+        }
+        return cls(
+            residual=max(leg.residual for leg in legs),
+            start_distance=max(leg.start_distance for leg in legs),
+            end_distance=max(leg.end_distance for leg in legs),
+            periods=sum(leg.periods for leg in legs),
+            transversality=min(leg.transversality for leg in legs),
+            **changes,
+        )
 
     @property
     def error(self) -> float:

@@ -184,7 +184,7 @@ class HierarchySearch:
         grids = self._covering(steps, _halved(_shared(shape, intervals))).unfolded(intervals)
         whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
         for _ in range(_WIDENINGS):
-            wider = grids.widened(self._before_exit(whole, whole.highest(targets)))
+            wider = grids.widened(self._before_exit(whole, whole.highest(targets), targets))
             if wider is grids:
                 break
             grids = wider
@@ -200,7 +200,7 @@ class HierarchySearch:
     def _closer(self, solved: SolvedGrid, targets: Sequence[ExitTarget], most: float) -> SolvedGrid:
         """Solve on as many nodes around what lies below the costliest exit, if that is at most a part of the area."""
         grids, ceiling = solved.potential.grids, _ROOM * solved.highest(targets)
-        zoomed = grids.zoomed(self._before_exit(solved, ceiling))
+        zoomed = grids.zoomed(self._before_exit(solved, ceiling, targets))
         return solved if zoomed.area > most * grids.area else self._solved(zoomed, ceiling, targets)
 
     def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
@@ -243,11 +243,14 @@ class HierarchySearch:
             states = images[np.isfinite(images).all(axis=1)]
         return Grids(np.array(boxes), shape, step, steps)
 
-    def _before_exit(self, solved: SolvedGrid, ceiling: float) -> list[Mask]:
-        """By phase: which nodes lie before the exit, with V below a ceiling."""
+    def _before_exit(self, solved: SolvedGrid, ceiling: float, targets: Sequence[ExitTarget]) -> list[Mask]:
+        """By phase: which nodes may lie on a path to one of the targets, with V below a ceiling."""
         grids, values = solved.potential.grids, solved.potential.values
+        below = [values[phase] < ceiling for phase in range(grids.phases)]
+        if any(target.farther for target in targets):
+            return below
         inside = self._not_out if self.problem.exit.by_position else self._in_basin
-        return [(values[phase] < ceiling) & inside(grids, phase) for phase in range(grids.phases)]
+        return [mask & inside(grids, phase) for phase, mask in enumerate(below)]
 
     def _not_out(self, grids: Grids, phase: int) -> Mask:
         return ~self.problem.is_out(grids.nodes(phase))

@@ -125,12 +125,14 @@ class GraphSearch:
         known, refinements = _Known(), list(self._refinements())
         for number, nodes in enumerate(refinements, start=1):
             known.finer, done = len(refinements) - number, settled()
-            try:
-                unsettled = [target for target in targets if target.label not in done]
-                yield from _solutions(problem, search, unsettled, nodes, known)
-            except StructureError:  # on few nodes, no exit may be reached
-                if nodes == self.nodes and not known.estimates:
-                    raise
+            unsettled = [target for target in targets if target.label not in done]
+            near, far = ([target for target in unsettled if target.farther is farther] for farther in (False, True))
+            for group in (near, far):  # grids for the first ones cover the own basin alone
+                try:
+                    yield from _solutions(problem, search, group, nodes, known, last=group is far or not far)
+                except StructureError:  # on few nodes, no exit may be reached
+                    if nodes == self.nodes and not known.estimates:
+                        raise
 
     def beginnings(
         self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
@@ -187,6 +189,8 @@ def _solutions(
     targets: Sequence[ExitTarget],
     nodes: tuple[int, int],
     known: _Known,
+    *,
+    last: bool,
 ) -> Iterator[GraphSolution]:
     """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
     if not targets:
@@ -194,7 +198,7 @@ def _solutions(
     estimates = known.estimates
     found, potential = search.estimates(targets, nodes)
     estimates |= found
-    if _highest(targets, estimates) == _highest(estimates, estimates):
+    if known.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
         known.potential = potential
     for _ in range(_CLOSER):
         highest = _highest(targets, estimates)
@@ -208,7 +212,7 @@ def _solutions(
             break
         targets = [target for target in targets if closer[target].error < estimates[target].error]
         estimates |= {target: closer[target] for target in targets}
-    yield _solution(problem, search, known, nodes, last=True)
+    yield _solution(problem, search, known, nodes, last=last)
 
 
 def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:

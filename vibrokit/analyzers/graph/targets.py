@@ -49,6 +49,11 @@ class ExitTarget(ABC):
     saddle: int  # which of the structure's saddles it is; −1 for none
     scale: float  # rough cost of a straight path, from which the search for the ceiling of V starts
 
+    @property
+    def farther(self) -> bool:
+        """Whether paths to it may pass basins of other attractors."""
+        return False
+
     @abstractmethod
     def evaluate(self, potential: Potential) -> Arrival:
         """Return what reaching the target costs, and where paths to it are traced back from."""
@@ -61,6 +66,11 @@ class StateTarget(ExitTarget):
     states: Array  # (count, 2)
     direction: Array | None = None  # (2,): of the unstable manifold at the first state, if that is a saddle
     depth: Array | None = None  # (2,): how far, in x and in v, the states lie behind the basin boundary; None: on it
+
+    @property
+    def farther(self) -> bool:
+        """Whether it is a basin: a saddle on the boundary of the own basin is reached before any other basin."""
+        return self.depth is not None
 
     def evaluate(self, potential: Potential) -> Arrival:
         """The cheapest state.

@@ -46,8 +46,8 @@ class FollowedPath:
         polisher.polish(Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method))
         if not polisher.solved:
             raise StructureError(str(polisher.findings[0].values["reason"]))
-        solved = polisher.solved[0]
-        return cls(problem, problem.path_ends.index(solved.end), solved.propagator, solved.found)
+        (leg,) = polisher.solved[0].legs  # a single end is polished to, so that there is none to pass before
+        return cls(problem, problem.path_ends.index(leg.end), leg.propagator, leg.found)
 
     @property
     def end(self) -> PathEnd:

@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher, Solved
+from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ends import usable_ends
 from vibrokit.analyzers.polishing.path_solver import LONG_ENOUGH
 from vibrokit.analyzers.polishing.sensitivity import sensitivities
+from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.progress import advance, stage
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
 from vibrokit.results.finding import Finding
 from vibrokit.structure.orbits import Orbit
 
@@ -102,46 +103,52 @@ class Polishing:
         return Polished(tuple(branches), (*findings, *_valleys(branches)))
 
 
-def _certified(problem: ExitProblem, solved: Solved, findings: list[Finding]) -> list[ActivationEnergy]:
+def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]) -> list[ActivationEnergy]:
     """The energies of a path with its certificate, or without if that fails."""
-    found, source = solved.found, problem.source
+    source, action = problem.source, solved.action
     try:
-        certificate = certify(solved.propagator, found)
+        certificates = [certify(leg.propagator, leg.found) for leg in solved.legs]
     except StructureError as failure:
-        findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=found.action, reason=str(failure)))
+        findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=action, reason=str(failure)))
         return _energies(problem, solved)
-    if found.source.start_on_orbit:
-        values = {"action": found.action, "periods": certificate.periods}
-        findings.append(Finding(Code.STARTS_ON_ORBIT, source, values=values))
-    derivatives = sensitivities(problem, solved.end, solved.propagator, found)
+    certificate = Certificate.combined(certificates)
+    if any(leg.found.source.start_on_orbit for leg in solved.legs):
+        findings.append(Finding.of(Code.STARTS_ON_ORBIT, source, action=action, periods=certificate.periods))
+    if solved.through:
+        findings += [
+            Finding.of(Code.PASSES_ORBITS, source, target, action=action, through=list(solved.through))
+            for target in solved.targets
+        ]
+    derivatives = [sensitivities(problem, leg.end, leg.propagator, leg.found) for leg in solved.legs]
+    names = [name for name in derivatives[0] if all(name in each for each in derivatives)]
     return _energies(
         problem,
         solved,
-        error=certificate.error + _ROUNDING * found.action,
+        error=certificate.error + _ROUNDING * action,
         residual=certificate.residual,
         certificate=certificate,
-        sensitivity={name: each.value for name, each in derivatives.items()},
-        sensitivity_error={name: each.error for name, each in derivatives.items()},
+        sensitivity={name: sum(each[name].value for each in derivatives) for name in names},
+        sensitivity_error={name: sum(each[name].error for each in derivatives) for name in names},
     )
 
 
 def _energies(
-    problem: ExitProblem, solved: Solved, *, error: float | None = None, **evidence: Any
+    problem: ExitProblem, solved: SolvedPath, *, error: float | None = None, **evidence: Any
 ) -> list[ActivationEnergy]:
     """The energy of a path, once for each attractor that it leads to.
 
     Without a certificate, the error is the change by which the path was accepted as long enough.
     """
-    found = solved.found
-    error = LONG_ENOUGH * found.action if error is None else error
-    known = {"residual": max(found.residual, found.slack)} | evidence
+    action = solved.action
+    error = LONG_ENOUGH * action if error is None else error
+    known = {"residual": max(max(leg.found.residual, leg.found.slack) for leg in solved.legs)} | evidence
     return [
         ActivationEnergy(
             source=problem.source,
             target=target,
-            value=found.action,
+            value=action,
             lower=0.0,
-            upper=found.action + error,
+            upper=action + error,
             method=METHOD,
             bound=Bound.BRACKET if solved.end.one_of_many else Bound.UPPER,
             numerical_error=error,
@@ -149,7 +156,7 @@ def _energies(
             saddle=solved.end.saddle,
             **known,
         )
-        for target in solved.end.targets
+        for target in solved.targets
     ]
 
 
