@@ -20,7 +20,8 @@ from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 
 _PASSED = 0.05  # of a candidate's extent: distance from a saddle that it passes; grids place it to 0.01 to 0.03
-_MOST_FAILURES = 3  # of legs from one orbit to one end, after which no other candidate is tried
+_NO_FALLBACK = 0.0  # for the least action known: legs that converge do so soon, and others would take minutes
+_MOST_FAILURES = 2  # of legs from one orbit to one end, after which no other candidate is tried
 _TOO_MUCH = 1.25  # times the candidate's action: searches price a path to a few percent
 _WHOLE = 1e-6  # of a section interval: difference of times that are equal
 
@@ -58,7 +59,7 @@ class PassingSearch:
             if self._failures[solver, end] >= _MOST_FAILURES:
                 continue
             try:
-                leg = solver.solve(end, rest)
+                leg = solver.solve(end, rest, least=_NO_FALLBACK)
                 if first.action + leg.found.action <= _TOO_MUCH * candidate.action:
                     return SolvedPath.of(self._problem, (*first.legs, leg))
             except StructureError:
@@ -79,7 +80,7 @@ class PassingSearch:
         states = candidate.states[places]
         last = int(np.argmin(self._from_saddle(end.saddle).orbit.nearest(states)[0]))
         passed: list[tuple[float, int, SolvedPath, LegSolver]] = []
-        for first in known if last else ():
+        for first in _cheapest(known) if last else ():
             if first.end.saddle >= 0 and first.end is not end and not first.end.one_of_many:
                 saddle = self._from_saddle(first.end.saddle)
                 distance = self._distance(saddle, candidate)
@@ -113,6 +114,12 @@ class PassingSearch:
         shifts = range(0, orbit.period_nodes, propagator.pieces)
         offsets = [(states - orbit.along(shift, len(states))) / propagator.units for shift in shifts]
         return float(np.linalg.norm(offsets, axis=-1).min()) / extent
+
+
+def _cheapest(known: Sequence[SolvedPath]) -> list[SolvedPath]:
+    """The cheapest path to each end."""
+    least = {one.end: one for one in sorted(known, key=lambda one: -one.action)}
+    return list(least.values())
 
 
 def _on_section(candidate: Candidate, scene: Oscillator) -> NDArray[np.intp]:
