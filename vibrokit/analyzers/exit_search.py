@@ -141,7 +141,7 @@ class ExitSearch:
     def _beyond(self) -> frozenset[int]:
         """Labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
 
-        Paths to these pass other basins. They are no first exits, and one estimate of them is enough.
+        Paths to these pass other basins: they are no first exits.
         """
         unled = {label for end in self.problem.path_ends if isinstance(end, InBasin) for label in end.targets}
         if not unled:
@@ -159,14 +159,27 @@ class ExitSearch:
         branches = self._polished()[0]
         if self.graph is None:
             return set()
-        useless = self._beyond | self._unresolvable(self.graph, branches)
         if not self.problem.attractor.repeats:
-            return useless
+            return self._beyond | self._unresolvable(self.graph, branches)
         estimates = self._estimates(self.graph, branches)
-        _, compared = combined(self.problem.attractor, branches, estimates)
-        agreed = {finding.target for finding in compared if finding.code is Code.AGREEMENT}
         accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
-        return accurate & agreed | useless
+        return accurate & self._agreed(estimates, branches) | self._useless(self.graph, branches)
+
+    def _useless(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
+        """Labels of the attractors for which finer grids are of no use.
+
+        An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
+        """
+        with_path = {branch.target for branch in branches}
+        agreed = self._agreed(self._estimates(graph, branches), branches)
+        return self._unresolvable(graph, branches) | {
+            label for label in self._beyond if label in agreed or label not in with_path
+        }
+
+    def _agreed(self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy]) -> set[int]:
+        """Labels of the attractors on which estimates and paths agree."""
+        _, compared = combined(self.problem.attractor, branches, estimates)
+        return {finding.target for finding in compared if finding.code is Code.AGREEMENT and finding.target is not None}
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
@@ -180,7 +193,7 @@ class ExitSearch:
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
         branches = self._polished()[0]
-        useless = self._beyond | self._unresolvable(graph, branches)
+        useless = self._useless(graph, branches)
         estimates = [each for each in self._estimates(graph, branches) if each.target not in useless]
         _, compared = combined(self.problem.attractor, branches, estimates)
         if any(finding.code not in _AGREED for finding in compared):

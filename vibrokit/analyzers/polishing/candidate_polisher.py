@@ -161,13 +161,14 @@ class CandidatePolisher:
         return SolvedPath.of(self.problem, (leg,))
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:
-        """Whether there is a path to an end through an orbit that a candidate passes; it is added."""
-        if candidate.momenta is not None or any(one.end is end and len(one.legs) == 1 for one in self.solved):
+        """Whether a path to an end through an orbit that a candidate passes is known, or found and added."""
+        to_end = [one for one in self.solved if one.end is end]
+        if candidate.momenta is not None or any(len(one.legs) == 1 for one in to_end):
             return False
-        if not any(one.end is end for one in self.solved):
+        if candidate.action < self._least((end,)):
             found = self._passing.solve(end, candidate, self.solved)
             if found is None:
-                return False
+                return bool(to_end)
             self._add(found)
         return True
 

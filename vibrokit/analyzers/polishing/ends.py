@@ -153,11 +153,11 @@ class SaddleEnding(Ending):
         return self._closest(candidate)[0]
 
     def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """Cut where the candidate, on the section, is closest to the orbit, and stay on the orbit from there."""
+        """Cut where the candidate is closest to the orbit, and stay on the orbit from there, up to a section."""
         _, node, place = self._closest(candidate)
         (orbit, phase), pieces = self.orbit.starting(place), self.propagator.pieces
         periods = math.ceil(_SETTLING / (orbit.slowest_rate * pieces))
-        added = min(max(2, periods), _MOST_ADDED) * pieces
+        added = min(max(2, periods), _MOST_ADDED) * pieces + -node % self.propagator.grain
         states = np.concatenate([candidate.all_states[: node + 1], orbit.along(phase + 1, added)])
         ending = dataclasses.replace(self, orbit=orbit, phase=phase + added)
         momenta = candidate.momenta_of(node + 1, len(states))
@@ -213,9 +213,8 @@ class SaddleEnding(Ending):
 
     def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, float]:
         """Distance, node of the candidate, and place on the orbit."""
-        states, grain = candidate.all_states, self.propagator.grain
-        nodes = np.arange(grain, len(states), grain)
-        distances, places = self.orbit.nearest(states[nodes])
+        nodes = np.arange(self.propagator.grain, len(candidate.all_states))
+        distances, places = self.orbit.nearest(candidate.all_states[nodes], nodes)
         nearest = int(np.argmin(distances))
         return float(distances[nearest]), int(nodes[nearest]), float(places[nearest])
 

@@ -66,11 +66,12 @@ class LinearizedAtNodes(LinearizedOrbit):
     def step(self, phase: int) -> Array:
         return extended(self.linear.derivatives[self.node(phase)], self.linear.covariances[self.node(phase)])
 
-    def nearest(self, states: Array) -> tuple[Array, Array]:
-        phases = np.arange(0, len(self.states), self.propagator.pieces)
-        distances = np.linalg.norm((states[:, None] - self.states[phases]) / self.propagator.units, axis=2)
+    def nearest(self, states: Array, phases: NDArray[np.intp]) -> tuple[Array, Array]:
+        places = (phases[:, None] + np.arange(0, len(self.states), self.propagator.pieces)) % len(self.states)
+        distances = np.linalg.norm((states[:, None] - self.states[places]) / self.propagator.units, axis=2)
         distances = np.where(np.isfinite(distances), distances, np.inf)
-        return distances.min(axis=1), phases[np.argmin(distances, axis=1)]
+        each, best = np.arange(len(states)), np.argmin(distances, axis=1)
+        return distances[each, best], places[each, best]
 
     def starting(self, place: float) -> tuple[Self, int]:
         return self, int(place)

@@ -77,7 +77,7 @@ class LinearizedCycle(LinearizedOrbit):
         moved = self._moved(state, self.propagator.piece)
         return extended(moved.derivatives[0], moved.covariances[0])
 
-    def nearest(self, states: Array) -> tuple[Array, Array]:
+    def nearest(self, states: Array, phases: NDArray[np.intp]) -> tuple[Array, Array]:
         """Distances from a polyline through the nodes, and times on the cycle."""
         units = self.propagator.units
         nodes = np.vstack([self.states, self.states[:1]]) / units

@@ -77,8 +77,11 @@ class LinearizedOrbit(ABC):
         """Return E over the piece that begins at a phase."""
 
     @abstractmethod
-    def nearest(self, states: Array) -> tuple[Array, Array]:
-        """Return the distance of each state (count, n) of the section, and where it is measured, for `starting`."""
+    def nearest(self, states: Array, phases: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the distance of each state (count, n), and where it is measured, for `starting`.
+
+        The phases (count,) of the states are in pieces since the section.
+        """
 
     @abstractmethod
     def starting(self, place: float) -> tuple[Self, int]:

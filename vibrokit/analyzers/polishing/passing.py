@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.path_ends import AtSaddle, PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.ends import obstacle
-from vibrokit.analyzers.polishing.leg import PIECES, Departure, LegSolver, Nodes
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes
+from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.errors import StructureError
-from vibrokit.oscillator import Oscillator
 
 _PASSED = 0.05  # of a candidate's extent: distance from a saddle that it passes; grids place it to 0.01 to 0.03
-_NO_FALLBACK = 0.0  # for the least action known: legs that converge do so soon, and others would take minutes
 _MOST_FAILURES = 2  # of legs from one orbit to one end, after which no other candidate is tried
-_TOO_MUCH = 1.25  # times the candidate's action: searches price a path to a few percent
-_WHOLE = 1e-6  # of a section interval: difference of times that are equal
+_TOO_MUCH = 1.1  # times the candidate's action, which searches price to a few percent: above, it is another path
+
+Array = NDArray[np.float64]
 
 
 class PassingSearch:
@@ -59,7 +59,7 @@ class PassingSearch:
             if self._failures[solver, end] >= _MOST_FAILURES:
                 continue
             try:
-                leg = solver.solve(end, rest, least=_NO_FALLBACK)
+                leg = solver.solve(end, rest, way=PathSolver.solve_near)
                 if first.action + leg.found.action <= _TOO_MUCH * candidate.action:
                     return SolvedPath.of(self._problem, (*first.legs, leg))
             except StructureError:
@@ -76,24 +76,21 @@ class PassingSearch:
         """
         if end.saddle < 0:
             return
-        places = _on_section(candidate, self._problem.scene)
-        states = candidate.states[places]
-        last = int(np.argmin(self._from_saddle(end.saddle).orbit.nearest(states)[0]))
-        passed: list[tuple[float, int, SolvedPath, LegSolver]] = []
-        for first in _cheapest(known) if last else ():
+        nodes = self._nodes.resampled(candidate).states
+        nodes = nodes[: _Passage.of(self._from_saddle(end.saddle), nodes).node]
+        passed: list[tuple[_Passage, SolvedPath]] = []
+        for first in _cheapest(known) if len(nodes) > 1 else ():
             if first.end.saddle >= 0 and first.end is not end and not first.end.one_of_many:
-                saddle = self._from_saddle(first.end.saddle)
-                distance = self._distance(saddle, candidate)
-                if distance <= _PASSED:
-                    place = int(np.argmin(saddle.orbit.nearest(states[:last])[0]))
-                    passed.append((distance, place, first, saddle))
+                saddle = _Passage.of(self._from_saddle(first.end.saddle), nodes)
+                if saddle.distance <= _PASSED:
+                    passed.append((saddle, first))
                     passed += [
-                        (self._distance(other, candidate), place + near, first, other)
-                        for other in self._attractors(first.end, candidate)
-                        for near in [int(np.argmin(other.orbit.nearest(states[place:last])[0]))]
+                        (_Passage.of(solver, nodes, saddle.node), first)
+                        for solver in self._attractors(first.end, candidate)
                     ]
-        for _, place, first, solver in sorted(passed, key=lambda each: each[0]):
-            yield first, solver, _after(candidate, places[place])
+        states = self._nodes.resampled(candidate).states
+        for passage, first in sorted(passed, key=lambda each: each[0].distance):
+            yield first, passage.solver, passage.rest(candidate, states)
 
     def _attractors(self, end: PathEnd, candidate: Candidate) -> list[LegSolver]:
         """Those that an end leads to and a candidate may pass."""
@@ -104,32 +101,35 @@ class PassingSearch:
             if attractor.repeats and attractor.label != candidate.target
         ]
 
-    def _distance(self, solver: LegSolver, candidate: Candidate) -> float:
-        """The least distance of a candidate from an orbit at any phase, relative to the candidate's extent."""
-        propagator, orbit = self._nodes.propagators[PIECES[0]], solver.orbit
-        states = self._nodes.resampled(candidate).states
-        extent = float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
-        if propagator.osc.autonomous:
-            return float(orbit.nearest(states)[0].min()) / extent
-        shifts = range(0, orbit.period_nodes, propagator.pieces)
-        offsets = [(states - orbit.along(shift, len(states))) / propagator.units for shift in shifts]
-        return float(np.linalg.norm(offsets, axis=-1).min()) / extent
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Passage:
+    """Where a candidate comes nearest to an orbit."""
+
+    solver: LegSolver  # for legs that leave the orbit
+    distance: float  # relative to the candidate's extent
+    node: int  # of the candidate
+    place: float  # on the orbit
+
+    @classmethod
+    def of(cls, solver: LegSolver, nodes: Array, begin: int = 0) -> _Passage:
+        """Find the place among the nodes (count, n) from `begin` on."""
+        numbers, orbit = np.arange(begin, len(nodes)), solver.orbit
+        extent = float(np.linalg.norm(np.ptp(nodes, axis=0) / orbit.propagator.units)) or 1.0
+        distances, places = orbit.nearest(nodes[begin:], numbers)
+        nearest = int(np.argmin(distances))
+        return cls(solver, float(distances[nearest]) / extent, begin + nearest, float(places[nearest]))
+
+    def rest(self, candidate: Candidate, nodes: Array) -> Candidate:
+        """Return what of a candidate follows; it is on the orbit from the section before until it leaves."""
+        (orbit, phase), propagator = self.solver.orbit.starting(self.place), self.solver.orbit.propagator
+        before = self.node % propagator.grain
+        states = np.concatenate([orbit.along(phase - before, before + 1), nodes[self.node + 1 :]])
+        times = propagator.piece * np.arange(len(states), dtype=float)
+        return dataclasses.replace(candidate, times=times, states=states)
 
 
 def _cheapest(known: Sequence[SolvedPath]) -> list[SolvedPath]:
     """The cheapest path to each end."""
     least = {one.end: one for one in sorted(known, key=lambda one: -one.action)}
     return list(least.values())
-
-
-def _on_section(candidate: Candidate, scene: Oscillator) -> NDArray[np.intp]:
-    """Return which states of a candidate lie on the section; without forcing all do."""
-    if scene.autonomous:
-        return np.arange(len(candidate.times))
-    passed = (candidate.times - candidate.times[0]) / scene.section_interval
-    return np.flatnonzero(np.abs(passed - np.round(passed)) <= _WHOLE)
-
-
-def _after(candidate: Candidate, place: int) -> Candidate:
-    """The part of a candidate from one of its states on."""
-    return dataclasses.replace(candidate, times=candidate.times[place:], states=candidate.states[place:])

@@ -84,6 +84,14 @@ class PathSolver:
             return from_orbit(error, action)
         return self._once(found, from_orbit)
 
+    def solve_near(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
+        """Polish as `solve` does, but never from the orbit itself, which takes long where there is no path."""
+        lost, self._lost = self._lost, _MOST_LOST
+        try:
+            return self.solve(cuts, worth)
+        finally:
+            self._lost = lost
+
     def solve_at_once(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate with momenta by multiple shooting alone, by the first way to cut it that converges.
 
@@ -92,7 +100,7 @@ class PathSolver:
         """
         for cut in cuts:
             assert cut.momenta is not None
-            source, first = self.source.starting(self.source.nearest(cut.states[:1])[1][0])
+            source, first = self.source.starting(self.source.nearest(cut.states[:1], np.zeros(1, dtype=np.intp))[1][0])
             points = np.hstack([cut.states, cut.momenta])
             try:
                 found = self._shot(source, first, points, cut, evaluations=_FROM_MOMENTA)
@@ -269,7 +277,7 @@ def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> 
     """
     states = cut.states
     nodes = np.arange(0, len(states) - 1, propagator.grain)
-    closest, places = source.nearest(states[nodes])
+    closest, places = source.nearest(states[nodes], nodes)
     wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
     near = np.flatnonzero(closest <= wanted)
     entered = int(near[-1]) if near.size else 0
