@@ -31,7 +31,7 @@ class PassingSearch:
 
     The least action may be that of a path through a saddle, and through the attractor that motion from there leads to,
     before the end. It is the sum over its legs, from each of these orbits to the next (Freidlin and Wentzell, "Random
-    Perturbations of Dynamical Systems", 6.3). Each leg takes infinite time, so that no single path is found near it.
+    Perturbations of Dynamical Systems", 6.2). Each leg takes infinite time, so that no single path is found near it.
     """
 
     def __init__(self, nodes: Nodes) -> None:
