@@ -37,7 +37,8 @@ class LeastAction(Analyzer):
     differ by about 0.1 %. Paths are certified after each search. If the work is stopped in between, they are
     returned with the bounds that are known.
 
-    A path that passes saddles and other attractors on its way is polished in legs from each of these orbits to the next.
+    A path that passes saddles and other attractors on its way is polished in legs, from each of these orbits to the
+    next.
 
     For a chaotic attractor, and for a chaotic set on its basin boundary, the graph bounds the energy from below, and
     paths from or to unstable orbits inside it bound it from above. Where the graph gives no path from a chaotic

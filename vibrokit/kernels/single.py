@@ -1,4 +1,4 @@
-"""Runs one trajectory and keeps all its samples."""
+"""Runs one trajectory, or some, and keeps all samples."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.ensemble import Stop, advance_block
+from vibrokit.kernels.ensemble import Stop, advance_block, compiled_kernel
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.streams import streams_of
@@ -37,3 +37,28 @@ def record(
     budget, phase = np.full(1, count), np.zeros(1, dtype=np.int64)
     path = advance_block(kernel, state[None], budget, common, streams, phase, Stop(), count, 1, normals)
     return np.concatenate([state[None], path.visits[0, : path.intervals[0]]])
+
+
+def record_each(
+    scene: Scene,
+    flow: Flow,
+    stepper: Stepper,
+    states: NDArray[np.float64],  # (trajectories, equations)
+    phases: NDArray[np.intp],  # (trajectories,): starts, in spacings since the section
+    spacing: float,  # time from sample to sample (s)
+    count: int,  # samples after the start
+) -> NDArray[np.float64]:
+    """Integrate some trajectories of a noise-free flow; return their samples (trajectories, count + 1, equations).
+
+    Those of one phase are integrated together. Samples of a trajectory that ended early are NaN from there on.
+    """
+    kernel = compiled_kernel(scene, flow, stepper)
+    warn_of_coarse_steps(scene, flow, stepper)
+    order = np.argsort(phases, kind="stable")
+    common = (theta_of(scene), 0.0, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
+    none, budget = np.empty((len(states), 0), dtype=np.uint64), np.full(len(states), count)
+    ended = advance_block(kernel, states[order], budget, common, none, phases[order], Stop(), count, 1)
+    ended.visits[np.arange(count) >= ended.intervals[:, None]] = np.nan
+    samples = np.empty((len(states), count + 1, states.shape[1]))
+    samples[:, 0], samples[order, 1:] = states, ended.visits
+    return samples

@@ -20,7 +20,7 @@ from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
-from vibrokit.kernels.single import record
+from vibrokit.kernels.single import record, record_each
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.saddle import Saddle
@@ -158,16 +158,14 @@ class LegSolver:
 def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:
     """Record a path piece by piece, each from its own node; the time is 0 at the start, which is on the section."""
     each, n, piece = SAMPLES // propagator.pieces, propagator.size, propagator.piece
-    lengths = np.append(np.full(len(found.points) - 2, piece), found.last)
     actions = found.head + np.concatenate([[0.0], np.cumsum(found.actions)])
-    parts, times = [], []
-    for node, length in enumerate(lengths):
-        start = (found.first + node) % propagator.pieces * piece
-        begin = np.append(found.points[node], actions[node])
-        part = record(propagator.osc, Flow.HAMILTONIAN, propagator.stepper, begin, start, length / each, each)
-        parts.append(part[:-1])
-        times.append(node * piece + length / each * np.arange(len(part) - 1))
-    z = np.vstack([*parts, np.append(found.points[-1], actions[-1])])
-    t = np.concatenate([*times, [float(np.sum(lengths))]])
+    nodes = np.column_stack([found.points[:-1], actions[:-1]])
+    phases = (found.first + np.arange(len(nodes))) % propagator.pieces
+    by = propagator.osc, Flow.HAMILTONIAN, propagator.stepper
+    samples = record_each(*by, nodes[:-1], phases[:-1] * each, piece / each, each)[:, :-1].reshape(-1, nodes.shape[1])
+    last = record(*by, nodes[-1], phases[-1] * piece, found.last / each, each)[:-1]
+    z = np.vstack([samples, last, np.append(found.points[-1], actions[-1])])
+    start = piece * (len(nodes) - 1)
+    t = np.concatenate([piece / each * np.arange(len(samples)), start + found.last / each * np.arange(len(last) + 1)])
     section = np.arange(0, len(z) - (found.last != piece), SAMPLES)
     return ExitPath(t, z[:, :n], z[:, n : 2 * n], z[:, -1], section)
