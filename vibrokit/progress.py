@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from typing import Any
 
+from vibrokit.blas import one_blas_thread
 from vibrokit.errors import StructureError, shown
 from vibrokit.registry import load_attribute
 
@@ -192,7 +193,8 @@ def working(progress: Progress = None, time_limit: float | None = None) -> Itera
     work = Work(_listener(progress), checked_time_limit(time_limit), _CURRENT.get())
     token = _CURRENT.set(work)
     try:
-        yield work
+        with contextlib.nullcontext() if work.outer else one_blas_thread():
+            yield work
     finally:
         _CURRENT.reset(token)
         work.close()

@@ -53,21 +53,14 @@ class CandidatePolisher:
         if candidate.action > WORTH * self._known(candidate):
             self.skipped += 1
             return
-        failures, solved = [], False
+        failures, solved = list[str](), False
         try:
-            ways = (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
-            for end, way in itertools.product(self._near(candidate), (*ways, PathSolver.solve)):
+            for end in self._near(candidate):
                 in_legs = self._solve_in_legs(end, candidate)
                 if (in_legs and self._failures[end]) or not self._is_wanted(end, candidate):
                     solved = True  # no failure of this candidate
-                    continue
-                try:
-                    self._add(self._solve(end, candidate, way))
-                    solved = True
-                except StructureError as error:
-                    failures.append(str(error))
-                    self._failures[end] += 1
-                    solved |= in_legs
+                else:
+                    solved |= self._solve_directly(end, candidate, failures) or in_legs
             for end in self._farther(candidate):
                 if self._solve_in_legs(end, candidate):
                     break
@@ -81,6 +74,23 @@ class CandidatePolisher:
                 )
             )  # fmt: skip
 
+    def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str]) -> bool:
+        """Whether a path to an end is found; by multiple shooting first where momenta are known."""
+        found = False
+        for way in (
+            (PathSolver.solve_at_once, PathSolver.solve) if candidate.momenta is not None else (PathSolver.solve,)
+        ):
+            try:
+                new = self._add(self._solve(end, candidate, way))
+            except StructureError as error:
+                failures.append(str(error))
+                self._failures[end] += 1
+            else:
+                found = True
+                if not new:  # another candidate has led there, and to where the other way leads
+                    break
+        return found
+
     def reach(self, end: PathEnd, ranked: Sequence[Candidate]) -> None:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
@@ -90,13 +100,17 @@ class CandidatePolisher:
             if not self._is_wanted(end, candidate):
                 return
             try:
-                return self._add(self._solve(end, candidate))
+                self._add(self._solve(end, candidate))
+                return
             except StructureError:
                 self._failures[end] += 1
 
-    def _add(self, one: SolvedPath) -> None:
-        if not any(one.is_same(other) for other in self.solved):
+    def _add(self, one: SolvedPath) -> bool:
+        """Whether a path is new; it is added then."""
+        new = not any(one.is_same(other) for other in self.solved)
+        if new:
             self.solved.append(one)
+        return new
 
     def _known(self, candidate: Candidate) -> float:
         """The least action of a known path to the candidate's target, or, if less, to any end that it comes near.
