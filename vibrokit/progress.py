@@ -191,10 +191,16 @@ def current() -> Work:
 def working(progress: Progress = None, time_limit: float | None = None) -> Iterator[Work]:
     """Open a piece of work; inside another one, the listener and the time limit of that stay in force."""
     work = Work(_listener(progress), checked_time_limit(time_limit), _CURRENT.get())
+    with contextlib.nullcontext() if work.outer else one_blas_thread(), opened(work):
+        yield work
+
+
+@contextlib.contextmanager
+def opened(work: Work) -> Iterator[Work]:
+    """Make a piece of work the current one, and close it at the end."""
     token = _CURRENT.set(work)
     try:
-        with contextlib.nullcontext() if work.outer else one_blas_thread():
-            yield work
+        yield work
     finally:
         _CURRENT.reset(token)
         work.close()

@@ -20,7 +20,7 @@ from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
-from vibrokit.progress import TRAJECTORIES, advance, count, working
+from vibrokit.progress import TRAJECTORIES, Work, advance, count, opened
 from vibrokit.symbolic.flow_kind import Flow
 
 _BLOCK = 2048
@@ -285,7 +285,7 @@ def _counted_apart(work: Callable[..., Any], task: tuple[Any, ...]) -> tuple[Any
     """Do a task, in whatever thread or process; return its result and what it counted."""
 
     def counted() -> tuple[Any, Mapping[str, int]]:
-        with working() as own:
+        with opened(Work()) as own:
             return work(*task), dict(own.counts)
 
     return contextvars.Context().run(counted)  # an executor may run it in the calling thread

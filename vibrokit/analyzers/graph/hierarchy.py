@@ -151,13 +151,14 @@ class HierarchySearch:
         if before is not None and before.refined_by(_shared(shape, before.intervals)):
             whole, rougher, coarse = before.whole, before.coarse, self._closer(before.fine, targets, _WORTHWHILE)
         else:
-            solved = [self._coarser(first, targets, shape, intervals) for intervals in self._intervals(before)]
+            ceiling = max(target.scale for target in targets) if before is None else before.whole.highest(targets)
+            solved = [self._coarser(first, targets, shape, each, 2 * ceiling) for each in self._intervals(before)]
             whole, coarse = min(solved, key=lambda both: both[1].highest(targets))  # interpolation raises V
             rougher = whole
         for count in shorter:
             if coarse.linearization_error(targets) <= max(_STEP_TOLERANCE, coarse.change(rougher, targets)):
                 break
-            tried = self._coarser(count, targets, shape, coarse.intervals)
+            tried = self._coarser(count, targets, shape, coarse.intervals, 2 * whole.highest(targets))
             excess = tried[1].excess(targets)
             if not np.isfinite(excess) or excess > max(coarse.excess(targets), _STEP_TOLERANCE):
                 break
@@ -175,14 +176,14 @@ class HierarchySearch:
         return (1, attractor.period) if self.unfolding and attractor.is_fixed and attractor.period > 1 else (1,)
 
     def _coarser(
-        self, steps: int, targets: Sequence[ExitTarget], shape: Shape, intervals: int
+        self, steps: int, targets: Sequence[ExitTarget], shape: Shape, intervals: int, ceiling: float
     ) -> tuple[SolvedGrid, SolvedGrid]:
         """Solve on the whole region, then on closer and closer grids around what lies below the costliest exit.
 
-        They have half as many nodes along each side as the finest grid of that shape.
+        They have half as many nodes along each side as the finest grid of that shape. The ceiling is a first guess.
         """
         grids = self._covering(steps, _halved(_shared(shape, intervals))).unfolded(intervals)
-        whole = self._solved(grids, 2 * max(target.scale for target in targets), targets)
+        whole = self._solved(grids, ceiling, targets)
         for _ in range(_WIDENINGS):
             wider = grids.widened(self._before_exit(whole, whole.highest(targets), targets))
             if wider is grids:
