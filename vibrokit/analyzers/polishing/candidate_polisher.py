@@ -176,15 +176,12 @@ class CandidatePolisher:
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:
         """Whether a path to an end through an orbit that a candidate passes is known, or found and added."""
-        to_end = [one for one in self.solved if one.end is end]
-        if candidate.momenta is not None or any(len(one.legs) == 1 for one in to_end):
+        if candidate.momenta is not None:  # a shot, which is one extremal path
             return False
-        if candidate.action < self._least((end,)):
-            found = self._passing.solve(end, candidate, self.solved)
-            if found is None:
-                return bool(to_end)
+        found = self._passing.solve(end, candidate, self.solved)
+        if found is not None:
             self._add(found)
-        return True
+        return any(one.end is end and len(one.legs) > 1 for one in self.solved)
 
 
 def _left(problem: ExitProblem, orbit: Orbit | None) -> Departure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 from collections import Counter
@@ -20,7 +21,7 @@ from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.errors import StructureError
 
 _PASSED = 0.05  # of a candidate's extent: distance from a saddle that it passes; grids place it to 0.01 to 0.03
-_MOST_FAILURES = 2  # of legs from one orbit to one end, after which no other candidate is tried
+_MOST_TRIES = 3  # candidates for a leg from one orbit to one end
 _TOO_MUCH = 1.1  # times the candidate's action, which searches price to a few percent: above, it is another path
 
 Array = NDArray[np.float64]
@@ -36,7 +37,7 @@ class PassingSearch:
 
     def __init__(self, nodes: Nodes) -> None:
         self._nodes, self._problem, structure = nodes, nodes.problem, nodes.problem.structure
-        self._failures: Counter[tuple[LegSolver, PathEnd]] = Counter()
+        self._tries: Counter[tuple[LegSolver, PathEnd]] = Counter()
         self._from_saddle = functools.cache(
             lambda number: LegSolver(nodes, Departure.from_saddle(number, structure.saddles[number]))
         )
@@ -56,15 +57,13 @@ class PassingSearch:
     def solve(self, end: PathEnd, candidate: Candidate, known: Sequence[SolvedPath]) -> SolvedPath | None:
         """Return a path to an end of which a known path is the first part; None if none is found."""
         for first, solver, rest in self._splits(end, candidate, known):
-            if self._failures[solver, end] >= _MOST_FAILURES:
+            self._tries[solver, end] += 1
+            if self._tries[solver, end] > _MOST_TRIES:
                 continue
-            try:
+            with contextlib.suppress(StructureError):
                 leg = solver.solve(end, rest, way=PathSolver.solve_near)
                 if first.action + leg.found.action <= _TOO_MUCH * candidate.action:
                     return SolvedPath.of(self._problem, (*first.legs, leg))
-            except StructureError:
-                pass
-            self._failures[solver, end] += 1
         return None
 
     def _splits(
