@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import functools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.errors import StructureError
 
-_PASSED = 0.05  # of a candidate's extent: distance from a saddle that it passes; grids place it to 0.01 to 0.03
+_PASSED = 0.05  # of a candidate's extent: distance from an orbit that it passes; grids place it to 0.003 to 0.04
 _MOST_TRIES = 3  # candidates for a leg from one orbit to one end
 _TOO_MUCH = 1.1  # times the candidate's action, which searches price to a few percent: above, it is another path
 
@@ -56,7 +56,11 @@ class PassingSearch:
 
     def solve(self, end: PathEnd, candidate: Candidate, known: Sequence[SolvedPath]) -> SolvedPath | None:
         """Return a path to an end of which a known path is the first part; None if none is found."""
-        for first, solver, rest in self._splits(end, candidate, known):
+        try:
+            splits = self._splits(end, candidate, known)
+        except StructureError:  # one of the orbits is not hyperbolic
+            return None
+        for first, solver, rest in splits:
             self._tries[solver, end] += 1
             if self._tries[solver, end] > _MOST_TRIES:
                 continue
@@ -68,28 +72,25 @@ class PassingSearch:
 
     def _splits(
         self, end: PathEnd, candidate: Candidate, known: Sequence[SolvedPath]
-    ) -> Iterator[tuple[SolvedPath, LegSolver, Candidate]]:
+    ) -> list[tuple[SolvedPath, LegSolver, Candidate]]:
         """Known paths to saddles that a candidate passes before an end, with what follows them.
 
         That begins at the saddle, or at an attractor that the saddle leads to; the nearest of all these comes first.
         """
-        if end.saddle < 0:
-            return
-        nodes = self._nodes.resampled(candidate).states
-        nodes = nodes[: _Passage.of(self._from_saddle(end.saddle), nodes).node]
-        passed: list[tuple[_Passage, SolvedPath]] = []
-        for first in _cheapest(known) if len(nodes) > 1 else ():
-            if first.end.saddle >= 0 and first.end is not end and not first.end.one_of_many:
-                saddle = _Passage.of(self._from_saddle(first.end.saddle), nodes)
-                if saddle.distance <= _PASSED:
-                    passed.append((saddle, first))
-                    passed += [
-                        (_Passage.of(solver, nodes, saddle.node), first)
-                        for solver in self._attractors(first.end, candidate)
-                    ]
+        firsts = [one for one in _cheapest(known) if one.end.saddle >= 0 and one.end is not end]
+        if end.saddle < 0 or not firsts:
+            return []
         states = self._nodes.resampled(candidate).states
-        for passage, first in sorted(passed, key=lambda each: each[0].distance):
-            yield first, passage.solver, passage.rest(candidate, states)
+        nodes = states[: _Passage.of(self._from_saddle(end.saddle), states).node]
+        passed: list[tuple[_Passage, SolvedPath]] = []
+        for first in firsts if len(nodes) > 1 else ():
+            saddle = _Passage.of(self._from_saddle(first.end.saddle), nodes)
+            if saddle.distance <= _PASSED and not first.end.one_of_many:
+                attractors = self._attractors(first.end, candidate)
+                passed.append((saddle, first))
+                passed += [(_Passage.of(solver, nodes, saddle.node), first) for solver in attractors]
+        near = sorted((each for each in passed if each[0].distance <= _PASSED), key=lambda each: each[0].distance)
+        return [(first, passage.solver, passage.rest(candidate, states)) for passage, first in near]
 
     def _attractors(self, end: PathEnd, candidate: Candidate) -> list[LegSolver]:
         """Those that an end leads to and a candidate may pass."""
