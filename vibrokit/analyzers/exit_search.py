@@ -47,6 +47,7 @@ class ExitSearch:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
+        self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
         self._searched = False  # whether there are no more solutions
         self.findings: list[Finding] = []
 
@@ -84,17 +85,18 @@ class ExitSearch:
 
     def shoot(self) -> None:
         """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""
-        if self.analyzer.shooting is None or not self.problem.attractor.is_fixed:
+        shooting, follow, self._shots_follow = self.analyzer.shooting, self._shots_follow, False
+        if shooting is None or not follow:
             return
-        if self.analyzer.graph is not None and not usable_ends(self.problem)[0]:
-            return
-        try:
-            found = self.analyzer.shooting.search(self.problem)
-        except (StructureError, StepperError) as error:
-            self._failed("action plot", error, only=self.analyzer.graph is None)
-        else:
-            self.findings += found.findings
-            self._polish(found.candidates)
+        candidates: Sequence[Candidate] = ()
+        if self.analyzer.graph is None or usable_ends(self.problem)[0]:
+            try:
+                found = shooting.search(self.problem)
+                candidates = found.candidates
+                self.findings += found.findings
+            except (StructureError, StepperError) as error:
+                self._failed("action plot", error, only=self.analyzer.graph is None)
+        self._polish(candidates)
 
     def search_graph(self) -> None:
         """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
@@ -110,7 +112,7 @@ class ExitSearch:
             self._searched = True
             self._failed("graph search", error, only=self.analyzer.shooting is None and self.graph is None)
         if self.graph is not None and self.graph is not before:
-            self._polish(self.graph.candidates)
+            self._polish(self.graph.candidates, quick=self._shots_follow)
 
     def approach(self) -> None:
         """Polish where a chaotic attractor comes nearest to a saddle, for exits that the graph gave no path to."""
@@ -217,9 +219,9 @@ class ExitSearch:
                 self._failed("polishing", error)
         return found
 
-    def _polish(self, candidates: Sequence[Candidate]) -> None:
+    def _polish(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
         for polishing in self._polishings:
-            polishing.add(candidates)
+            polishing.add(candidates, quick=quick)
             if self.stopped:
                 break
 

@@ -24,6 +24,7 @@ WORTH = 1.25
 """Times the least action known: costlier candidates are skipped. Searches price a path to a few percent."""
 _NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
 _INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
+_QUICKLY = 0.0  # for the least action known: no finer pieces where the coarser ones do not converge
 _MOST_FAILURES = 6  # candidates that lead to no path to an end, after which no other one is tried
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 
@@ -43,12 +44,13 @@ class CandidatePolisher:
         self._solver = LegSolver(self.nodes, _left(problem, orbit))
         self._passing = PassingSearch(self.nodes)
         self._failures: Counter[PathEnd] = Counter()
+        self._left: list[Candidate] = []  # that led nowhere quickly
 
-    def polish(self, candidate: Candidate) -> None:
+    def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
 
         A candidate of a grid may pass an orbit on its way to an end. No path does that in finite time, so that it is
-        polished in legs first.
+        polished in legs first. If it is polished quickly and no path is found, it is left for `polish_the_rest`.
         """
         if candidate.action > WORTH * self._known(candidate):
             self.skipped += 1
@@ -60,13 +62,15 @@ class CandidatePolisher:
                 if (in_legs and self._failures[end]) or not self._is_wanted(end, candidate):
                     solved = True  # no failure of this candidate
                 else:
-                    solved |= self._solve_directly(end, candidate, failures) or in_legs
+                    solved |= self._solve_directly(end, candidate, failures, quick=quick) or in_legs
             for end in self._farther(candidate):
                 if self._solve_in_legs(end, candidate):
                     break
         except StructureError as error:
             failures.append(str(error))
-        if not solved:
+        if not solved and quick:
+            self._left.append(candidate)
+        elif not solved:
             self.findings.append(
                 Finding.of(
                     Code.CANDIDATE_FAILED, self.problem.source, candidate.target,
@@ -74,17 +78,23 @@ class CandidatePolisher:
                 )
             )  # fmt: skip
 
-    def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str]) -> bool:
+    def polish_the_rest(self) -> None:
+        """Polish what was left, unless paths are known that cost as little."""
+        left, self._left = self._left, []
+        for candidate in left:
+            if candidate.action < self._known(candidate):
+                self.polish(candidate)
+
+    def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
         """Whether a path to an end is found; by multiple shooting first where momenta are known."""
-        found = False
-        for way in (
-            (PathSolver.solve_at_once, PathSolver.solve) if candidate.momenta is not None else (PathSolver.solve,)
-        ):
+        found, at_once = False, candidate.momenta is not None
+        ways = (PathSolver.solve_near,) if quick else (PathSolver.solve_at_once, PathSolver.solve)[not at_once :]
+        for way in ways:
             try:
-                new = self._add(self._solve(end, candidate, way))
+                new = self._add(self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,))))
             except StructureError as error:
                 failures.append(str(error))
-                self._failures[end] += 1
+                self._failures[end] += not quick
             else:
                 found = True
                 if not new:  # another candidate has led there, and to where the other way leads
@@ -100,7 +110,7 @@ class CandidatePolisher:
             if not self._is_wanted(end, candidate):
                 return
             try:
-                self._add(self._solve(end, candidate))
+                self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
                 return
             except StructureError:
                 self._failures[end] += 1
@@ -169,9 +179,9 @@ class CandidatePolisher:
         except StructureError:
             return False
 
-    def _solve(self, end: PathEnd, candidate: Candidate, way: Way = PathSolver.solve) -> SolvedPath:
+    def _solve(self, end: PathEnd, candidate: Candidate, way: Way, least: float) -> SolvedPath:
         others = [other for other in self.ends if other is not end]
-        leg = self._solver.solve(end, candidate, others=others, least=self._least((end,)), way=way)
+        leg = self._solver.solve(end, candidate, others=others, least=least, way=way)
         return SolvedPath.of(self.problem, (leg,))
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:

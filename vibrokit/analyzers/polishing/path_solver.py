@@ -85,10 +85,10 @@ class PathSolver:
         return self._once(found, from_orbit)
 
     def solve_near(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
-        """Polish as `solve` does, but never from the orbit itself, which takes long where there is no path."""
+        """Polish as `solve` does, whatever it is worth, but never from the orbit itself, which takes long."""
         lost, self._lost = self._lost, _MOST_LOST
         try:
-            return self.solve(cuts, worth)
+            return self.solve(cuts)
         finally:
             self._lost = lost
 

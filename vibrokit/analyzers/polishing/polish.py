@@ -62,10 +62,11 @@ class Polishing:
         self._certified = self._tried = 0
         self._known = set[tuple[int, bytes]]()
 
-    def add(self, candidates: Sequence[Candidate]) -> None:
+    def add(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
         """Polish candidates, the cheapest first, and certify the paths that they lead to.
 
-        Those that came before are left out: finer graphs give some paths again.
+        Those that came before are left out: finer graphs give some paths again. Those that lead to no path quickly are
+        left for the next call, after the candidates of that one.
         """
         new = {(each.target, each.states.tobytes()): each for each in candidates}
         ranked = sorted((new[key] for key in new if key not in self._known), key=lambda each: each.action)
@@ -74,10 +75,12 @@ class Polishing:
         try:
             with stage("polishing", unit="candidates", total=len(ranked)):
                 for candidate in ranked:
-                    self._polisher.polish(candidate)
+                    self._polisher.polish(candidate, quick=quick)
                     advance()
-                for end in self._ends:
-                    self._polisher.reach(end, ranked)
+                if not quick:
+                    self._polisher.polish_the_rest()
+                    for end in self._ends:
+                        self._polisher.reach(end, ranked)
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))
         found = self._polisher.solved[self._certified :]
