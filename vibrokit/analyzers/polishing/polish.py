@@ -61,6 +61,7 @@ class Polishing:
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
         self._known = set[tuple[int, bytes]]()
+        self._waiting: list[Candidate] = []  # for a call that is not quick, which tries to reach all ends
 
     def add(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
         """Polish candidates, the cheapest first, and certify the paths that they lead to.
@@ -77,10 +78,12 @@ class Polishing:
                 for candidate in ranked:
                     self._polisher.polish(candidate, quick=quick)
                     advance()
+                self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
                 if not quick:
                     self._polisher.polish_the_rest()
                     for end in self._ends:
-                        self._polisher.reach(end, ranked)
+                        self._polisher.reach(end, self._waiting)
+                    self._waiting = []
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))
         found = self._polisher.solved[self._certified :]
