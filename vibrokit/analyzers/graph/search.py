@@ -126,10 +126,12 @@ class GraphSearch:
         for number, nodes in enumerate(refinements, start=1):
             known.finer, done = len(refinements) - number, settled()
             unsettled = [target for target in targets if target.label not in done]
-            near, far = ([target for target in unsettled if target.farther is farther] for farther in (False, True))
-            for group in (near, far):  # grids for the first ones cover the own basin alone
+            # Grids for targets that are no farther than the own basin cover that basin alone.
+            both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
+            groups = [group for group in both if group]
+            for group in groups:
                 try:
-                    yield from _solutions(problem, search, group, nodes, known, last=group is far or not far)
+                    yield from _solutions(problem, search, group, nodes, known, last=group is groups[-1])
                 except StructureError:  # on few nodes, no exit may be reached
                     if nodes == self.nodes and not known.estimates:
                         raise
@@ -193,8 +195,6 @@ def _solutions(
     last: bool,
 ) -> Iterator[GraphSolution]:
     """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
-    if not targets:
-        return
     estimates = known.estimates
     found, potential = search.estimates(targets, nodes)
     estimates |= found

@@ -44,7 +44,7 @@ class CandidatePolisher:
         self._solver = LegSolver(self.nodes, _left(problem, orbit))
         self._passing = PassingSearch(self.nodes)
         self._failures: Counter[PathEnd] = Counter()
-        self._left: list[Candidate] = []  # that led nowhere quickly
+        self._unsolved: list[Candidate] = []  # that led nowhere quickly
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
@@ -69,7 +69,7 @@ class CandidatePolisher:
         except StructureError as error:
             failures.append(str(error))
         if not solved and quick:
-            self._left.append(candidate)
+            self._unsolved.append(candidate)
         elif not solved:
             self.findings.append(
                 Finding.of(
@@ -80,8 +80,8 @@ class CandidatePolisher:
 
     def polish_the_rest(self) -> None:
         """Polish what was left, unless paths are known that cost as little."""
-        left, self._left = self._left, []
-        for candidate in left:
+        unsolved, self._unsolved = self._unsolved, []
+        for candidate in unsolved:
             if candidate.action < self._known(candidate):
                 self.polish(candidate)
 
@@ -138,8 +138,12 @@ class CandidatePolisher:
 
     def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
         """Whether only ends that are not near a candidate lead to its target."""
-        leading = [end for end in self._passing.ends if candidate.target in end.targets]
+        leading = self._leading(candidate)
         return bool(leading) and not any(end in leading for end in near)
+
+    def _leading(self, candidate: Candidate) -> list[PathEnd]:
+        """The ends, of paths through other orbits too, that lead to the target of a candidate."""
+        return [end for end in self._passing.ends if candidate.target in end.targets]
 
     def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
         """Whether to look for a path to an end: not after many failures, nor inside a set if others cost less."""
@@ -168,7 +172,7 @@ class CandidatePolisher:
 
     def _farther(self, candidate: Candidate) -> list[PathEnd]:
         """The ends that lead to the target of a candidate, the nearest first, if no path to the target is known."""
-        ends = [end for end in self._passing.ends if candidate.target in end.targets]
+        ends = self._leading(candidate)
         if np.isfinite(self._least(ends)):
             return []
         return sorted(ends, key=lambda end: self.nodes.distance(end, candidate))

@@ -213,10 +213,7 @@ class SaddleEnding(Ending):
 
     def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, float]:
         """Distance, node of the candidate, and place on the orbit."""
-        nodes = np.arange(self.propagator.grain, len(candidate.all_states))
-        distances, places = self.orbit.nearest(candidate.all_states[nodes], nodes)
-        nearest = int(np.argmin(distances))
-        return float(distances[nearest]), int(nodes[nearest]), float(places[nearest])
+        return self.orbit.closest(candidate.all_states, self.propagator.grain)
 
 
 def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:

@@ -60,8 +60,7 @@ class FollowedPath:
         orbits = [(one.source, two.source)]
         orbits += [(own, its) for (own, _), (its, _) in zip(one.ending.approached, two.ending.approached, strict=False)]
         return abs(one.action - two.action) <= _SAME * one.action and all(
-            own.nearest(its.along(0, 1), np.zeros(1, dtype=np.intp))[0].min() <= _SAME * one.extent
-            for own, its in orbits
+            own.closest(its.along(0, 1))[0] <= _SAME * one.extent for own, its in orbits
         )
 
     def at(self, osc: Oscillator) -> FollowedPath:

@@ -102,6 +102,16 @@ class LinearizedOrbit(ABC):
     def displacement(self, phase: int, momentum: Array) -> OrbitDisplacement:
         """Return how p·q, q the orbit at a phase, changes with the scene."""
 
+    def closest(self, states: Array, begin: int = 0) -> tuple[float, int, float]:
+        """Return the least distance of states (count, n) a piece apart, the first on the section, from `begin` on.
+
+        It comes with the number of that state, and where on the orbit it is measured, for `starting`.
+        """
+        numbers = np.arange(begin, len(states))
+        distances, places = self.nearest(states[begin:], numbers)
+        nearest = int(np.argmin(distances))
+        return float(distances[nearest]), int(numbers[nearest]), float(places[nearest])
+
     def point(self, phase: int) -> Array:
         """Return the orbit as (q, p)."""
         (state,) = self.along(phase, 1)

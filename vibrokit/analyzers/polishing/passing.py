@@ -114,11 +114,9 @@ class _Passage:
     @classmethod
     def of(cls, solver: LegSolver, nodes: Array, begin: int = 0) -> _Passage:
         """Find the place among the nodes (count, n) from `begin` on."""
-        numbers, orbit = np.arange(begin, len(nodes)), solver.orbit
-        extent = float(np.linalg.norm(np.ptp(nodes, axis=0) / orbit.propagator.units)) or 1.0
-        distances, places = orbit.nearest(nodes[begin:], numbers)
-        nearest = int(np.argmin(distances))
-        return cls(solver, float(distances[nearest]) / extent, begin + nearest, float(places[nearest]))
+        extent = float(np.linalg.norm(np.ptp(nodes, axis=0) / solver.orbit.propagator.units)) or 1.0
+        distance, node, place = solver.orbit.closest(nodes, begin)
+        return cls(solver, distance / extent, node, place)
 
     def rest(self, candidate: Candidate, nodes: Array) -> Candidate:
         """Return what of a candidate follows; it is on the orbit from the section before until it leaves."""

@@ -58,6 +58,13 @@ class PathSolver:
         action is below `worth`; one that costs more descends in few iterations only. Raises StructureError if no
         extremal path is found near the candidate.
         """
+        return self._solve(cuts, worth, from_orbit=True)
+
+    def solve_near(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
+        """Polish as `solve` does, whatever it is worth, but never from the orbit itself, which takes long."""
+        return self._solve(cuts, np.inf, from_orbit=False)
+
+    def _solve(self, cuts: Sequence[Cut], worth: float, *, from_orbit: bool) -> ExtremalPath:
         propagator, fitted = self.propagator, []
         for cut in cuts:
             source, first, points = _begun(propagator, self.source, cut)
@@ -68,8 +75,8 @@ class PathSolver:
             if isinstance(known, ExtremalPath) and _in_family(known, first, points, action):
                 return known
 
-        def from_orbit(failure: StructureError, known: float) -> ExtremalPath:
-            if not known < worth or self._lost >= _MOST_LOST:
+        def fallback(failure: StructureError, known: float) -> ExtremalPath:
+            if not from_orbit or not known < worth or self._lost >= _MOST_LOST:
                 raise failure
             try:
                 return self._from_orbit(first, cut, points, failure)
@@ -81,16 +88,8 @@ class PathSolver:
             iterations = MANY_ITERATIONS if action < worth else FEW_ITERATIONS
             found = self._descended(source, first, cut, points, iterations)
         except StructureError as error:
-            return from_orbit(error, action)
-        return self._once(found, from_orbit)
-
-    def solve_near(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
-        """Polish as `solve` does, whatever it is worth, but never from the orbit itself, which takes long."""
-        lost, self._lost = self._lost, _MOST_LOST
-        try:
-            return self.solve(cuts)
-        finally:
-            self._lost = lost
+            return fallback(error, action)
+        return self._once(found, fallback, final=from_orbit)
 
     def solve_at_once(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish a candidate with momenta by multiple shooting alone, by the first way to cut it that converges.
@@ -100,7 +99,7 @@ class PathSolver:
         """
         for cut in cuts:
             assert cut.momenta is not None
-            source, first = self.source.starting(self.source.nearest(cut.states[:1], np.zeros(1, dtype=np.intp))[1][0])
+            source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
             points = np.hstack([cut.states, cut.momenta])
             try:
                 found = self._shot(source, first, points, cut, evaluations=_FROM_MOMENTA)
@@ -109,24 +108,26 @@ class PathSolver:
                 failure = error
         raise failure
 
-    def _once(self, found: ExtremalPath, from_orbit: Fallback) -> ExtremalPath:
-        """Complete a path, unless that was done, or failed, before."""
+    def _once(self, found: ExtremalPath, fallback: Fallback, *, final: bool = True) -> ExtremalPath:
+        """Complete a path, unless that was done, or failed for good, before."""
         result = next((known for before, known in self._known if _are_one(before, found)), None)
         if result is None:
             try:
-                result = self._completed(found, from_orbit)
+                result = self._completed(found, fallback)
             except StructureError as error:
+                if not final:  # starting on the orbit may help later
+                    raise
                 result = error
             self._known.append((found, result))
         if isinstance(result, StructureError):
             raise result
         return result
 
-    def _completed(self, found: ExtremalPath, from_orbit: Fallback) -> ExtremalPath:
+    def _completed(self, found: ExtremalPath, fallback: Fallback) -> ExtremalPath:
         try:
             return completed(self.propagator, found)
         except StructureError as error:
-            return from_orbit(error, found.action)
+            return fallback(error, found.action)
 
     def _descended(
         self, source: LinearizedOrbit, first: int, cut: Cut, points: Array, iterations: int = MANY_ITERATIONS

@@ -19,7 +19,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.linear_map import linear_map
+from vibrokit.structure.linear_map import unstable_direction
 from vibrokit.symbolic.flow_kind import Flow
 
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
@@ -132,12 +132,11 @@ def _relaxation(
     """The motion from a saddle to an attractor, until it is near the state `there` on the section."""
     scene, stepper = problem.scene, problem.single_stepper(Flow.STATE)
     start = saddle.points[_nearest(scene, saddle.points, here)]
-    (slopes,) = linear_map(
-        scene, start[None], problem.single_stepper(Flow.STATE_VARIATIONAL), intervals=max(1, saddle.period)
-    ).derivatives
-    values, vectors = np.linalg.eig(slopes)
-    direction = np.real(vectors[:, int(np.argmax(np.abs(values)))])
-    direction /= np.linalg.norm(direction / extent)
+    by = problem.single_stepper(Flow.STATE_VARIATIONAL)
+    direction = unstable_direction(scene, start, by, max(1, saddle.period))
+    if direction is None:
+        raise StructureError(f"motion from the saddle at ({start[0]:.6g}, {start[1]:.6g}) diverges.")
+    direction = direction / np.linalg.norm(direction / extent)
     spacing, every = scene.section_interval / SAMPLES, 1 if scene.autonomous else SAMPLES
     motions = [start + side * _BESIDE * direction for side in (1, -1)]
     parts: list[list[Array]] = [[], []]
