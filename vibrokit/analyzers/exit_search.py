@@ -96,7 +96,8 @@ class ExitSearch:
                 self.findings += found.findings
             except (StructureError, StepperError) as error:
                 self._failed("action plot", error, only=self.analyzer.graph is None)
-        self._polish(candidates)
+        if candidates or self._polishing_begun:  # candidates of the first graph may wait
+            self._polish(candidates)
 
     def search_graph(self) -> None:
         """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
@@ -219,6 +220,10 @@ class ExitSearch:
                 self._failed("polishing", error)
         return found
 
+    @property
+    def _polishing_begun(self) -> bool:
+        return "_polishings" in vars(self)
+
     def _polish(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
         for polishing in self._polishings:
             polishing.add(candidates, quick=quick)
@@ -227,7 +232,7 @@ class ExitSearch:
 
     def _polished(self) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
         """Branches and findings of all orbits."""
-        if "_polishings" not in vars(self):
+        if not self._polishing_begun:
             return (), ()
         found = [polishing.polished() for polishing in self._polishings]
         branches = tuple(branch for each in found for branch in each.branches)
