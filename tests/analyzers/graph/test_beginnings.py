@@ -33,8 +33,13 @@ def search(problem):
     return HierarchySearch(problem, model, (8,), (60, 60))
 
 
-def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, energy):
-    found = beginnings(problem, search, energy)
+@pytest.fixture(scope="module")
+def potential(problem):
+    return GRAPH.search(problem).potential
+
+
+def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, potential, energy):
+    found = beginnings(problem, search, potential, energy)
     assert found
     for candidate in found:
         speed = np.abs(np.diff(energy.path.q[:, :2], axis=0)).max(axis=0) * 128 / 8
@@ -43,10 +48,10 @@ def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, energy):
         assert candidate.action == pytest.approx(energy.value, rel=0.05)
 
 
-def test_none_without_a_path(problem, search, energy):
-    assert beginnings(problem, search, dataclasses.replace(energy, path=None)) == ()
+def test_none_without_a_path(problem, search, potential, energy):
+    assert beginnings(problem, search, potential, dataclasses.replace(energy, path=None)) == ()
 
 
-def test_none_for_a_path_that_spends_its_action_at_once(problem, search, energy):
+def test_none_for_a_path_that_spends_its_action_at_once(problem, search, potential, energy):
     path = dataclasses.replace(energy.path, section=energy.path.section[-1:])
-    assert beginnings(problem, search, dataclasses.replace(energy, path=path)) == ()
+    assert beginnings(problem, search, potential, dataclasses.replace(energy, path=path)) == ()

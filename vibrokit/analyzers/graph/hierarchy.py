@@ -113,7 +113,6 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: tuple[int, ...]  # to be tried in turn
     finest: Shape  # the last one, whose hierarchies are not kept
-    unfolding: bool = True  # whether to try grids for each section interval of the attractor's period
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
 
     def estimates(
@@ -128,6 +127,17 @@ class HierarchySearch:
             if shape != self.finest:
                 self._solved_before[shape, frozenset(targets)] = hierarchy
             return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
+
+    def within(self, potential: Potential, target: ExitTarget, shape: Shape) -> list[Candidate]:
+        """Return paths to a target that a known potential covers, from a grid around what lies below the target.
+
+        Raises StructureError if the grid does not reach it.
+        """
+        with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
+            known = SolvedGrid(self.problem, self.model, potential)
+            grids, ceiling = self._around(known, (target,))
+            solved = self._solved(grids.with_shape(shape), ceiling, (target,))
+            return [path.candidate for path in solved.paths(target)]
 
     def _before(self, targets: frozenset[ExitTarget], shape: Shape) -> GridHierarchy | None:
         """The finest hierarchy on fewer nodes that was solved for the fewest other targets."""
@@ -173,7 +183,7 @@ class HierarchySearch:
         if before is not None:
             return (before.intervals,)
         attractor = self.problem.attractor
-        return (1, attractor.period) if self.unfolding and attractor.is_fixed and attractor.period > 1 else (1,)
+        return (1, attractor.period) if attractor.is_fixed and attractor.period > 1 else (1,)
 
     def _coarser(
         self, steps: int, targets: Sequence[ExitTarget], shape: Shape, intervals: int, ceiling: float
@@ -200,9 +210,14 @@ class HierarchySearch:
 
     def _closer(self, solved: SolvedGrid, targets: Sequence[ExitTarget], most: float) -> SolvedGrid:
         """Solve on as many nodes around what lies below the costliest exit, if that is at most a part of the area."""
-        grids, ceiling = solved.potential.grids, _ROOM * solved.highest(targets)
-        zoomed = grids.zoomed(self._before_exit(solved, ceiling, targets))
-        return solved if zoomed.area > most * grids.area else self._solved(zoomed, ceiling, targets)
+        grids, ceiling = self._around(solved, targets)
+        too_large = grids.area > most * solved.potential.grids.area
+        return solved if too_large else self._solved(grids, ceiling, targets)
+
+    def _around(self, solved: SolvedGrid, targets: Sequence[ExitTarget]) -> tuple[Grids, float]:
+        """Grids around what lies below the costliest exit, and a ceiling for V on them."""
+        ceiling = _ROOM * solved.highest(targets)
+        return solved.potential.grids.zoomed(self._before_exit(solved, ceiling, targets)), ceiling
 
     def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it."""

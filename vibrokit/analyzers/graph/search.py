@@ -120,7 +120,7 @@ class GraphSearch:
                 "the structure on a wider region."
             )
         with stage("exit targets", subject=attractor.name):
-            search = self._hierarchies(problem, self.nodes)
+            search = self._hierarchies(problem)
             targets = exit_targets(problem, search.model)
         known, refinements = _Known(), list(self._refinements())
         for number, nodes in enumerate(refinements, start=1):
@@ -139,16 +139,14 @@ class GraphSearch:
     def beginnings(
         self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
     ) -> tuple[Candidate, ...]:
-        """Return candidates that begin otherwise than a known path, on two thirds of the nodes of a solution."""
-        nx, nv = solved.potential.grids.shape
-        nodes = max(_FEWEST_NODES, 2 * nx // 3), max(_FEWEST_NODES, 2 * nv // 3)
-        return beginnings(problem, self._hierarchies(problem, nodes, unfolding=False), energy)
+        """Return candidates that begin otherwise than a known path, from a closer look at where a solution has it."""
+        return beginnings(problem, self._hierarchies(problem), solved.potential, energy)
 
-    def _hierarchies(self, problem: ExitProblem, finest: tuple[int, int], *, unfolding: bool = True) -> HierarchySearch:
-        """What solves hierarchies of up to so many nodes."""
+    def _hierarchies(self, problem: ExitProblem) -> HierarchySearch:
+        """What solves hierarchies of up to the nodes that are set."""
         steps = self._affordable_steps(problem.scene)
         model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-        return HierarchySearch(problem, model, steps, finest, unfolding)
+        return HierarchySearch(problem, model, steps, self.nodes)
 
     def _refinements(self) -> Iterator[tuple[int, int]]:
         """Numbers of nodes from few to those that are set, each twice the one before."""
