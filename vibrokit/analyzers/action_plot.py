@@ -16,7 +16,8 @@ from vibrokit.results.result import Result
 class ActionPlot(Shooting, Analyzer):
     """Actions of extremal paths that leave an attractor, as upper bounds of its activation energies.
 
-    `Shooting` describes the method and its settings; `Analyzer` has those that all methods share.
+    `Shooting` describes the method and its settings; `Analyzer` has those that all methods share. The `tolerance` is
+    1e-4 by default, since the actions are not polished.
 
     Each energy is the least action found for its target, bounded above by the value and its numerical error. The error
     covers what the last refinement rounds (for the ring: a quarter of its points) and finer steps change, and the time
@@ -24,6 +25,8 @@ class ActionPlot(Shooting, Analyzer):
     """
 
     result: ClassVar[type[Result]] = ActionPlotResult
+
+    tolerance: float = 1e-4
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Search the exit paths from one attractor."""

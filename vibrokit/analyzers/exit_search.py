@@ -117,7 +117,7 @@ class ExitSearch:
 
     def approach(self) -> None:
         """Polish where a chaotic attractor comes nearest to a saddle, for exits that the graph gave no path to."""
-        reached = {branch.target for branch in self._polished()[0]}
+        reached = () if self.graph is None else {candidate.target for candidate in self.graph.candidates}
         with stage(closest_approach.FINDER, subject=self.problem.attractor.name):
             found = [each for each in closest_approach.closest_approaches(self.problem) if each.target not in reached]
         if found:

@@ -38,6 +38,7 @@ SHOOTINGS = (
     Shooting(points=6_000),
     Shooting(rounds=0),
     Shooting(),
+    Shooting(tolerance=1e-4),
 )
 GRAPHS = (
     *(GraphSearch(nodes=(80, 80), steps_per_period=steps) for steps in (4, 8, 16)),
