@@ -112,22 +112,20 @@ def _visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[_Visit
 
 def _linear_level(model: StepModel, grids: Grids, visits: list[_Visit], level: float) -> float:
     """Lower a level until the motion on its ellipses is linear in every step; 0 if it never is."""
+    levels = level * _LOWER ** np.arange(_LOWERINGS)
     angles = np.linspace(0, 2 * np.pi, _ANGLES, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)])
-    for _ in range(_LOWERINGS):
-        worst = 0.0
-        for visit, after in zip(visits, [*visits[1:], visits[0]], strict=True):
-            offset = (np.linalg.cholesky(2 * level * visit.covariance) @ circle).T
-            images = model.images(visit.point + offset, grids.time(visit.phase), grids.step)
-            deviation = images - after.point - offset @ visit.slope.T
-            size = np.linalg.norm(
-                np.linalg.solve(np.linalg.cholesky(2 * level * after.covariance), deviation.T), axis=0
-            )
-            worst = max(worst, float(np.where(np.isfinite(size), size, np.inf).max()))
-        if worst <= _NONLINEAR:
-            return level
-        level *= _LOWER
-    return 0.0
+    sizes = np.sqrt(2 * levels)[:, None, None]
+    worst = np.zeros(_LOWERINGS)
+    for visit, after in zip(visits, [*visits[1:], visits[0]], strict=True):
+        offsets = sizes * (np.linalg.cholesky(visit.covariance) @ circle).T  # (levels, angles, 2)
+        states = visit.point + offsets
+        images = model.images(states.reshape(-1, 2), grids.time(visit.phase), grids.step).reshape(states.shape)
+        deviations = (images - after.point - offsets @ visit.slope.T) / sizes
+        distances = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(after.covariance), deviations.mT), axis=1)
+        worst = np.maximum(worst, np.where(np.isfinite(distances), distances, np.inf).max(axis=1))
+    linear = worst <= _NONLINEAR
+    return float(levels[np.argmax(linear)]) if linear.any() else 0.0
 
 
 def _dense(curve: Array, grids: Grids) -> Array:
