@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -65,6 +66,17 @@ class LinearizedAtNodes(LinearizedOrbit):
 
     def step(self, phase: int) -> Array:
         return extended(self.linear.derivatives[self.node(phase)], self.linear.covariances[self.node(phase)])
+
+    def carried(self, phase: int, *, leaving: bool) -> Array:
+        return (self._carried_leaving if leaving else self._carried_approaching)[self.node(phase)]
+
+    @cached_property
+    def _carried_leaving(self) -> list[Array]:
+        return [super(LinearizedAtNodes, self).carried(node, leaving=True) for node in range(len(self.states))]
+
+    @cached_property
+    def _carried_approaching(self) -> list[Array]:
+        return [super(LinearizedAtNodes, self).carried(node, leaving=False) for node in range(len(self.states))]
 
     def nearest(self, states: Array, phases: NDArray[np.intp]) -> tuple[Array, Array]:
         places = (phases[:, None] + np.arange(0, len(self.states), self.propagator.pieces)) % len(self.states)

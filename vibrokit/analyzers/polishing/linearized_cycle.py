@@ -64,7 +64,8 @@ class LinearizedCycle(LinearizedOrbit):
         return 0
 
     def along(self, first: int, count: int) -> Array:
-        return np.array([self._from_node(phase)[1].images[0] for phase in range(first, first + count)])
+        states = [self._from_node(phase)[1].images[0] for phase in range(first, first + count)]
+        return np.array(states).reshape(count, self.states.shape[1])
 
     def unstable_at(self, phase: int) -> Array:
         return self._carried(self.unstable, phase)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from typing import ClassVar, Self
 
 import numpy as np
@@ -133,27 +135,36 @@ class LinearizedOrbit(ABC):
         """Return the derivatives (n, 2n) of the misfit in the point over `scale`."""
         return self.conditions(phase, scale, leaving=leaving)
 
-    def continued(self, point: Array, phase: int, count: int) -> Array:
-        """Return (q, p) at `count` nodes that continue a path after a point, or before it if negative.
+    def carried(self, phase: int, *, leaving: bool) -> Array:
+        """Return how the piece that begins at a phase carries offsets (n, n), in the bases of their space."""
+        before, after = self.space_at(phase, leaving=leaving), self.space_at(phase + 1, leaving=leaving)
+        sizes = np.linalg.norm(after, axis=0)
+        shares: Array = np.linalg.lstsq(after / sizes, self.step(phase) @ before)[0] / sizes[:, None]
+        return shares
 
-        The point (2n,) is in the stable space to continue after it, in the unstable space to continue before it.
+    def offsets(self, point: Array, phase: int, sign: int) -> Iterator[Array]:
+        """Yield offsets (2n,) from the orbit at the nodes that follow on a point (2n,), by the linearized equations.
+
+        The point is in the stable space to go on after it (sign 1), in the unstable space to go back (sign −1).
         """
-        sign = 1 if count > 0 else -1
-        offset, nodes = point - self.point(phase), []
-        for number in range(1, abs(count) + 1):
-            there = phase + sign * number
-            if sign > 0:
-                basis, image = self.stable_at(there), self.step(there - 1) @ offset
-                shares = np.linalg.lstsq(basis, image)[0]
-            else:
-                basis = self.unstable_at(there)
-                ahead = self.step(there) @ basis
-                sizes = np.linalg.norm(ahead, axis=0)
-                shares = np.linalg.lstsq(ahead / sizes, offset)[0] / sizes
+        leaving = sign < 0
+        basis = self.space_at(phase, leaving=leaving)
+        sizes = np.linalg.norm(basis, axis=0)
+        shares = np.linalg.lstsq(basis / sizes, point - self.point(phase))[0] / sizes
+        while True:
             shares[: self.neutral] = 0.0  # what is not in the space would not decay
-            offset = basis @ shares
-            nodes.append(self.point(there) + offset)
-        return np.array(nodes[::sign]).reshape(abs(count), len(point))
+            carried = self.carried(min(phase, phase + sign), leaving=leaving)
+            shares = np.linalg.solve(carried, shares) if leaving else carried @ shares
+            phase += sign
+            yield self.space_at(phase, leaving=leaving) @ shares
+
+    def continued(self, point: Array, phase: int, count: int) -> Array:
+        """Return (q, p) at `count` nodes that continue a path after a point (2n,), or before it if negative."""
+        sign = 1 if count > 0 else -1
+        offsets = list(itertools.islice(self.offsets(point, phase, sign), abs(count)))[::sign]
+        nodes = np.array(offsets).reshape(abs(count), len(point))
+        nodes[:, : len(point) // 2] += self.along(phase + min(count, 1), abs(count))
+        return nodes
 
     def missing(self, points: Array, phase: int, sign: int, radius: float, grain: int) -> int:
         """Return how many nodes to add for a path to start or end within a radius in (x, v); negative: to drop.
@@ -167,16 +178,15 @@ class LinearizedOrbit(ABC):
         outside = np.linalg.norm(points[::grain, :2] - orbit[:, :2], axis=1) > radius
         if not outside[0]:
             return -grain * (int(np.argmax(outside)) - 1)
-        added, point = 0, points[0]
-        distance = float(np.linalg.norm((point - self.point(phase))[:2]))
+        distance = float(np.linalg.norm(points[0, :2] - orbit[0, :2]))
         most = _PATIENCE * (math.log(distance / radius) / self.slowest_rate + self.period_nodes)
-        while np.linalg.norm((point - self.point(phase + sign * added))[:2]) > radius:
+        offsets = itertools.islice(self.offsets(points[0], phase, sign), grain - 1, None, grain)
+        for added, offset in zip(itertools.count(grain, grain), offsets, strict=False):
+            if np.linalg.norm(offset[:2]) <= radius:
+                return added
             if added > most:
-                raise StructureError(
-                    f"the path does not approach its orbit: after {added} nodes more it is still farther than "
-                    f"{radius:.1e} away."
-                )
-            nodes = self.continued(point, phase + sign * added, sign * grain)
-            point = nodes[-1] if sign > 0 else nodes[0]
-            added += grain
-        return added
+                break
+        raise StructureError(
+            f"the path does not approach its orbit: after {added} nodes more it is still farther than {radius:.1e} "
+            "away."
+        )
