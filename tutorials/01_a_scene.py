@@ -36,8 +36,8 @@ osc = vk.Oscillator(
 
 assert osc == vk.load_scene("hertz-0.570")
 
-# Every parameter has a path. `replace` returns a new oscillator with some of them changed. The end of a path is enough
-# if only one path ends so, and fields of the scene can be given by name.
+# Every parameter has a dotted name, its path. `replace` returns a new oscillator with some of them changed. An
+# unambiguous ending of the name is enough. Fields of the scene can be given by name, too.
 
 for path, value in osc.parameters.items():
     print(f"{path:<28} {value:g}")

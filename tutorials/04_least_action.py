@@ -42,8 +42,8 @@ print(f"    p₂ equals 4ζω_n v along the path, within {along:.0e} of its maxi
 # 2. The clear-running and the hammering state
 #
 # With forcing there is no such formula. `LeastAction` searches exit paths by two independent methods, a graph search
-# over the section and shooting, and polishes each path. By default it uses both, with more nodes than here; a graph of
-# 160 × 160 nodes is sufficient for a first answer. The status lists the findings as sentences.
+# over the section and shooting, and polishes each path. By default it uses both. Here the graph search alone, on
+# 160 × 160 nodes, is sufficient for a first answer. The status lists the findings as sentences.
 
 osc = vk.load_scene("hertz-0.570")
 structure = vk.find_structure(osc, cells=(100, 100), rng=0)

@@ -75,9 +75,9 @@ for rate, by_formula in zip(left_rates, kramers, strict=True):
 # ---------------------------------------------------------------------------------------------------------------------
 # 4. The committor and the mean exit time
 #
-# A rate belongs to the attractor as a whole. For one start, `committor` has the probability to reach the other core
-# before its own, and `mean_exit_time` the mean time until the exit. From the saddle of this well both cores are
-# equally likely by symmetry, so that the mean time is half that of the attractor.
+# A rate belongs to the attractor as a whole. For one start, `committor` is the probability to reach the core (a central
+# ellipse) of the other well before that of its own, and `mean_exit_time` the mean time until the exit. From the saddle
+# of this well both cores are equally likely by symmetry, so that the mean time is half that of the attractor.
 
 place = {"x": saddle.points[0][0], "v": saddle.points[0][1]}
 at_saddle = result.committor("left-rest").interp(place).values
@@ -105,8 +105,8 @@ print(f"limit D → 0: {limit.value:.4f}, between {limit.lower:.4f} and {limit.u
 # `evolve_density` carries any density to later times. Here it starts as a uniform density, as in the paper, on the
 # scene with two stops. Noise of D = 10⁻⁴ is five times that of the scene; weaker noise has narrower densities, which
 # need more nodes and time. A finding reports what truncation on so few nodes would have changed in the probability. The
-# comparison is with 20 000 simulated trajectories: of their distribution function and the exact one, the largest
-# difference is below 0.013 in 99.8 % of cases.
+# comparison is with 20 000 simulated trajectories: their distribution function differs from the exact one by less than
+# 0.013 with probability 99.8 %.
 
 osc = vk.load_scene("hertz-0.570").replace({"noise.intensity": 1e-4})
 box = np.array([[-0.4, 0.4], [-0.4, 0.4]])

@@ -61,8 +61,8 @@ print(f"D = 0.03: {remaining:.3f} of the walkers have not left after the mean ti
 #
 # The slope of ln τ against 1/D tends to the activation energy as D → 0. `arrhenius` fits a straight line. The slopes
 # between neighbouring intensities show whether the line is straight; if they change by more than their errors, a
-# finding reports it and no energy is given. The bounds of the energy include a change of the prefactor with D as in the
-# formula below. At weaker damping the prefactor may change more.
+# finding reports it and no energy is given. The bounds of the energy allow for a prefactor proportional to D, as at
+# weak damping.
 
 fit = direct.arrhenius("left-rest")
 slopes, slope_errors = fit.local_slopes
@@ -97,9 +97,9 @@ for rate in direct.rates:
 # 4. Splitting
 #
 # At D = 0.01 the mean time is e²² s. Splitting does not wait for it. It follows excursions from the core, replaces
-# those that came least far by copies of those that came farther, and repeats this until they leave. The share that is
-# kept at each level is known, and the product of these shares is the probability to leave. The estimate is unbiased;
-# independent replicas give its error.
+# those with the least progress by copies of others, restarted where these had made more progress, and repeats this
+# until all leave. The fraction that is kept at each level is known, and the product of these fractions is the
+# probability to leave. The estimate is unbiased; independent replicas give its error.
 
 split = vk.MFET(source="left-rest", intensities=(0.01,), target_error=0.15).run(well, two_wells)
 (rare,) = split.rates

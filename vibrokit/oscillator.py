@@ -237,7 +237,7 @@ def _advice(stepper: Stepper) -> str:
 
 
 def seed_from(rng: int | np.random.Generator) -> int:
-    """Return the seed of a family of random streams, one per trajectory (`rng` as in SPEC 7)."""
+    """Return the seed of a family of random streams, one per trajectory."""
     return int(generator_from(rng).integers(2**63))
 
 

@@ -20,8 +20,9 @@ class ActionPlot(Shooting, Analyzer):
     1e-4 by default, since the actions are not polished.
 
     Each energy is the least action found for its target, bounded above by the value and its numerical error. The error
-    covers what the last refinement rounds (for the ring: a quarter of its points) and finer steps change, and the time
-    between the last two exit tests. The lower bound is 0, because shooting excludes no cheaper path.
+    is the sum of the change over the last refinement rounds (without refinement: with a quarter of the starts), the
+    change with finer steps, and the action between the last two exit tests. The lower bound is 0, because shooting
+    excludes no cheaper path.
     """
 
     result: ClassVar[type[Result]] = ActionPlotResult

@@ -21,7 +21,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import NOT_FOLLOWED
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding, check_findings
@@ -252,10 +252,10 @@ class Analyzer(ABC):
                     f"{method} returned the source {shown(energy.source)}; it must be {problem.source}, the label of "
                     "the attractor that it was given."
                 )
-            if energy.target not in range(NOT_FOLLOWED, len(attractors)):
+            if energy.target not in range(ESCAPED, len(attractors)):
                 raise ValueError(
                     f"{method} returned the target {shown(energy.target)}; it must be the label of an attractor, 0 to "
-                    f"{len(attractors) - 1}, or -1 for an exit that is no attractor."
+                    f"{len(attractors) - 1}, or -1 for another exit, -2 for escape."
                 )
             if not energy.value >= 0:
                 raise ValueError(f"{method} returned the energy {shown(energy.value)}; it must be 0 or positive.")

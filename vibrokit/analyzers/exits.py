@@ -108,8 +108,8 @@ class LeaveBasin(Exit):
     ----------
     for_good : bool
         Whether a state at finite noise has left only when it has settled around another attractor. Otherwise it has
-        left at its first section point in another basin. Where that basin has thin arms, noise soon throws the state
-        back, and the rate is several times as large. The activation energy is the same.
+        left at its first section point in another basin. Where that basin has thin arms, noise often brings the state
+        back, so that this rate is larger. The activation energy is the same.
     to : int or str, optional
         Label or name of the attractor that must be reached; by default any other. Motion on a third attractor goes on.
         It serves states that noise exchanges quickly: together they are metastable, and only leaving all of them
@@ -164,7 +164,7 @@ class LeaveBasin(Exit):
         return Stop().with_cells(basins.region.bounds, labels, home=source)
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
-        """The saddles on basin boundaries, those of this basin first, and basins that none of these leads to."""
+        """The saddles on basin boundaries, this basin's first; then target basins to which none of its own leads."""
         own, others = [], []
         wanted = [attractor.label for attractor in self.targets(structure, source)]
         # Without a wanted one, motion that leaves the region counts too. What did not settle is no exit.

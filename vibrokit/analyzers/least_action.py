@@ -42,7 +42,7 @@ class LeastAction(Analyzer):
 
     For a chaotic attractor, and for a chaotic set on its basin boundary, the graph bounds the energy from below, and
     paths from or to unstable orbits inside it bound it from above. Where the graph gives no path from a chaotic
-    attractor, the candidates go from where it comes closest to a saddle to that saddle.
+    attractor, candidates follow the attractor until it is closest to a saddle and then go to that saddle.
 
     Parameters
     ----------
@@ -51,10 +51,9 @@ class LeastAction(Analyzer):
     graph : GraphSearch, optional
         The other one; None to do without.
     accuracy : float
-        The graph is refined, up to its `nodes`, until its error is at most this fraction of each energy,
-        except of those to attractors that are reached only through other basins, and of those that even its finest
-        grid could not resolve.
-        The energies themselves are far more accurate; this is how far below them a cheaper path is not excluded.
+        The graph is refined, up to its `nodes`, until its error is at most this fraction of each energy, except
+        energies of exits that pass through other basins or that even the finest grid cannot resolve. The energies are
+        far more accurate; this limits the gap from an energy to its lower bound.
     orbits : int
         Number of unstable orbits inside a chaotic attractor that paths are polished from.
     source : int or str, optional

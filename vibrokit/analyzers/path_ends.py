@@ -13,7 +13,7 @@ class PathEnd(ABC):
     Attributes
     ----------
     targets : tuple of int
-        Labels of the attractors that are reached from there; −1 for an exit that is no attractor.
+        Labels of the attractors that are reached from there; −1 for another exit, −2 for escape.
     """
 
     targets: tuple[int, ...]

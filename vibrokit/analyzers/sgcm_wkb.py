@@ -69,8 +69,8 @@ class SGCM(Analyzer):
     -----
     A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
     reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Their difference is its error estimate, with a share of what halving the steps, or another sample, changes. An
-    activation energy is the limit of D ln τ as D → 0, fitted to the mean times τ at all intensities.
+    Its error estimate is their difference, plus a fraction of the change with half the steps (or with a new sample),
+    plus the iteration error. An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
     1990), without its matrix of sampled transitions, which cannot contain a probability of 1e-9.

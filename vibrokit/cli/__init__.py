@@ -80,8 +80,9 @@ def _parser() -> argparse.ArgumentParser:
         help="a setting of the analyzer, or of a part of it: graph.nodes=240,240, shooting=none, source=clear",
     )  # fmt: skip
     run.add_argument(
-        "--stepper", metavar="NAME[:NUMBER]", help="rk4:STEPS, rk8:STEPS, order8:TOLERANCE or free-flight:TOLERANCE"
-    )
+        "--stepper", metavar="NAME[:NUMBER]",
+        help="rk4:STEPS, rk8:STEPS, rkn12:STEPS, order8:TOLERANCE or free-flight:TOLERANCE",
+    )  # fmt: skip
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
     run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
     run.add_argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")

@@ -33,9 +33,9 @@ _LOWEST = -1e6  # in place of −inf where ln p is interpolated
 class StationaryDensity:
     """Stationary probabilities of all attractors and the density on the section, at finite noise.
 
-    The exit rates W between the attractors balance: for two attractors W_IN P_I = W_NI P_N. The density is the sum of
-    the quasi-stationary ones, each with the probability of its attractor. Nothing waits for relaxation between basins,
-    so that it is right also where that takes 10³⁰ periods.
+    The exit rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from
+    1 to 2. The density is the sum of the quasi-stationary ones, each with the probability of its attractor. Nothing
+    waits for relaxation between basins, so that it is right also where that takes 10³⁰ periods.
 
     Attributes
     ----------
@@ -163,7 +163,8 @@ class StationaryDensity:
 def occupancies(result: RatedResult) -> xarray.DataArray:
     """Return the stationary probability of each attractor, over (intensity, attractor), from rates alone.
 
-    The rates W between the attractors balance: for two attractors W_IN P_I = W_NI P_N.
+    The rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from 1
+    to 2.
 
     Raises
     ------

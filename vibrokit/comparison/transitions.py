@@ -57,9 +57,9 @@ class Transitions:
     """Activation energies between all attractors, and the long-term behaviour under weak noise that follows from them.
 
     For D → 0 the motion jumps from attractor i to attractor j at rates like exp(−V_ij/D), and the stationary weight of
-    attractor i goes like exp(−(W_i − min W)/D). W_i is the least sum of V over the graphs that lead from every other
-    attractor to i (Freidlin and Wentzell, Random Perturbations of Dynamical Systems, 3rd ed., Springer 2012,
-    chapter 6). Both are exponents only: the prefactors are not known here.
+    attractor i goes like exp(−w_i/D). w_i is the least sum of V over the graphs that lead from every other attractor to
+    i, minus the smallest such sum of all attractors (Freidlin and Wentzell, Random Perturbations of Dynamical Systems,
+    3rd ed., Springer 2012, chapter 6). Both are exponents only: the prefactors are not known here.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Transitions:
 
     @cached_property
     def weights(self) -> Array:
-        """Exponents W_i − min W of the stationary weights (m² s⁻³): 0 for the most stable, NaN where not known.
+        """Exponents w_i of the stationary weights (m² s⁻³): 0 for the most stable, NaN where not known.
 
         Infinite for an attractor that is not reached.
         """
@@ -256,7 +256,7 @@ class Transitions:
 
     @cached_property
     def _differences(self) -> tuple[Array, Array]:
-        """Bounds of W_i − W_j, shape (count, count) each, 0 on the diagonal."""
+        """Bounds of w_i − w_j, shape (count, count) each, 0 on the diagonal."""
         shape = (len(self.names),) * 2
 
         def both(energies: Array) -> tuple[Array, Array]:

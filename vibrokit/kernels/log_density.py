@@ -1,7 +1,7 @@
 """One step of the Fokker–Planck equation for φ = ln p on the nodes of a grid in (x, v).
 
-A step is the flow without noise, φ(F(y)) = φ(y) − ln |det F′(y)|, followed by diffusion in v. Both are exact where φ is
-a quadratic form: the flow interpolates with quintics, and the diffusion is a Gaussian integral in closed form. So
+A step is the flow without noise, ``φ(F(y)) = φ(y) − ln |det F′(y)|``, followed by diffusion in v. Both are exact where
+φ is a quadratic form: the flow interpolates with quintics, and the diffusion is a Gaussian integral in closed form. So
 densities of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no density is added to a larger one.
 
 Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) polynomials

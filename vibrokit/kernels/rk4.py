@@ -21,9 +21,9 @@ class RK4(FixedSteps):
     noise, which need many trajectories at moderate accuracy; choose `RKN12` or `RK8` where there are no stops, and
     `FreeFlight` or `Order8` for orbits and certificates, and wherever a contact is shorter than a few steps.
 
-    Derivatives of momenta jump where those of a contact force do: at linear stops, and where a law that would pull is
-    cut. Steps across such a contact miss it, by a term proportional to p₂. So they are right along the motion without
-    noise, where p = 0, and wrong along any other path.
+    Derivatives of momenta jump where the derivative of a contact force jumps: at linear stops, and where a pulling
+    force is set to zero. Fixed steps miss this jump, which is proportional to p₂. Across such a contact, the
+    derivatives are then correct without noise, where p = 0, and wrong on any other path.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ class Severity(StrEnum):
 
 INFO, WARNING, ERROR = Severity
 _SEE_REASON = "The reason says what to change."
-_RAISE_BUDGET = "Raise the budget."
+_RAISE_BUDGET = "Raise budget, an argument of find_structure."
 _FINER_STEPPER = "Use a finer stepper."
 
 
@@ -96,7 +96,7 @@ class Code(StrEnum):
         "coarse-grid", INFO,
         "The basins have {nx} × {nv} cells: transients are long, and a finer grid would take some {sections:.1e} "
         "section-map iterations.",
-        "Give cells for a finer one.",
+        "Set cells, an argument of find_structure, for a finer grid.",
     )  # fmt: skip
     SADDLES = "saddles", INFO, "Unstable orbits on basin boundaries: {count}."
     BOUNDARIES_SKIPPED = (
@@ -170,7 +170,7 @@ class Code(StrEnum):
     )  # fmt: skip
     NO_EXIT_FOUND = (
         "no-exit-found", ERROR, "No exit path from {state} was found.",
-        "Raise the budget or the number of points, or widen the region.",
+        "Raise the action plot's budget or points, or find the structure on a wider region.",
     )  # fmt: skip
     METHOD_FAILED = "method-failed", WARNING, "The {method} could not be used for {state}: {reason}", _SEE_REASON
 
@@ -203,7 +203,9 @@ class Code(StrEnum):
         "checkpoint-not-written", WARNING, "The checkpoint {path} could not be written: {reason}",
         "Free some space, or choose another place.",
     )  # fmt: skip
-    INTENSITY_FAILED = "intensity-failed", WARNING, "{state} at D = {intensity:g}: {reason}", _SEE_REASON
+    INTENSITY_FAILED = (
+        "intensity-failed", WARNING, "{state} could not be simulated at D = {intensity:g}: {reason}", _SEE_REASON,
+    )  # fmt: skip
     NO_EXIT_SEEN = (
         "no-exit-seen", WARNING,
         "No walker left {state} at D = {intensity:g}: with 95 % confidence the mean exit time is above {time:.3g} s.",
@@ -216,8 +218,8 @@ class Code(StrEnum):
     )  # fmt: skip
     TARGET_NOT_METASTABLE = (
         "target-not-metastable", WARNING,
-        "Only {share:.0%} of the motion that begins on {goal} is still there after some relaxation times at "
-        "D = {intensity:g}: arrivals from {state} do not stay.", "Lower the noise intensity.",
+        "Only {share:.0%} of the walkers started on {goal} are still there after five relaxation times at "
+        "D = {intensity:g}: exits from {state} to it are not permanent.", "Lower the noise intensity.",
     )  # fmt: skip
     NOT_EXPONENTIAL = (
         "not-exponential", WARNING,
@@ -268,8 +270,8 @@ class Code(StrEnum):
     )  # fmt: skip
     RATE_UNKNOWN = (
         "rate-unknown", WARNING,
-        "The rate from {state} to {goal} at D = {intensity:g} is not known: the outflow did not become steady above "
-        "the numerical errors.", "Raise the number of nodes or of steps, or the noise intensity.",
+        "The rate from {state} to {goal} at D = {intensity:g} is not known: the outflow did not become steady or is "
+        "below the numerical errors.", "Raise the number of nodes or of steps, or the noise intensity.",
     )  # fmt: skip
 
     # Polishing
@@ -320,8 +322,9 @@ class Code(StrEnum):
     )  # fmt: skip
     FLAT_VALLEY = (
         "flat-valley", INFO,
-        "The stable and unstable manifolds of the best path from {state} meet at a sine of only {sine:.1e}: the action "
-        "hardly changes along a family of paths.", "At finite noise the whole family carries exits.",
+        "On the cheapest path from {state}, the unstable manifold of its start and the stable manifold of its end meet "
+        "at an angle with a sine of only {sine:.1e}: the action hardly changes along a family of paths.",
+        "At finite noise the whole family carries exits.",
     )  # fmt: skip
     CHAOTIC_SOURCE = (
         "chaotic-source", INFO,

@@ -79,7 +79,7 @@ class ExitPath:
 class Certificate:
     """Evidence for a polished exit path: how well it solves its equations, and how the action depends on the settings.
 
-    A path of several legs has the weakest evidence of all.
+    For a path of several legs, each is the worst value of all legs; changes and lengths are summed.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Certificate:
 
     @classmethod
     def combined(cls, legs: Sequence[Certificate]) -> Certificate:
-        """Return the evidence for a path of several legs: the weakest of all, and the sizes of the changes added."""
+        """Return the evidence for a path of several legs: the worst values, and the sums of changes and lengths."""
         changes = {
             name: sum(abs(getattr(leg, name)) for leg in legs) for name in ("by_start", "by_length", "by_stepper")
         }
@@ -139,7 +139,7 @@ class ActivationEnergy:
     Attributes
     ----------
     source, target : int
-        Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor.
+        Labels of the attractor that is left and of the one that is reached; −1 for another exit, −2 for escape.
     value : float
         ΔU, in units of action (m² s⁻³).
     lower, upper : float
@@ -215,7 +215,7 @@ _EVIDENCE: dict[str, Field] = {
 }
 _FIELDS: dict[str, Field] = {
     "source": Whole("label of the attractor that is left"),
-    "target": Whole("label of the attractor that is reached; -1 for an exit that is no attractor", low=NOT_FOLLOWED),
+    "target": Whole("label of the attractor that is reached; -1 for another exit, -2 for escape", low=NOT_FOLLOWED),
     "value": Number("activation energy", _ACTION),
     "lower": Number("lower bound of the activation energy", _ACTION),
     "upper": Number("upper bound of the activation energy", _ACTION),

@@ -40,7 +40,7 @@ def save_record(record: Record, path: str | os.PathLike[str]) -> None:
 
 
 def load_result(path: str | os.PathLike[str]) -> Any:
-    """Open a saved record: a `Result`, a `Structure` or a `Continuation`.
+    """Open a saved `Record`, such as a `Result` or a `Structure`.
 
     Parameters
     ----------

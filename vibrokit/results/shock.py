@@ -17,7 +17,7 @@ class Shock:
     source, target : int
         Labels of the attractor whose state changes, and of the attractor that is reached.
     size : float
-        √((ω_n Δx)² + Δv²) (m s⁻¹); |Δv| for a change of velocity alone.
+        √((ω_n Δx)² + Δv²) (m s⁻¹); ``|Δv|`` for a change of velocity alone.
     error : float
         How much smaller the smallest one may be: the last step of the search (m s⁻¹).
     kick : array (2,)

@@ -36,10 +36,10 @@ def find_structure(
     """Find the steady states of the noise-free system, their basins, the saddles between them and their manifolds.
 
     Starts on a grid are followed until they recur; each orbit is refined by Newton's method on the variational
-    equations. Motion that does not recur is watched at two accuracies of integration, and is an attractor only if it
-    survives both; its largest Lyapunov exponent determines its kind. The watch ends when the survivors together have
-    gone on for 200000 periods since the last start settled, or after 20000 periods. Basins are found on a grid,
-    saddles by tracking the basins' boundaries, manifolds from the saddles.
+    equations. Motion that does not recur is followed at two accuracies of integration, until the survivors together
+    have gone on for 200000 periods since the last start settled, or for 20000 periods each. It is an attractor only if
+    it survives both; its largest Lyapunov exponent determines its kind. Basins are found on a grid, saddles by tracking
+    the basins' boundaries, manifolds from the saddles.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If no attractor
     is known by then, KeyboardInterrupt is raised.
@@ -53,7 +53,7 @@ def find_structure(
         that ends at a copy of an attractor elsewhere has then left the region.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
-        are so long that the next finer grid would take more than 5 · 10⁶ sections.
+        are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map.
     refine : int
         How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional

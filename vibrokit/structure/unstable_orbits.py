@@ -54,8 +54,8 @@ def unstable_orbits(
 ) -> tuple[Saddle, ...]:
     """Find the unstable orbits of one period: saddles, flip saddles and repellers, inside basins and between them.
 
-    Newton's method with damped steps starts from a grid, and from the cells of a grid eight times as fine at whose
-    corners the map moves x in both directions and v as well. These find saddles that few starts converge to, such as
+    Newton's method with damped steps starts from a grid, and from those cells of an eight times finer grid at whose
+    corners the map's shifts of x and of v both change sign. These find saddles that few starts converge to, such as
     those created at grazing. The derivative is that of the variational equations; what it converges to is refined with
     located contacts. There is no guarantee that all orbits are found; more starts may find more.
 
@@ -128,7 +128,7 @@ def _turning_cells(
     stepper: Stepper,
     executor: concurrent.futures.Executor | None,
 ) -> Array:
-    """Return centres (count, 2) of cells at whose corners the map moves x in both directions, and v as well."""
+    """Return centres (count, 2) of cells at whose corners the map's shifts of x and of v both change sign."""
     axes = [np.linspace(low, high, count + 1) for (low, high), count in zip(region.bounds, cells, strict=True)]
     corners = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     states = states_at(osc, corners)
