@@ -38,14 +38,13 @@ free = vk.Oscillator(
     natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(1.0, 0.3), excitations=(vk.Harmonic(0.18, 0.57),),
     noise=vk.WhiteNoise(intensity=1e-4),
 )
-cases = [(smooth, vk.RK4(128)), (smooth, vk.RK8(64)), (free, vk.RKN12(16))]
-cases += [(jumping, vk.Order8(1e-8)), (jumping, vk.FreeFlight(1e-8))]
-flows = [Flow.STATE, Flow.STATE_VARIATIONAL, Flow.COVARIANCE_REVERSED, Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL]
+some = [Flow.STATE, Flow.HAMILTONIAN_VARIATIONAL]  # RK4 and Order8, one of each kind of driver, take every flow
+every = [Flow.STATE, Flow.STATE_VARIATIONAL, Flow.COVARIANCE_REVERSED, Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL]
+cases = [(smooth, vk.RK4(128), [*every, Flow.NOISY]), (smooth, vk.RK8(64), some), (free, vk.RKN12(16), some)]
+cases += [(jumping, vk.Order8(1e-8), every), (jumping, vk.FreeFlight(1e-8), some)]
 digests = {}
-for osc, stepper in cases:
-    for flow in flows + [Flow.NOISY] * (stepper.name == "rk4"):
-        if stepper.name == "rkn12" and flow.has_covariance:
-            continue
+for osc, stepper, flows in cases:
+    for flow in flows:
         generator = np.random.default_rng(0)
         starts = np.zeros((40, kernel_for(osc, flow, stepper).module.EQUATIONS))
         starts[:, :2] = generator.uniform(-0.6, 0.6, (40, 2))
@@ -76,7 +75,7 @@ def printed_by_two_processes(script, cache):
 
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     compiled, loaded = (json.loads(printed) for printed in printed_by_two_processes(DIGESTS, tmp_path))
-    assert len(compiled) == 25
+    assert len(compiled) == 17
     assert compiled == loaded
 
 
