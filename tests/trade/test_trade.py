@@ -80,6 +80,15 @@ def test_refusal_is_told():
     }  # fmt: skip
 
 
+def test_settings_with_which_trajectories_diverge_are_told():
+    """Steps of an eighth of a period are many times as long as a contact with this stop."""
+    osc = load_scene("hertz-0.570").replace({"barriers.0.law.stiffness": 1e6})
+    trade = measure_steppers(osc, ladders=((vk.RK8(8), vk.RK8(2048)),), **SETTINGS)
+    assert [row.stepper for row in trade.rows] == ["RK8(steps=2048)"]
+    assert list(trade.too_coarse) == ["RK8(steps=8)"]
+    assert "RK8(steps=8): not used." in str(trade)
+
+
 def test_progress_reaches_its_total():
     updates = []
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)

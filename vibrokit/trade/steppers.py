@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import StepperError
+from vibrokit.errors import IntegrationError, StepperError
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
 from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
@@ -87,6 +87,7 @@ class Trade:
     references: Mapping[str, str]  # what the errors of each stepper are distances to
     orders: Mapping[str, float]  # exponent of the error, in the step or in the tolerance, or NaN
     refused: Mapping[str, str]  # steppers that cannot integrate this scene, with the reason
+    too_coarse: Mapping[str, str]  # settings with which trajectories diverge, likewise
     checked: float  # median distance of the finest stepper to DOP853, which shares only the right-hand side with it
     starts: int
     periods: int
@@ -107,7 +108,7 @@ class Trade:
                 f"{call.name}: {self._order(call.name)}, against {self.references[call.name]}; "
                 f"first call {call.seconds:.1f} s ({source})."
             )
-        lines += [f"{name}: not used. {reason}" for name, reason in self.refused.items()]
+        lines += [f"{name}: not used. {reason}" for name, reason in (*self.refused.items(), *self.too_coarse.items())]
         lines.append(f"The reference of RK4 and SciPy's DOP853 at its finest differ by {self.checked:.1e} (median).")
         return "\n".join(lines)
 
@@ -150,6 +151,7 @@ def measure_steppers(
     states = starts_between_stops(osc, starts, np.random.default_rng(rng))
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
     rows: list[TradeRow] = []
+    too_coarse: dict[str, str] = {}
     with working(progress), stage("steppers", unit="settings"), warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose
         calls, refused = _first_calls(osc, ladders, states[:1])
@@ -157,8 +159,12 @@ def measure_steppers(
         references = _references(osc, states, periods)
         for done, stepper in enumerate(taken):
             report(1 + done, 1 + len(taken))
-            row = _row(osc, stepper, states, periods, references[type(stepper).__name__][1], seconds)
-            rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
+            try:
+                row = _row(osc, stepper, states, periods, references[type(stepper).__name__][1], seconds)
+            except IntegrationError as error:
+                too_coarse[repr(stepper)] = str(error)
+            else:
+                rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
         report(1 + len(taken))
     checked = reference_map(osc, states[:_CHECKED], periods, tolerance=TIGHTEST)
     return Trade(
@@ -167,6 +173,7 @@ def measure_steppers(
         references={name: references[name][0] for name in calls},
         orders={name: _fitted_order([row for row in rows if row.name == name], rows) for name in calls},
         refused=refused,
+        too_coarse=too_coarse,
         checked=float(np.median(np.linalg.norm(references["RK4"][1][:_CHECKED] - checked, axis=1))),
         starts=starts,
         periods=periods,
