@@ -133,7 +133,7 @@ def test_one_attractor_is_refused_in_a_sentence(well):
 def one_table(monkeypatch, tmp_path):
     """The command with small tables in place of the long ones."""
     row = TradeRow("RK4", "RK4(steps=32)", 32.0, 1e-3, 1e-3, 1e-6, 1e-5, 40.0, in_steps=True)
-    steppers = Trade((row,), (), {}, {}, {}, checked=0.0, starts=1, periods=1, threads=1)
+    steppers = Trade((row,), (), {}, {}, {}, {}, checked=0.0, starts=1, periods=1, threads=1)
     monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: steppers)
     monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
     return ["-o", str(tmp_path / "trade.png")]
