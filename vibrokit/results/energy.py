@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.basins import NOT_FOLLOWED
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.fields import (
     STATE,
     ByName,
@@ -215,7 +215,7 @@ _EVIDENCE: dict[str, Field] = {
 }
 _FIELDS: dict[str, Field] = {
     "source": Whole("label of the attractor that is left"),
-    "target": Whole("label of the attractor that is reached; -1 for another exit, -2 for escape", low=NOT_FOLLOWED),
+    "target": Whole("label of the attractor that is reached; -1 for another exit, -2 for escape", low=ESCAPED),
     "value": Number("activation energy", _ACTION),
     "lower": Number("lower bound of the activation energy", _ACTION),
     "upper": Number("upper bound of the activation energy", _ACTION),

@@ -138,9 +138,7 @@ class LinearizedOrbit(ABC):
     def carried(self, phase: int, *, leaving: bool) -> Array:
         """Return how the piece that begins at a phase carries offsets (n, n), in the bases of their space."""
         before, after = self.space_at(phase, leaving=leaving), self.space_at(phase + 1, leaving=leaving)
-        sizes = np.linalg.norm(after, axis=0)
-        shares: Array = np.linalg.lstsq(after / sizes, self.step(phase) @ before)[0] / sizes[:, None]
-        return shares
+        return _shares(after, self.step(phase) @ before)
 
     def offsets(self, point: Array, phase: int, sign: int) -> Iterator[Array]:
         """Yield offsets (2n,) from the orbit at the nodes that follow on a point (2n,), by the linearized equations.
@@ -148,13 +146,11 @@ class LinearizedOrbit(ABC):
         The point is in the stable space to go on after it (sign 1), in the unstable space to go back (sign −1).
         """
         leaving = sign < 0
-        basis = self.space_at(phase, leaving=leaving)
-        sizes = np.linalg.norm(basis, axis=0)
-        shares = np.linalg.lstsq(basis / sizes, point - self.point(phase))[0] / sizes
+        shares = _shares(self.space_at(phase, leaving=leaving), point - self.point(phase))
         while True:
             shares[: self.neutral] = 0.0  # what is not in the space would not decay
             carried = self.carried(min(phase, phase + sign), leaving=leaving)
-            shares = np.linalg.solve(carried, shares) if leaving else carried @ shares
+            shares = np.asarray(np.linalg.solve(carried, shares)) if leaving else carried @ shares
             phase += sign
             yield self.space_at(phase, leaving=leaving) @ shares
 
@@ -190,3 +186,10 @@ class LinearizedOrbit(ABC):
             f"the path does not approach its orbit: after {added} nodes more it is still farther than {radius:.1e} "
             "away."
         )
+
+
+def _shares(basis: Array, vectors: Array) -> Array:
+    """Return the coordinates (k,) or (k, count) in a basis (2n, k), whose columns may differ much in size."""
+    sizes = np.linalg.norm(basis, axis=0)
+    shares: Array = (np.linalg.lstsq(basis / sizes, vectors)[0].T / sizes).T
+    return shares
