@@ -368,6 +368,35 @@ def test_tasks_of_tasks_do_not_wait_for_themselves():
     assert list(carry(_nested, [(number,) for number in range(50)])) == [number + 1 for number in range(50)]
 
 
+class _Losing(ThreadPoolExecutor):
+    """Threads whose results are lost with one of several errors, the first times a task is submitted."""
+
+    def __init__(self, losses):
+        super().__init__(2)
+        self.losses, self.submitted = losses, {}
+
+    def submit(self, work, *task):
+        number = self.submitted[task] = self.submitted.get(task, 0) + 1
+        if number > self.losses:
+            return super().submit(work, *task)
+        lost = concurrent.futures.Future()
+        if len(self.submitted) % 2:
+            lost.cancel()
+            lost.set_running_or_notify_cancel()
+        else:
+            lost.set_exception(ValueError("lost on the way"))
+        return lost
+
+
+def test_a_lost_task_is_submitted_a_second_time():
+    tasks = [(number,) for number in range(-5, 0)]
+    with _Losing(1) as executor:
+        assert list(carry(abs, tasks, executor)) == [5, 4, 3, 2, 1]
+        assert set(executor.submitted.values()) == {2}
+    with _Losing(2) as executor, pytest.raises((concurrent.futures.CancelledError, ValueError)):
+        list(carry(abs, tasks, executor))
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_forked_process_has_threads_of_its_own():

@@ -243,15 +243,20 @@ def carry(
 
     Without an executor the threads of this process do the tasks. A single task, and those of a task that a thread
     already does, are done by the caller: handing over costs more than most of them, and a thread that waited for others
-    could wait for itself.
+    could wait for itself. A task that fails in an executor is submitted a second time: workers can be lost, also while
+    they return a result.
     """
     if executor is None and (len(tasks) == 1 or _inside.thread):
         for task in tasks:
             yield work(*task)
         return
-    pending = [(executor or _threads()).submit(_counted_apart, work, task) for task in tasks]
+    workers = executor or _threads()
+    pending = [workers.submit(_counted_apart, work, task) for task in tasks]
     try:
-        for future in pending:
+        for number, future in enumerate(pending):
+            futures.wait((future,))
+            if executor is not None and (future.cancelled() or future.exception()):
+                pending[number] = future = workers.submit(_counted_apart, work, tasks[number])
             result, counts = future.result()
             count(**counts)
             yield result
