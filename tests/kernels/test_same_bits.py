@@ -39,9 +39,9 @@ free = vk.Oscillator(
     noise=vk.WhiteNoise(intensity=1e-4),
 )
 some = [Flow.STATE, Flow.HAMILTONIAN_VARIATIONAL]  # RK4 and Order8, one of each kind of driver, take every flow
-every = [Flow.STATE, Flow.STATE_VARIATIONAL, Flow.COVARIANCE_REVERSED, Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL]
-cases = [(smooth, vk.RK4(128), [*every, Flow.NOISY]), (smooth, vk.RK8(64), some), (free, vk.RKN12(16), some)]
-cases += [(jumping, vk.Order8(1e-8), every), (jumping, vk.FreeFlight(1e-8), some)]
+every = [*some, Flow.STATE_VARIATIONAL, Flow.COVARIANCE_REVERSED, Flow.HAMILTONIAN]
+cases = [(smooth, vk.RK4(128), [*every, Flow.NOISY]), (smooth, vk.RK8(64), some[1:]), (free, vk.RKN12(16), some[1:])]
+cases += [(jumping, vk.Order8(1e-8), every), (jumping, vk.FreeFlight(1e-8), some[1:])]
 digests = {}
 for osc, stepper, flows in cases:
     for flow in flows:
@@ -75,7 +75,7 @@ def printed_by_two_processes(script, cache):
 
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     compiled, loaded = (json.loads(printed) for printed in printed_by_two_processes(DIGESTS, tmp_path))
-    assert len(compiled) == 17
+    assert len(compiled) == 14
     assert compiled == loaded
 
 

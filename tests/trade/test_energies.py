@@ -139,12 +139,16 @@ def one_table(monkeypatch, tmp_path):
     return ["-o", str(tmp_path / "trade.png")]
 
 
-def test_the_command_prints_the_table(one_table, trade, monkeypatch, capsys):
+def test_the_command_prints_the_tables(one_table, trade, monkeypatch, capsys):
     asked = []
-    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: asked.append(source) or trade)
+    tables = {"energies": trade, "densities": "of densities", "exit_times": "of exit times"}
+    for name, table in tables.items():
+        measure = f"vibrokit.trade.{name}.measure_{name}"
+        monkeypatch.setattr(measure, lambda osc, source, table=table: asked.append(source) or table)
     assert main(["trade", "double-well", "--source", "left-rest", *one_table]) == 0
-    assert str(trade) in capsys.readouterr().out
-    assert asked == ["left-rest"]
+    printed = capsys.readouterr().out
+    assert all(str(table) in printed for table in tables.values())
+    assert asked == ["left-rest"] * 3
 
 
 def test_the_command_says_why_there_is_no_table(one_table, tmp_path, capsys):
