@@ -116,11 +116,22 @@ def full_structure() -> Structure:
     two = np.array([5.0 + 0j, -0.2 + 0j])
     rates = np.log(two)
     saddles = (
-        Saddle("saddle", 1, 11.0, circle(0.2)[:1], two, rates, (0, 1), 1e-13, 1e-12),
-        Saddle("flip saddle", 2, 22.0, circle(0.3)[:2], -two, rates, (1, 1), 1e-13, 1e-12),
-        Saddle("repeller", 1, 11.0, circle(0.4)[:1], two, rates, (UNSETTLED, ESCAPED), 1e-13, 1e-12),
-        Saddle("chaotic", 0, np.nan, circle(0.35), np.empty(0, complex), np.array([0.1 + 0j]), (0, 2), np.nan, np.nan),
-        Saddle("saddle", 1, 11.0, circle(0.35)[:1], two, rates, (0, 2), 1e-13, 1e-12, embedded=True),
+        Saddle("saddle", 1, 11.0, circle(0.2)[:1], circle(0.2)[:4], two, rates, (0, 1), 1e-13, 1e-12),
+        Saddle("flip saddle", 2, 22.0, circle(0.3)[:2], circle(0.3)[:1], -two, rates, (1, 1), 1e-13, 1e-12),
+        Saddle("repeller", 1, 11.0, circle(0.4)[:1], circle(0.4)[:1], two, rates, (UNSETTLED, ESCAPED), 1e-13, 1e-12),
+        Saddle(
+            "chaotic",
+            0,
+            np.nan,
+            circle(0.35),
+            np.empty((0, 2)),
+            np.empty(0, complex),
+            np.array([0.1 + 0j]),
+            (0, 2),
+            np.nan,
+            np.nan,
+        ),
+        Saddle("saddle", 1, 11.0, circle(0.35)[:1], circle(0.35)[:1], two, rates, (0, 2), 1e-13, 1e-12, embedded=True),
     )
     manifolds = (
         Manifold(0, 0, True, 1, circle(0.5, 300), ManifoldEnd.LEAVES_REGION),

@@ -24,8 +24,8 @@ WIDE = ((-3.0, 3.0), (-3.0, 3.0))
 
 
 def saddle(*points, kind="saddle", period=1, duration=0.0):
-    nothing = np.empty(0, dtype=complex)
-    return Saddle(kind, period, duration, np.array(points, dtype=float), nothing, nothing, (0, 1), 0.0, 0.0)
+    nothing, places = np.empty(0, dtype=complex), np.array(points, dtype=float)
+    return Saddle(kind, period, duration, places, places[:1], nothing, nothing, (0, 1), 0.0, 0.0)
 
 
 def distances(points, curve):

@@ -14,11 +14,11 @@ from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
-from vibrokit.analyzers.paths import closest_approach, reversed_relaxation
+from vibrokit.analyzers.paths import closest_approach, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import usable_ends
-from vibrokit.analyzers.polishing.leg import PIECES
+from vibrokit.analyzers.polishing.leg import pieces_of
 from vibrokit.analyzers.polishing.polish import Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
@@ -75,11 +75,12 @@ class ExitSearch:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
 
     def reverse(self) -> None:
-        """Run the relaxation to an equilibrium backwards, and polish that."""
+        """Run relaxations backwards, to an equilibrium or under slow forcing, and polish these."""
         stepper = self.problem.single_stepper(Flow.STATE)
         with stage(reversed_relaxation.FINDER, subject=self.problem.attractor.name):
-            propagator = SegmentPropagator(self.problem.scene, stepper, max(PIECES))
+            propagator = SegmentPropagator(self.problem.scene, stepper, max(pieces_of(self.problem.scene)))
             found = reversed_relaxation.reversed_relaxations(self.problem, propagator)
+            found += slow_relaxation.slow_relaxations(self.problem, propagator)
         if found:
             self._polish(found)
 

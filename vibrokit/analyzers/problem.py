@@ -149,4 +149,4 @@ class ExitProblem:
             orbit = self.orbit(stepper)
         except StructureError:
             return False
-        return bool(np.abs(np.linalg.eigvals(orbit.monodromy)).max() < 1)
+        return bool(np.abs(orbit.multipliers).max() < 1)

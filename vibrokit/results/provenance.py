@@ -19,7 +19,7 @@ from vibrokit.results.finding import Finding
 if TYPE_CHECKING:
     from vibrokit.results.record import Record
 
-FORMAT = 2
+FORMAT = 3
 """Format of the files that this version writes and reads."""
 
 _NOT_FINITE = "float"  # {"float": "nan"} stands for a number that JSON does not have

@@ -23,6 +23,10 @@ class Saddle:
         Time after which it repeats (s); 0 for an equilibrium, NaN for a chaotic set.
     points : array (count, n)
         Its points on the section, in the order in which they are visited; a sample of a chaotic set.
+    nodes : array (count, n)
+        States along the orbit at equal times, the first point first. One is enough where motion from it comes back;
+        there are more where it is so unstable that rounding errors carry motion away within its duration. Empty for a
+        chaotic set.
     multipliers : complex array (n,)
         Eigenvalues of the map over one period of the orbit, the largest first; of the flow over 2π/ω_n for an
         equilibrium; empty for a chaotic set.
@@ -33,8 +37,8 @@ class Saddle:
         Labels of the attractors that the two branches of the unstable direction reach; for a chaotic set, of the two
         basins between which it was found. Negative as in `Basins.labels` where a branch does not settle.
     residual : float
-        Distance between the first point and its image after one period of the orbit, in units of the scene's motions (a
-        length and ω_n times it); NaN for a chaotic set.
+        Distance between the nodes and the images of those before them, in units of the scene's motions (a length and
+        ω_n times it); NaN for a chaotic set.
     error : float
         How far the first point moves when the integration is tightened; NaN for a chaotic set.
     embedded : bool
@@ -45,6 +49,7 @@ class Saddle:
     period: int
     duration: float
     points: NDArray[np.float64]
+    nodes: NDArray[np.float64]
     multipliers: NDArray[np.complex128]
     exponents: NDArray[np.complex128]
     leads_to: tuple[int, ...]

@@ -10,7 +10,7 @@ from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
 from vibrokit.results.basins import NOT_FOLLOWED, Basins, grid_variables, read_grid
-from vibrokit.results.fields import PLANE, Flag, Length, Number, Series, Vectors, Whole, Word
+from vibrokit.results.fields import PLANE, STATE, Flag, Length, Number, Series, Vectors, Whole, Word
 from vibrokit.results.labels import label_of
 from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record
@@ -32,7 +32,9 @@ _SADDLES = Table(
         "kind": Word("kind of the unstable orbit", known=("saddle", "flip saddle", "repeller", "chaotic")),
         "period": Whole("period in forcing periods; 0 for a chaotic set"),
         "duration": Number("time after which the motion repeats; NaN for a chaotic set", "s"),
-        **{name: ATTRACTOR_FIELDS[name] for name in ("points", "multipliers", "exponents")},
+        "points": ATTRACTOR_FIELDS["points"],
+        "nodes": Vectors(Length("node", "nodes along the orbit"), STATE),
+        **{name: ATTRACTOR_FIELDS[name] for name in ("multipliers", "exponents")},
         "leads_to": Series(
             Length("side", "sides"), "label of the attractor that each unstable branch reaches; negative as in basin",
             whole=True, low=NOT_FOLLOWED,
@@ -213,6 +215,11 @@ def _saddles(arrays: Arrays, attractors: int) -> tuple[Saddle, ...]:
             raise ResultFileError(f"a saddle leads to {values['leads_to']}, and there are {attractors} attractors")
         if len(values["points"]) == 0:
             raise ResultFileError(f"a {values['kind']} orbit has no points")
+        nodes, period = len(values["nodes"]), max(1, values["period"])
+        if values["kind"] != "chaotic" and nodes != 1 and (not nodes or nodes % period):
+            raise ResultFileError(
+                f"an orbit of period {period} has {nodes} nodes; 1 or a multiple of the period is valid"
+            )
     return tuple(saddles)
 
 

@@ -77,7 +77,7 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
     # Balanced: a stiff stop makes the rate of v huge in units of x, which would cost as many digits.
     balanced, balance = scipy.linalg.matrix_balance(jacobian, permute=False)
     monodromy = balance @ scipy.linalg.expm(balanced) @ np.linalg.inv(balance)
-    return Equilibrium(point, 1, 0.0, monodromy, float(residual))
+    return Equilibrium(point[None], 1, 0.0, monodromy[None], float(residual))
 
 
 def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
@@ -167,7 +167,7 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
             f"the residual is {residual:.1e}. The start is too far away, or the cycle is one of a family; follow the "
             "motion for longer, take a finer stepper, or give the scene damping."
         )
-    cycle = Cycle(turning_point(unknowns), 1, float(unknowns[1]), monodromy, float(residual))
+    cycle = Cycle(turning_point(unknowns)[None], 1, float(unknowns[1]), monodromy[None], float(residual))
     _check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
     return cycle
 

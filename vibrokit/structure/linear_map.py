@@ -67,15 +67,6 @@ def linear_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int 
     return LinearMap(found[:, :n], found[:, n:].reshape(count, n, n))
 
 
-def unstable_direction(osc: Oscillator, state: Array, stepper: Stepper, intervals: int = 1) -> Array | None:
-    """Return the direction (n,) in which motion grows most over some intervals; None where it diverges."""
-    (slopes,) = linear_map(osc, state[None], stepper, intervals).derivatives
-    if not np.isfinite(slopes).all():
-        return None
-    values, vectors = np.linalg.eig(slopes)
-    return np.real(vectors[:, int(np.argmax(np.abs(values)))])
-
-
 def gaussian_map(osc: Oscillator, states: Array, stepper: Stepper, intervals: int = 1, **over: Any) -> GaussianMap:
     """Linearize the flow with the covariance that noise adds; as `linear_map`, with a SceneError if there is no noise.
 

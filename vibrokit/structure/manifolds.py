@@ -204,6 +204,12 @@ def _linearised(osc: Oscillator, saddle: Saddle, place: int) -> _Linearised:
         derivative = VectorField(osc).jacobian(point)
         exponents, vectors = np.linalg.eig(derivative)
         return _Linearised(point, derivative, np.exp(duration * exponents), vectors, duration)
+    if len(saddle.nodes) > 1:
+        raise StructureError(
+            f"the orbit has the multiplier {saddle.multipliers[0].real:.2g}, so that rounding errors carry motion away "
+            "from it within its duration, and curves that grow from period to period cannot be followed. The boundary "
+            "of the basins shows its stable manifold."
+        )
     orbit = refine_orbit(osc, saddle.points[place], saddle.period, single_stepper(osc, Flow.STATE_VARIATIONAL))
     duration = saddle.period * osc.section_interval
     return _Linearised(orbit.point, orbit.monodromy, *np.linalg.eig(orbit.monodromy), duration)

@@ -83,7 +83,7 @@ def _steps(here: Evaluation) -> Array:
     """Newton steps; NaN where a Jacobian is singular or not finite."""
     steps = np.full_like(here.residuals, np.nan)
     with np.errstate(all="ignore"):
-        determinants = np.linalg.det(here.jacobians)
-    solvable = np.isfinite(determinants) & (determinants != 0)
+        signs, logarithms = np.linalg.slogdet(here.jacobians)  # the determinant of many nodes may overflow
+    solvable = np.isfinite(logarithms) & (signs != 0)
     steps[solvable] = -np.linalg.solve(here.jacobians[solvable], here.residuals[solvable, :, None])[..., 0]
     return steps

@@ -1,18 +1,22 @@
-"""Periodic orbits: Newton's method on the section map, and what is computed of every closed orbit."""
+"""Periodic orbits: Newton's method on the section map or on many nodes, and what is computed of every closed orbit."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import ClassVar
 
+import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop, run_ensemble
+from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import linear_map
@@ -30,19 +34,41 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Orbit:
-    """A closed orbit with its linearization; of this class itself, a fixed point of the section map's power."""
+    """A closed orbit with its linearization; of this class itself, a fixed point of the section map's power.
+
+    It has one node, a point on the section. Where deviations grow so much over the duration that motion from that point
+    would not come back, it has several at equal times, of which the first is on the section.
+    """
 
     kind: ClassVar[str] = "periodic"
 
-    point: Array  # (n,)
+    nodes: Array  # (count, n)
     period: int  # in forcing periods
     duration: float  # time after which it repeats (s)
-    monodromy: Array  # (n, n), derivative of the flow over the duration
-    residual: float  # distance between the point and its image, in units of the scene
+    steps: Array  # (count, n, n), derivatives of the flow from node to node
+    residual: float  # distance between the nodes and the images of those before them, in units of the scene
+
+    @property
+    def point(self) -> Array:
+        return self.nodes[0]
+
+    @cached_property
+    def monodromy(self) -> Array:
+        """Derivative of the flow over the duration, shape (n, n)."""
+        return _product(self.steps)
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Eigenvalues of the monodromy matrix, shape (n,)."""
+        return multipliers_of(self.steps)
 
     def refined(self, osc: Oscillator, stepper: Stepper) -> Orbit:
         """Return the orbit that Newton's method finds from here with another stepper; may raise StructureError."""
-        return refine_orbit(osc, self.point, self.period, stepper)
+        return refine_orbit(osc, self.nodes, self.period, stepper)
+
+    def starting_at(self, visit: int) -> Array:
+        """Return its nodes, where it has several, from another visit of the section on."""
+        return np.roll(self.nodes, -visit * (len(self.nodes) // self.period), axis=0)
 
     def moved_by_tightening(self, osc: Oscillator, stepper: Stepper, times: int) -> float:
         """Return how far its point moves when the stepper is refined so many times; infinite if the orbit vanishes."""
@@ -68,16 +94,51 @@ def section_equations(
     return evaluate
 
 
+def _node_equations(osc: Oscillator, count: int, interval: float, stepper: Stepper) -> Callable[[Array], Evaluation]:
+    """Return the equations of nodes (1, count n) at equal times: each is the image of the one before.
+
+    Attached are the derivatives of the images (1, count, n, n).
+    """
+
+    def evaluate(flat: Array) -> Evaluation:
+        nodes = flat.reshape(count, -1)
+        n = nodes.shape[1]
+        found = linear_map(osc, nodes, stepper, interval=interval, phases=np.arange(count))
+        jacobian = np.zeros((count, n, count, n))
+        each, following = np.arange(count), np.roll(np.arange(count), -1)
+        jacobian[each, :, each] = found.derivatives
+        jacobian[each, :, following] -= np.eye(n)
+        residuals = found.images - nodes[following]
+        return Evaluation(residuals.reshape(1, -1), jacobian.reshape(1, count * n, count * n), found.derivatives[None])
+
+    return evaluate
+
+
 def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
-    """Refine a periodic point by Newton's method until the residual stays; StructureError where it stays large."""
-    units = units_of(osc)
-    (point,), (residual,), (monodromy,) = newton(scaled(section_equations(osc, period, stepper), units), guess[None])
-    orbit = Orbit(point, period, period * osc.section_interval, monodromy, float(residual))
-    if not orbit.residual <= CONVERGED * (1.0 + float(np.linalg.norm(guess / units))):
+    """Refine a periodic point by Newton's method until the residual stays; StructureError where it stays large.
+
+    The guess (n,) is a point on the section, or consists of several nodes (count, n) at equal times, of which `period`
+    are on the section; then all of them are unknowns.
+    """
+    units, guesses = units_of(osc), np.atleast_2d(guess)
+    count, duration = len(guesses), period * osc.section_interval
+    equations = (
+        section_equations(osc, period, stepper)
+        if count == 1
+        else _node_equations(osc, count, duration / count, stepper)
+    )
+    (found,), (residual,), (steps,) = newton(scaled(equations, np.tile(units, count)), guesses.reshape(1, -1))
+    orbit = Orbit(found.reshape(guesses.shape), period, duration, steps.reshape(count, *2 * units.shape), residual)
+    if not orbit.residual <= CONVERGED * (1.0 + float(np.linalg.norm(guesses / units, axis=1).max())):
         raise StructureError(
-            f"Newton's method found no orbit of period {period} near {tuple(np.round(guess, 6).tolist())}: the "
+            f"Newton's method found no orbit of period {period} near {tuple(np.round(guesses[0], 6).tolist())}: the "
             f"residual is {orbit.residual:.1e}. The start is too far away, or the orbit is not hyperbolic; follow the "
             "motion for longer, or take a finer stepper."
+        )
+    if not np.isfinite(orbit.monodromy).all():
+        raise StructureError(
+            f"along the orbit of period {period} near {tuple(np.round(guesses[0], 6).tolist())} deviations grow by "
+            "more than a floating-point number can hold; take a shorter forcing period."
         )
     return orbit
 
@@ -87,7 +148,8 @@ def least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
     for divisor in range(1, orbit.period):
         if orbit.period % divisor == 0:
             try:
-                shorter = refine_orbit(osc, orbit.point, divisor, stepper)
+                part = max(1, len(orbit.nodes) * divisor // orbit.period)
+                shorter = refine_orbit(osc, orbit.nodes[:part], divisor, stepper)
             except StructureError:
                 continue
             if same_point(osc, orbit.point, shorter.point[None], EQUAL):
@@ -97,10 +159,43 @@ def least_period(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Orbit:
 
 def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     """Return the points of an orbit on the section, in the order of visits, shape (period, n)."""
+    if len(orbit.nodes) > 1:
+        return orbit.nodes[:: len(orbit.nodes) // orbit.period]
     points = [orbit.point]
     for _ in range(orbit.period - 1):
         points.append(run_ensemble(osc, Flow.STATE, stepper, points[-1][None], 1).states[0])
     return np.array(points)
+
+
+def states_along(osc: Oscillator, nodes: Array, period: int, stepper: Stepper, pieces: int) -> Array:
+    """Return states (period · pieces, n) along an orbit at equal times, each reached from the node before it.
+
+    The nodes (count, n) are those of the orbit. The number of pieces of a section interval is a multiple of the number
+    of nodes there, or divides it.
+    """
+    total = period * pieces
+    if len(nodes) >= total:
+        return nodes[:: len(nodes) // total]
+    each, spacing = total // len(nodes), osc.section_interval / pieces
+    return np.concatenate(
+        [
+            record(osc, Flow.STATE, stepper, node, at * each * spacing, spacing, each)[:each]
+            for at, node in enumerate(nodes)
+        ]
+    )
+
+
+def unstable_direction(osc: Oscillator, nodes: Array, period: int, stepper: Stepper) -> Array | None:
+    """Return the direction (n,) in which motion beside an orbit grows most; None where it diverges.
+
+    The nodes are those of an orbit, or of motion close to one that ends a number of periods later.
+    """
+    duration = period * osc.section_interval / len(nodes)
+    steps = linear_map(osc, nodes, stepper, interval=duration, phases=np.arange(len(nodes))).derivatives
+    if not np.isfinite(steps).all():
+        return None
+    values, vectors = np.linalg.eig(_product(steps))
+    return np.real(vectors[:, int(np.argmax(np.abs(values)))])
 
 
 def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
@@ -115,6 +210,28 @@ def arrival_at(orbits: Mapping[int, Array], distances: Array) -> Stop:
     labels = np.repeat(list(orbits), [len(points) for points in orbits.values()])
     metrics = np.tile(np.diag(1.0 / distances), (len(points), 1, 1))
     return Stop(points=points, point_labels=labels.astype(np.int64), metrics=metrics)
+
+
+def _product(steps: Array) -> Array:
+    """The product of matrices (count, n, n), the first of them applied first."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return functools.reduce(lambda product, step: step @ product, steps)
+
+
+def multipliers_of(steps: Array) -> NDArray[np.complex128]:
+    """Return the eigenvalues (n,) of a product of matrices (count, n, n), the first of them applied first.
+
+    One that is far smaller than the others would be lost in the rounding errors of the product. So the product is
+    formed with as many digits more as it grows by.
+    """
+    if len(steps) == 1:
+        return np.asarray(np.linalg.eigvals(steps[0]), dtype=complex)
+    growth = sum(math.log10(np.linalg.cond(step)) for step in steps)
+    with mpmath.workdps(30 + math.ceil(growth)):
+        product = functools.reduce(
+            lambda before, step: mpmath.matrix(step.tolist()) * before, steps, mpmath.eye(steps.shape[1])
+        )
+        return np.array([complex(value) for value in mpmath.eig(product, left=False, right=False)])
 
 
 def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:

@@ -40,7 +40,7 @@ def orbits_inside(osc: Oscillator, points: Array, stepper: Stepper, most: int, l
                 visits = visited(osc, orbit, stepper)
             except StructureError:
                 continue
-            unstable = float(np.abs(np.linalg.eigvals(orbit.monodromy)).max()) > 1
+            unstable = float(np.abs(orbit.multipliers).max()) > 1
             if unstable and cKDTree(points).query(visits)[0].max() < 50 * spacing:
                 found.append(orbit)
                 known = np.concatenate([known, visits])

@@ -51,6 +51,15 @@ def length_of(osc: Oscillator) -> float:
     return length or 1.0
 
 
+def doublings_of(osc: Oscillator) -> int:
+    """Return how often a number of parts of a section interval is doubled, to stay as fine in 2π/ω_n.
+
+    A section interval is the period of the forcing. Up to two of 2π/ω_n it counts as one.
+    """
+    turns = osc.section_interval * osc.natural_frequency / (2 * math.pi)
+    return max(0, math.ceil(math.log2(turns / 2) - 1e-9))
+
+
 def units_of(osc: Oscillator) -> Array:
     """Return the sizes of the coordinates of a state, shape (n,): length, velocity, and both for those of the noise.
 

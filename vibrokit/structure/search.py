@@ -130,7 +130,7 @@ class Search:
             orbit = least_period(self.osc, refine_orbit(self.osc, point, period, stepper), stepper)
         except StructureError:
             return False
-        if np.abs(np.linalg.eigvals(orbit.monodromy)).max() >= 1:
+        if np.abs(orbit.multipliers).max() >= 1:
             return False  # the motion passes near a saddle
         points = visited(self.osc, orbit, stepper)
         if not same_point(self.osc, point, points, _REACH):
@@ -159,7 +159,7 @@ class Search:
             cycle = find_cycle(self.osc, state, self.orbit_stepper, longest=longest)
         except StructureError:
             return False
-        if np.sort(np.abs(np.linalg.eigvals(cycle.monodromy)))[-2:][0] >= 1:
+        if np.sort(np.abs(cycle.multipliers))[-2:][0] >= 1:
             return False
         if not any(_is_on(orbit, cycle.point) for orbit in known):
             self.attractors.append(describe_orbit(self.osc, cycle, self.orbit_stepper))

@@ -114,7 +114,7 @@ def unstable_orbits(
             equations = section_equations(osc, period, many, executor)
         roots = _roots(osc, equations, guesses, where)
         for orbit, points in _distinct(osc, roots, period, orbit_stepper, where):
-            if where.contains(points).any() and np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1:
+            if where.contains(points).any() and np.abs(orbit.multipliers).max() > 1:
                 limits = () if classifier is None else branch_limits(classifier, orbit)
                 found.append(describe_unstable(osc, orbit, orbit_stepper, limits))
     return tuple(sorted(found, key=lambda saddle: tuple(saddle.points[0])))

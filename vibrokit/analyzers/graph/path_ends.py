@@ -15,7 +15,7 @@ from vibrokit.errors import StructureError
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.basins.stop_cells import agreeing
-from vibrokit.structure.linear_map import unstable_direction
+from vibrokit.structure.orbits import unstable_direction
 
 _DEPTH = 2  # cells of the basin grid, from the boundary to the nearest cell that surely lies inside
 _GENEROUS = 10  # times the cost of a straight path to a face
@@ -91,5 +91,5 @@ def _straight(problem: ExitProblem, model: StepModel, states: Array) -> float:
 def _unstable_direction(model: StepModel, saddle: Saddle) -> Array | None:
     if saddle.kind == "chaotic":
         return None
-    found = unstable_direction(model.scene, saddle.points[0], model.stepper, max(1, saddle.period))
+    found = unstable_direction(model.scene, saddle.nodes, max(1, saddle.period), model.stepper)
     return None if found is None else found[:2]

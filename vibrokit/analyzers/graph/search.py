@@ -23,6 +23,7 @@ from vibrokit.progress import stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
+from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -33,8 +34,8 @@ _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrat
 _ALL_GRIDS = 1.9  # memory of all grids together, in units of the finest
 _FEWEST_NODES = 32
 _PARTS, _FEWEST_REFINED = (4, 2), 60  # of the nodes along a side: those of grids that come first, and their least
-_MOST_STEPS = 64
-_STEPS_PER_PERIOD = (8, 16, 32, 64)
+_MOST_STEPS = 1024
+_STEPS_PER_PERIOD = (8, 16, 32, 64)  # more in a period that is longer than two of 2π/ω_n
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class GraphSearch:
         Nodes in x and in v.
     steps_per_period : int, optional
         Steps of time in a section interval; even. By default 8, doubled (up to 64) until linearization over a step
-        changes no cost by more than 1 %.
+        changes no cost by more than 1 %; all these numbers are larger where the interval is longer than 4π/ω_n.
     max_memory_gib : float
         Memory that the search may take (GiB).
 
@@ -157,16 +158,20 @@ class GraphSearch:
         yield self.nodes
 
     def _affordable_steps(self, scene: Oscillator) -> tuple[int, ...]:
-        """Numbers of steps to try that there is memory for."""
-        wanted = _STEPS_PER_PERIOD if self.steps_per_period is None else (self.steps_per_period,)
-        allowed = tuple(steps for steps in wanted if self._memory(scene, steps) <= self.max_memory_gib)
+        """Numbers of steps to try that there is memory for; in a long period, fewer than wanted if need be."""
+        doublings = doublings_of(scene)
+        wanted = [2**doublings * steps for steps in _STEPS_PER_PERIOD]
+        fewer = [2**times * _STEPS_PER_PERIOD[0] for times in range(doublings)]
+        if self.steps_per_period is not None:
+            wanted, fewer = [self.steps_per_period], []
+        allowed = [steps for steps in (*fewer, *wanted) if self._memory(scene, steps) <= self.max_memory_gib]
         if not allowed:
-            nx, nv = self.nodes
+            (nx, nv), steps = self.nodes, (*fewer, *wanted)[0]
             raise StructureError(
-                f"a graph of {nx} × {nv} nodes at {wanted[0]} phases needs {self._memory(scene, wanted[0]):.3g} GiB of "
+                f"a graph of {nx} × {nv} nodes at {steps} phases needs {self._memory(scene, steps):.3g} GiB of "
                 f"memory, and max_memory_gib is {self.max_memory_gib:.3g}; lower nodes or raise max_memory_gib."
             )
-        return allowed
+        return tuple(steps for steps in allowed if steps >= wanted[0]) or (allowed[-1],)
 
     def _memory(self, scene: Oscillator, steps: int) -> float:
         """Memory that a graph takes (GiB)."""

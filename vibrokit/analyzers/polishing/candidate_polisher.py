@@ -202,7 +202,7 @@ def _left(problem: ExitProblem, orbit: Orbit | None) -> Departure:
     """The orbit that paths leave."""
     attractor = problem.attractor
     if orbit is not None:
-        return Departure(f"an orbit inside {attractor.name}", orbit.point, orbit.period, orbit.duration)
+        return Departure(f"an orbit inside {attractor.name}", orbit.nodes, orbit.period, orbit.duration)
     if not attractor.repeats:
         raise StructureError(
             f"{attractor.name} is {attractor.kind}, and paths are polished from an orbit, an equilibrium or a limit "

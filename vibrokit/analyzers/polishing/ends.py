@@ -254,5 +254,5 @@ def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator)
     if isinstance(end, AtFace):
         return FaceEnding(propagator, end)
     saddle = problem.structure.saddles[end.saddle]
-    orbit = linearized_orbit(propagator, saddle.points[0], saddle.period, saddle.duration)
+    orbit = linearized_orbit(propagator, saddle.nodes, saddle.period, saddle.duration)
     return SaddleEnding(propagator, orbit)

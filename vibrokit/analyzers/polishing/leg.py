@@ -21,15 +21,15 @@ from vibrokit.analyzers.polishing.path_solver import PathSolver
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record, record_each
+from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.scales import doublings_of
 from vibrokit.symbolic.flow_kind import Flow
 
-PIECES = (8, 16)
-"""In a section interval: the finer ones where the coarser ones do not converge."""
-SAMPLES = 128
-"""In a section interval: enough for pictures, and for quadrature to about 1e-6."""
+_PIECES = (8, 16)  # in a section interval, more in a long one: the finer ones where the coarser ones do not converge
+_SAMPLES = 128  # in a section interval, more in a long one: enough for pictures, and for quadrature to about 1e-6
 _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
 
@@ -42,7 +42,7 @@ class Departure:
     """A closed orbit that paths leave: the attractor, an orbit inside it, or one that a path passes on its way."""
 
     name: str
-    point: Array  # (n,): one of its points on the section
+    nodes: Array  # (count, n): one of its points on the section, or several states from one on
     period: int  # in section intervals
     duration: float  # time after which it repeats (s); 0 for an equilibrium
     saddle: int = -1  # which of the structure's saddles it is; −1 for none
@@ -50,12 +50,12 @@ class Departure:
     @classmethod
     def from_attractor(cls, attractor: Attractor) -> Departure:
         """Return an attractor that repeats."""
-        return cls(attractor.name, attractor.points[0], attractor.period, attractor.duration)
+        return cls(attractor.name, attractor.points[:1], attractor.period, attractor.duration)
 
     @classmethod
     def from_saddle(cls, number: int, saddle: Saddle) -> Departure:
         """Return one of the structure's saddles, which is no chaotic set."""
-        return cls(f"saddle {number}", saddle.points[0], saddle.period, saddle.duration, number)
+        return cls(f"saddle {number}", saddle.nodes, saddle.period, saddle.duration, number)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,24 +69,35 @@ class Leg:
     path: ExitPath
 
 
+def pieces_of(scene: Oscillator) -> tuple[int, ...]:
+    """Return the numbers of pieces of a section interval that paths are solved with, in turn."""
+    return tuple(pieces * 2 ** doublings_of(scene) for pieces in _PIECES)
+
+
+def samples_of(scene: Oscillator) -> int:
+    """Return the number of samples of a path in a section interval: a multiple of each number of pieces."""
+    return _SAMPLES * 2 ** doublings_of(scene)
+
+
 class Nodes:
     """Candidates at the nodes of paths, and the conditions of ends there, each made once."""
 
     def __init__(self, problem: ExitProblem) -> None:
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
         self.problem = problem
-        self.propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in PIECES}
+        self.pieces = pieces_of(problem.scene)
+        self.propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in self.pieces}
         self._resampled = functools.cache(lambda candidate, pieces: resampled(self.propagators[pieces], candidate))
         self._ending = functools.cache(lambda end, pieces: ending_at(end, problem, self.propagators[pieces]))
 
-    def resampled(self, candidate: Candidate, pieces: int = PIECES[0]) -> ResampledCandidate:
+    def resampled(self, candidate: Candidate, pieces: int | None = None) -> ResampledCandidate:
         """Return a candidate at the nodes; raises StructureError as `ending.resampled` does."""
-        found: ResampledCandidate = self._resampled(candidate, pieces)
+        found: ResampledCandidate = self._resampled(candidate, pieces or self.pieces[0])
         return found
 
-    def ending(self, end: PathEnd, pieces: int = PIECES[0]) -> Ending:
+    def ending(self, end: PathEnd, pieces: int | None = None) -> Ending:
         """Return the conditions of an end; raises StructureError if it is a saddle that is not hyperbolic."""
-        found: Ending = self._ending(end, pieces)
+        found: Ending = self._ending(end, pieces or self.pieces[0])
         return found
 
     def distance(self, end: PathEnd, candidate: Candidate) -> float:
@@ -100,15 +111,15 @@ class LegSolver:
     def __init__(self, nodes: Nodes, left: Departure) -> None:
         self.nodes, self.left = nodes, left
         self._source = functools.cache(
-            lambda pieces: linearized_orbit(nodes.propagators[pieces], left.point, left.period, left.duration)
+            lambda pieces: linearized_orbit(nodes.propagators[pieces], left.nodes, left.period, left.duration)
         )
-        self._source(PIECES[0])
+        self._source(self.nodes.pieces[0])
         self._solver = functools.cache(lambda end, pieces: PathSolver(nodes.propagators[pieces], self._source(pieces)))
 
     @property
     def orbit(self) -> LinearizedOrbit:
         """The orbit that is left."""
-        found: LinearizedOrbit = self._source(PIECES[0])
+        found: LinearizedOrbit = self._source(self.nodes.pieces[0])
         return found
 
     def solve(
@@ -124,7 +135,7 @@ class LegSolver:
 
         Raises StructureError if no path to the end is found, or if it leaves by one of the others before.
         """
-        for pieces in PIECES:
+        for pieces in self.nodes.pieces:
             try:
                 return self._solve_with(pieces, end, candidate, others, (1 - _CHEAPER) * least, way)
             except StructureError as error:
@@ -157,7 +168,8 @@ class LegSolver:
 
 def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:
     """Record a path piece by piece, each from its own node; the time is 0 at the start, which is on the section."""
-    each, n, piece = SAMPLES // propagator.pieces, propagator.size, propagator.piece
+    interval = samples_of(propagator.osc)
+    each, n, piece = interval // propagator.pieces, propagator.size, propagator.piece
     actions = found.head + np.concatenate([[0.0], np.cumsum(found.actions)])
     nodes = np.column_stack([found.points[:-1], actions[:-1]])
     phases = (found.first + np.arange(len(nodes))) % propagator.pieces
@@ -167,5 +179,5 @@ def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:
     z = np.vstack([samples, last, np.append(found.points[-1], actions[-1])])
     start = piece * (len(nodes) - 1)
     t = np.concatenate([piece / each * np.arange(len(samples)), start + found.last / each * np.arange(len(last) + 1)])
-    section = np.arange(0, len(z) - (found.last != piece), SAMPLES)
+    section = np.arange(0, len(z) - (found.last != piece), interval)
     return ExitPath(t, z[:, :n], z[:, n : 2 * n], z[:, -1], section)

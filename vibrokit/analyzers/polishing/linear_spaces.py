@@ -41,6 +41,22 @@ def carried_along(
     return np.array(forward), np.array([backward[0], *backward[:0:-1]])
 
 
+def carried_around(linear: GaussianMap, turns: int, scale: Array) -> tuple[Array, Array]:
+    """Return the spaces at all nodes of a closed orbit that has no neutral direction, without its map over a period.
+
+    Any two spaces are carried some times around the orbit, one forward and one backward.
+    """
+    steps = [extended(step, part) for step, part in zip(linear.derivatives, linear.covariances, strict=True)]
+    n = linear.images.shape[1]
+    unstable, stable = np.random.default_rng(0).standard_normal((2, 2 * n, n)) * scale[:, None]
+    for _ in range(turns):
+        for step in steps:
+            unstable = normalized(step @ unstable, scale, 0)
+        for step in reversed(steps):
+            stable = normalized(np.asarray(np.linalg.solve(step, stable), dtype=float), scale, 0)
+    return carried_along(linear, unstable, stable, scale)
+
+
 def normals_of(basis: Array, scale: Array) -> Array:
     """Return an orthonormal basis (n, 2n), in units of `scale`, of the complement of a space."""
     full = np.linalg.qr(basis / scale[:, None], mode="complete")[0]

@@ -13,14 +13,14 @@ from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 Array = NDArray[np.float64]
 
 
-def linearized_orbit(propagator: SegmentPropagator, point: Array, period: int, duration: float) -> LinearizedOrbit:
+def linearized_orbit(propagator: SegmentPropagator, nodes: Array, period: int, duration: float) -> LinearizedOrbit:
     """Linearize Hamilton's equations along an orbit, an equilibrium, or a limit cycle, of any stability.
 
     Parameters
     ----------
     propagator : SegmentPropagator
-    point : array (n,)
-        One of its points on the section; it is refined.
+    nodes : array (count, n)
+        One of its points on the section, or several states at equal times from such a point on; they are refined.
     period : int
         In section intervals; 0 and 1 are the same.
     duration : float
@@ -29,8 +29,8 @@ def linearized_orbit(propagator: SegmentPropagator, point: Array, period: int, d
     Raises
     ------
     StructureError
-        There is no such orbit near the point, or it is not hyperbolic.
+        There is no such orbit near the nodes, or it is not hyperbolic.
     """
     if propagator.osc.autonomous and duration > 0:
-        return linearized_cycle(propagator, point, duration)
-    return orbit_at_nodes(propagator, point, max(1, period))
+        return linearized_cycle(propagator, nodes[0], duration)
+    return orbit_at_nodes(propagator, nodes, max(1, period))

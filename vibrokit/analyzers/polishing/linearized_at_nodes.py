@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import cached_property
 from typing import Self
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.linear_spaces import (
     carried_along,
+    carried_around,
     check_hyperbolic,
     extended,
     invariant_spaces,
@@ -19,8 +21,11 @@ from vibrokit.analyzers.polishing.linear_spaces import (
 )
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
-from vibrokit.structure.linear_map import GaussianMap, gaussian_pieces
-from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.linear_map import GaussianMap, gaussian_map
+from vibrokit.structure.orbits import multipliers_of, refine_orbit, states_along
+
+_FAST = 16.0  # logarithm of a multiplier above which the map over the orbit has fewer than nine digits for the others
+_TURNED = 40.0  # logarithm of the factor by which a wrong part of a space must shrink
 
 Array = NDArray[np.float64]
 
@@ -92,7 +97,7 @@ class LinearizedAtNodes(LinearizedOrbit):
         return self
 
     def again(self, propagator: SegmentPropagator) -> LinearizedAtNodes:
-        found = orbit_at_nodes(propagator, self.states[0], len(self.states) // propagator.pieces)
+        found = orbit_at_nodes(propagator, self.states, len(self.states) // propagator.pieces)
         return found.with_start_on_orbit() if self.left_from_itself else found
 
     def displacement(self, phase: int, momentum: Array) -> OrbitDisplacement:
@@ -101,20 +106,40 @@ class LinearizedAtNodes(LinearizedOrbit):
         return OrbitDisplacement(self.states[phases], np.roll(self.states, -1, axis=0)[phases], weights, phases, None)
 
 
-def orbit_at_nodes(propagator: SegmentPropagator, point: Array, period: int) -> LinearizedAtNodes:
+def orbit_at_nodes(propagator: SegmentPropagator, guess: Array, period: int) -> LinearizedAtNodes:
     """Linearize Hamilton's equations along an orbit of any stability that repeats after some section intervals.
 
     From the section, the spaces are carried to the other nodes, the unstable one forward and the stable one backward:
     in these directions they attract.
 
-    The point (n,) on the section is refined. Raises StructureError if there is no orbit, or if it is not hyperbolic.
+    The guess (count, n) consists of nodes as of `refine_orbit`; it is refined. Raises StructureError if there is no
+    orbit, or if it is not hyperbolic.
     """
-    orbit = refine_orbit(propagator.osc, point, period, propagator.stepper)
-    nodes = period * propagator.pieces
-    states, linear = gaussian_pieces(propagator.osc, orbit.point, propagator.stepper, propagator.pieces, nodes)
-    monodromy, covariance = linear.composed()
-    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    osc, stepper, pieces = propagator.osc, propagator.stepper, propagator.pieces
+    orbit = refine_orbit(osc, guess, period, stepper)
+    states = states_along(osc, orbit.nodes, period, stepper, pieces)
+    states = refine_orbit(osc, states, period, stepper).nodes
+    linear = gaussian_map(osc, states, stepper, interval=osc.section_interval / pieces, phases=np.arange(len(states)))
+    multipliers = multipliers_of(linear.derivatives)
     check_hyperbolic(orbit.point, multipliers)
-    spaces = invariant_spaces(monodromy, covariance, np.empty((len(point), 0)))
-    unstable, stable = carried_along(linear, *spaces, scale_of(propagator, covariance))
-    return LinearizedAtNodes(propagator, multipliers, states[:-1], linear, unstable, stable)
+    unstable, stable = _spaces(linear, multipliers, propagator)
+    return LinearizedAtNodes(propagator, multipliers, states, linear, unstable, stable)
+
+
+def _spaces(
+    linear: GaussianMap, multipliers: NDArray[np.complex128], propagator: SegmentPropagator
+) -> tuple[Array, Array]:
+    """The unstable and the stable space at all nodes.
+
+    At the first node they are invariant spaces of the map over the whole orbit. Where deviations grow so much that
+    these would be lost in rounding errors, almost any two spaces turn into them while they are carried along the orbit.
+    """
+    n = linear.images.shape[1]
+    logarithms = np.log(np.abs(multipliers))
+    if logarithms.max() < _FAST:
+        monodromy, covariance = linear.composed()
+        spaces = invariant_spaces(monodromy, covariance, np.empty((n, 0)))
+        return carried_along(linear, *spaces, scale_of(propagator, covariance))
+    turns = math.ceil(_TURNED / (2 * float(np.abs(logarithms).min())))
+    scale = scale_of(propagator, linear.covariances.sum(axis=0))
+    return carried_around(linear, turns, scale)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import PathEnd
-from vibrokit.analyzers.polishing.leg import SAMPLES, Departure, Leg
+from vibrokit.analyzers.polishing.leg import Departure, Leg, samples_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record
@@ -19,7 +19,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.linear_map import unstable_direction
+from vibrokit.structure.orbits import states_along, unstable_direction
 from vibrokit.symbolic.flow_kind import Flow
 
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
@@ -46,7 +46,7 @@ class SolvedPath:
         """
         path = legs[0].path
         for before, after in itertools.pairwise(legs):
-            path = _appended(path, _between(problem, before, after), after.path, problem.scene.section_interval)
+            path = _appended(path, _between(problem, before, after), after.path, problem.scene)
         return cls(tuple(legs), path)
 
     @property
@@ -81,17 +81,18 @@ class SolvedPath:
         return bool(np.abs(offsets).max(axis=1).min() < _SAME)
 
 
-def _appended(path: ExitPath, between: Array, after: ExitPath, interval: float) -> ExitPath:
+def _appended(path: ExitPath, between: Array, after: ExitPath, scene: Oscillator) -> ExitPath:
     """The path, the states between, and another path, whose first sample is one time step after the last of these.
 
     The last sample of the path gives way to the first of what follows: both are on the section at one time.
     """
     kept, count, n = len(path.t) - 1, len(between), path.q.shape[1]
-    step = interval / SAMPLES
+    samples = samples_of(scene)
+    step = scene.section_interval / samples
     times = path.t[-1] + step * np.arange(count)
     start = path.t[-1] + step * count
     last = kept + count
-    sections = [path.section[path.section < kept], kept + np.arange(0, count, SAMPLES), last + after.section]
+    sections = [path.section[path.section < kept], kept + np.arange(0, count, samples), last + after.section]
     return ExitPath(
         np.concatenate([path.t[:kept], times, start + after.t - after.t[0]]),
         np.concatenate([path.q[:kept], between, after.q]),
@@ -112,18 +113,20 @@ def _between(problem: ExitProblem, before: Leg, after: Leg) -> Array:
 
 def _along(scene: Oscillator, saddle: Saddle, stepper: Stepper, here: Array, there: Array) -> Array:
     """The motion along the orbit of a saddle."""
-    nothing, spacing = np.empty((0, len(here))), scene.section_interval / SAMPLES
+    nothing, samples = np.empty((0, len(here))), samples_of(scene)
     if saddle.duration == 0:
         return nothing
     if scene.autonomous:
+        spacing = scene.section_interval / samples
         count = math.ceil(saddle.duration / spacing)
         orbit = record(scene, Flow.STATE, stepper, saddle.points[0], 0.0, spacing, count)[:count]
         first, last = (_nearest(scene, orbit, state) for state in (here, there))
         return np.roll(orbit, -first, axis=0)[: (last - first) % count]
     first, last = (_nearest(scene, saddle.points, state) for state in (here, there))
     visited = (first + np.arange((last - first) % len(saddle.points))) % len(saddle.points)
-    parts = [record(scene, Flow.STATE, stepper, saddle.points[at], 0.0, spacing, SAMPLES)[:-1] for at in visited]
-    return np.concatenate([nothing, *parts])
+    nodes = max(saddle.nodes, saddle.points, key=len)
+    states = states_along(scene, nodes, saddle.period, stepper, samples).reshape(saddle.period, samples, -1)
+    return np.concatenate([nothing, *states[visited]])
 
 
 def _relaxation(
@@ -131,19 +134,21 @@ def _relaxation(
 ) -> Array:
     """The motion from a saddle to an attractor, until it is near the state `there` on the section."""
     scene, stepper = problem.scene, problem.single_stepper(Flow.STATE)
-    start = saddle.points[_nearest(scene, saddle.points, here)]
-    by = problem.single_stepper(Flow.STATE_VARIATIONAL)
-    direction = unstable_direction(scene, start, by, max(1, saddle.period))
+    visit, by = _nearest(scene, saddle.points, here), problem.single_stepper(Flow.STATE_VARIATIONAL)
+    start, several = saddle.points[visit], len(saddle.nodes) > 1
+    nodes = np.roll(saddle.nodes, -visit * (len(saddle.nodes) // saddle.period), axis=0) if several else start[None]
+    direction = unstable_direction(scene, nodes, max(1, saddle.period), by)
     if direction is None:
         raise StructureError(f"motion from the saddle at ({start[0]:.6g}, {start[1]:.6g}) diverges.")
     direction = direction / np.linalg.norm(direction / extent)
-    spacing, every = scene.section_interval / SAMPLES, 1 if scene.autonomous else SAMPLES
+    samples = samples_of(scene)
+    spacing, every = scene.section_interval / samples, 1 if scene.autonomous else samples
     motions = [start + side * _BESIDE * direction for side in (1, -1)]
     parts: list[list[Array]] = [[], []]
     for _ in range(_MOST_STRETCHES):
         for side, state in enumerate(motions):
-            motion = record(scene, Flow.STATE, stepper, state, 0.0, spacing, _STRETCH * SAMPLES)
-            if len(motion) <= _STRETCH * SAMPLES:  # it diverged
+            motion = record(scene, Flow.STATE, stepper, state, 0.0, spacing, _STRETCH * samples)
+            if len(motion) <= _STRETCH * samples:  # it diverged
                 continue
             near = np.linalg.norm((motion[::every] - there) / extent, axis=1)
             parts[side].append(motion[:-1])

@@ -42,7 +42,7 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
     path = _path(osc, orbit.point, orbit.duration, count, stepper)
     still = np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max())
     resting = still and osc.autonomous and orbit.kind != "limit cycle"
-    multipliers = np.linalg.eigvals(orbit.monodromy).astype(complex)
+    multipliers = orbit.multipliers
     return _described(
         osc, path, stepper,
         kind="equilibrium" if resting else orbit.kind,

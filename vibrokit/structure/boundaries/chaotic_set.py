@@ -15,11 +15,13 @@ _BLOCKS = 6  # of a motion, for the standard error
 
 def chaotic_set(tracks: Sequence[EdgeTrack], exponent: float) -> Saddle:
     """Return the record of a set on which motions on a boundary never repeat."""
+    points = np.concatenate([track.points[_transient(track) :] for track in tracks])
     return Saddle(
         kind="chaotic",
         period=0,
         duration=np.nan,
-        points=np.concatenate([track.points[_transient(track) :] for track in tracks]),
+        points=points,
+        nodes=points[:0],
         multipliers=np.empty(0, dtype=complex),
         exponents=np.array([exponent], dtype=complex),
         leads_to=tracks[0].labels,

@@ -21,8 +21,9 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
-PARTS_OF_A_TURN = 16
-"""Points for each 2π/ω_n in an autonomous scene, where any time step is a section."""
+_PARTS_OF_A_TURN = 16  # times for each 2π/ω_n in an autonomous scene, where any time step is a section
+_MOST_PARTS = 128  # of a section interval
+_FASTEST = 14.0  # logarithm of the most that ends 1e-10 widths apart may separate by between two times
 _WIDTH = 1e-10  # of the region's widths: target distance of two ends
 _SEPARATED, _TOGETHER = 60.0, 2.0  # times that: distances at which ends are brought together, and count as together
 _FEWEST_PIECES, _MOST_PIECES = 3, 63  # of a line between two ends, all corners classified at once
@@ -42,12 +43,23 @@ class EdgeTrack:
 
     Its points (count, n) are the midpoints between the two sides at every section, at every sixteenth of 2π/ω_n in an
     autonomous scene. Its stretches (count − 1,) are the logarithms of the ratios by which the distance of the two sides
-    grows from each point to the next.
+    grows from each point to the next. Its nodes (parts · (count − 1) + 1, n) are the midpoints at all times at which
+    the sides were brought together; with one part of a section interval, they are the points.
     """
 
     labels: tuple[int, int]
     points: Array
     stretches: Array
+    nodes: Array
+
+    @property
+    def parts(self) -> int:
+        """Times in a section interval at which the sides were brought together."""
+        return (len(self.nodes) - 1) // max(1, len(self.points) - 1)
+
+    def guess(self, period: int) -> Array:
+        """Return a guess of an orbit of some period that the motion has converged to, as of `refine_orbit`."""
+        return self.points[-1] if self.parts == 1 else self.nodes[-1 - period * self.parts : -1]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +78,8 @@ class Straddles:
 
     They start between neighbouring cells of different labels, distributed over the cells where the labels meet, at most
     `trackers` pairs for each pair of labels. `only` are the pairs of labels to start between, the lower first; by
-    default all that meet. Pairs without a change of label between them are dropped.
+    default all that meet. Pairs without a change of label between them are dropped. Between two sections they are
+    brought together `parts` times.
     """
 
     def __init__(
@@ -76,8 +89,10 @@ class Straddles:
         trackers: int,
         rng: np.random.Generator,
         only: Container[tuple[int, int]] | None = None,
+        parts: int = 1,
     ) -> None:
         self.classifier, self.rng = classifier, rng
+        self.parts = _PARTS_OF_A_TURN if classifier.osc.autonomous else parts
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
         for pair, cells in meeting_cells(basins).items():
@@ -99,18 +114,28 @@ class Straddles:
 
     @property
     def interval(self) -> float:
-        """Time from one point to the next (s)."""
-        osc = self.classifier.osc
-        return osc.section_interval / (PARTS_OF_A_TURN if osc.autonomous else 1)
+        """Time from one advance to the next (s)."""
+        return self.classifier.osc.section_interval / self.parts
+
+    @property
+    def time(self) -> float:
+        """Time since the last section; 0 in an autonomous scene (s)."""
+        return 0.0 if self.classifier.osc.autonomous else len(self._stretches) % self.parts * self.interval
+
+    @property
+    def too_fast(self) -> bool:
+        """Whether ends have separated so far between two times that the boundary was lost, and more may help."""
+        fastest = max((float(np.max(each, initial=0.0)) for each in self._stretches), default=0.0)
+        return fastest > _FASTEST and not self.classifier.osc.autonomous and self.parts < _MOST_PARTS
 
     def advance(self) -> None:
-        """Map all ends to the next section, and bring those together again that have separated."""
+        """Integrate all ends over an interval, and bring those together again that have separated."""
         if not len(self):
             return
         before = self._widths()
         osc, stepper = self.classifier.osc, self.classifier.stepper
         states = self.ends.reshape(-1, self.ends.shape[-1])
-        ended = run_ensemble(osc, Flow.STATE, stepper, states, interval=self.interval)
+        ended = run_ensemble(osc, Flow.STATE, stepper, states, start_time=self.time, interval=self.interval)
         self.ends = ended.states.reshape(self.ends.shape)
         after = self._widths()
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -135,8 +160,13 @@ class Straddles:
     def track(self, index: int) -> EdgeTrack:
         """One motion so far."""
         low, high = sorted(int(label) for label in self.end_labels[index])
-        points = np.array([points[index] for points in self._points])
-        return EdgeTrack((low, high), points, np.array([stretches[index] for stretches in self._stretches]))
+        nodes = np.array([points[index] for points in self._points])
+        stretches = np.array([stretches[index] for stretches in self._stretches])
+        each, whole = 1 if self.classifier.osc.autonomous else self.parts, len(stretches) // self.parts * self.parts
+        if each == 1:
+            return EdgeTrack((low, high), nodes, stretches, nodes)
+        nodes = nodes[: whole + 1]
+        return EdgeTrack((low, high), nodes[::each], stretches[:whole].reshape(-1, each).sum(axis=1), nodes)
 
     def _bring_together(self, wide: NDArray[np.intp]) -> None:
         """Bring the ends of some pairs together, drop pairs that lost the boundary, and record all points."""
@@ -168,14 +198,14 @@ class Straddles:
             piece = known[changes[picked] : changes[picked] + 2]
             self.ends[index], self.end_labels[index] = corners[row, piece], labels[row, piece]
             shrunk[row] = piece[1] - piece[0] < pieces
-            if not shrunk[row] and (labels[row, 1:-1] == UNSETTLED).all():
+            if not shrunk[row] and self.time == 0 and (labels[row, 1:-1] == UNSETTLED).all():
                 ends = sorted(int(label) for label in labels[row, piece])
                 self.strips.append(Strip((ends[0], ends[1]), corners[row, pieces // 2]))
         return shrunk
 
     def _labels(self, states: Array) -> NDArray[np.int64]:
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
-        self.sections += self.classifier.label(found, states)
+        self.sections += self.classifier.label(found, states, self.time)
         return found
 
     def _widths(self) -> Array:

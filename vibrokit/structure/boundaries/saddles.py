@@ -23,7 +23,6 @@ from vibrokit.structure.autonomous import equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
 from vibrokit.structure.boundaries.edges import (
-    PARTS_OF_A_TURN,
     EdgeTrack,
     Straddles,
     almost_repeats,
@@ -117,17 +116,30 @@ class SaddleSearch:
             for classifier in (self.classifier, dataclasses.replace(self.classifier, core=None)):
                 if unexplained:
                     each = max(2, min(self.trackers, most // len(unexplained)))
-                    straddles = Straddles(classifier, self.basins, each, rng, only=unexplained)
+                    straddles = self._straddles(classifier, each, rng, unexplained)
                     self._follow(straddles, tracked)
                     self._look_into_strips(straddles)
                     tracked += len(straddles.origins)
                 unexplained = pairs - self._explained
         self._lost = tuple(sorted(unexplained))
 
+    def _straddles(
+        self, classifier: BasinClassifier, each: int, rng: np.random.Generator, only: set[Pair]
+    ) -> Straddles:
+        """Start motions, and bring their sides together as often between two sections as they separate fast."""
+        parts = 1
+        while True:
+            straddles = Straddles(classifier, self.basins, each, rng, only=only, parts=parts)
+            for _ in range(straddles.parts):
+                straddles.advance()
+            if not straddles.too_fast:
+                return straddles
+            parts *= 2
+
     def _add_equilibria(self) -> None:
         """Add those that one direction leaves, on both sides to different attractors."""
         for orbit in equilibria(self.osc, *self.classifier.region.bounds[0]):
-            if np.sum(np.abs(np.linalg.eigvals(orbit.monodromy)) > 1) == 1:
+            if np.sum(np.abs(orbit.multipliers) > 1) == 1:
                 limits = branch_limits(self.classifier, orbit)
                 if len(set(limits)) > 1:
                     self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
@@ -137,11 +149,12 @@ class SaddleSearch:
         """Follow motions until each has converged to a saddle, or for the largest number of sections."""
         motions = len(straddles.origins)
         tries = np.zeros(motions, dtype=np.int64)
-        parts, most_sections = PARTS_OF_A_TURN if self.osc.autonomous else 1, np.inf
+        parts, most_sections = straddles.parts, np.inf
         for step in range(1, self.sections * parts + 1):
             if not len(straddles) or straddles.sections > most_sections:
                 break
-            straddles.advance()
+            if step > parts:  # the first section was for finding how many parts are needed
+                straddles.advance()
             if step == _SOON * parts:
                 most_sections = straddles.sections + _MANY_SECTIONS
             if step % (_CHECKED_EVERY * parts) == 0:
@@ -166,7 +179,7 @@ class SaddleSearch:
         for strip, points in zip(strips, visits, strict=True):
             period = recurrence(self.region.scaled(points), _LONGEST_PERIOD)
             with contextlib.suppress(StructureError):
-                if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0)), period):
+                if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0), points), period):
                     self._explained.add(strip.labels)
 
     def _explain(self, straddles: Straddles, which: NDArray[np.bool_]) -> None:
@@ -193,9 +206,9 @@ class SaddleSearch:
             return False
 
     def _reached_orbit(self, track: EdgeTrack, period: int) -> bool:
-        here = track.points[-1]
-        orbit = refine_unstable(self.osc, here, period, self.orbit_stepper)
-        unstable = np.abs(np.linalg.eigvals(orbit.monodromy)).max() > 1
+        guess = track.guess(period)
+        orbit, here = refine_unstable(self.osc, guess, period, self.orbit_stepper), np.atleast_2d(guess)[0]
+        unstable = np.abs(orbit.multipliers).max() > 1
         if not unstable or self.region.apart(orbit.point, here) > _FARTHEST:
             return False
         if any(same_place(self.region.scaled(orbit.point[None]), places, EQUAL) for places in self._places):
@@ -237,7 +250,7 @@ class SaddleSearch:
                 count = len(motions) - len(wandering)
                 self._findings.append(_on_boundary(Code.MOTIONS_NOT_CONVERGED, pair, count=count))
             if wandering and not self.osc.autonomous:
-                exponent, error = growth(wandering, straddles.interval)
+                exponent, error = growth(wandering, self.osc.section_interval)
                 chaotic = chaotic_set(wandering, exponent)
                 self._found.append(chaotic)
                 inside = self._add_orbits_inside(chaotic)

@@ -14,7 +14,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.orbits import Orbit, exponents_of, least_period, refine_orbit, visited
+from vibrokit.structure.orbits import Orbit, exponents_of, least_period, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
 _RESIDUAL = 1e-10
@@ -24,6 +24,7 @@ _LARGEST_DEPARTURE = 1e-2
 _ON_A_BRANCH = 16
 _ROUND = 32  # directions from a repeller
 _TIGHTENED = 2  # times, for the error
+_FINER = 4
 
 Array = NDArray[np.float64]
 
@@ -31,14 +32,18 @@ Array = NDArray[np.float64]
 def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -> Orbit:
     """Refine an unstable orbit, or an equilibrium of an autonomous scene, to its least period.
 
-    A finer stepper is used where the residual is too large. A StructureError is raised if Newton's method finds no such
-    orbit near the guess, or in an autonomous scene no equilibrium.
+    The guess is as of `refine_orbit`; several nodes become four times as many, so that steps from one to the next have
+    accurate multipliers below 1 as well. A finer stepper is used where the residual is too large. A StructureError is
+    raised if Newton's method finds no such orbit near the guess, or in an autonomous scene no equilibrium.
     """
     if osc.autonomous:
         return refine_equilibrium(osc, guess)
     orbit = refine_orbit(osc, guess, period, stepper)
+    if len(orbit.nodes) > 1:
+        pieces = _FINER * len(orbit.nodes) // period
+        orbit = refine_orbit(osc, states_along(osc, orbit.nodes, period, stepper, pieces), period, stepper)
     if orbit.residual > _RESIDUAL:
-        finer = refine_orbit(osc, orbit.point, period, stepper.refined().refined())
+        finer = refine_orbit(osc, orbit.nodes, period, stepper.refined().refined())
         orbit = min(orbit, finer, key=lambda found: found.residual)
     return least_period(osc, orbit, stepper)
 
@@ -47,13 +52,15 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
     """Describe an unstable orbit or limit cycle, from its point of least x on, checked with finer steppers."""
     points = visited(osc, orbit, stepper)
     if orbit.period > 1:
-        orbit = refine_orbit(osc, points[np.argmin(points[:, 0])], orbit.period, stepper)
+        first = int(np.argmin(points[:, 0]))
+        nodes = orbit.starting_at(first) if len(orbit.nodes) > 1 else points[first]
+        orbit = refine_orbit(osc, nodes, orbit.period, stepper)
         points = visited(osc, orbit, stepper)
     if orbit.kind == "equilibrium":
         exponents = equilibrium_exponents(osc, orbit.point)
         multipliers = np.exp(exponents * osc.section_interval)
     else:
-        multipliers = _sorted_multipliers(orbit.monodromy)
+        multipliers = _sorted(orbit.multipliers)
         exponents = exponents_of(multipliers, orbit.duration)
     return Saddle(
         # No direction in (x, v) leads to a cycle but its own.
@@ -61,6 +68,7 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         period=orbit.period,
         duration=orbit.duration,
         points=points,
+        nodes=orbit.nodes,
         multipliers=multipliers,
         exponents=exponents,
         leads_to=leads_to,
@@ -77,9 +85,8 @@ def _kind_of(multipliers: NDArray[np.complex128]) -> str:
     return "flip saddle" if growing[0].real < 0 else "saddle"
 
 
-def _sorted_multipliers(monodromy: Array) -> NDArray[np.complex128]:
-    """Return eigenvalues, the largest first; of a complex pair the one above the real axis first."""
-    values = np.linalg.eigvals(monodromy).astype(complex)
+def _sorted(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return multipliers, the largest first; of a complex pair the one above the real axis first."""
     return values[np.lexsort((-values.imag, -np.abs(values).round(14)))]
 
 
@@ -97,7 +104,7 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
         orbit = orbit.refined(classifier.osc, classifier.stepper)
     values, vectors = np.linalg.eig(orbit.monodromy)
     widths = classifier.region.widths
-    if np.sum(np.abs(values) > 1) > 1:
+    if np.sum(np.abs(orbit.multipliers) > 1) > 1:
         angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
         ring = np.zeros((_ROUND, len(orbit.point)))
         ring[:, 0], ring[:, 1] = widths[0] * np.cos(angles), widths[1] * np.sin(angles)
@@ -112,11 +119,13 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
 
 
 def _mismatch(classifier: BasinClassifier, orbit: Orbit) -> float:
-    """Return the distance between the point of an orbit and its image under the classifier's map, in widths."""
+    """Return the largest distance, in widths, of a node from the image of the one before by the classifier's map."""
     if classifier.osc.autonomous:
         return orbit.residual
-    ended = run_ensemble(classifier.osc, Flow.STATE, classifier.stepper, orbit.point[None], orbit.period)
-    return float(classifier.region.apart(ended.states[0], orbit.point))
+    count = len(orbit.nodes)
+    interval, phases = orbit.duration / count, np.arange(count)
+    ended = run_ensemble(classifier.osc, Flow.STATE, classifier.stepper, orbit.nodes, interval=interval, phases=phases)
+    return float(classifier.region.apart(ended.states, np.roll(orbit.nodes, -1, axis=0)).max())
 
 
 def _label_of_each(low: NDArray[np.int64], high: NDArray[np.int64]) -> tuple[int, int]:

@@ -117,7 +117,7 @@ class Tracing:
             other = self._add(attractor, end, to)
         if other is None:
             osc = self.at(end.value)
-            orbit = Orbit(end.point, attractor.period, end.duration, end.derivative, end.residual(osc))
+            orbit = Orbit(end.point[None], attractor.period, end.duration, end.derivative[None], end.residual(osc))
             self._led_to[at, index, to] = visited(osc, orbit, self.stepper)
             return
         first, second, pair = (index, other, at) if to > at else (other, index, to)
@@ -138,10 +138,13 @@ class Tracing:
         osc, period = self.at(self.values[at]), origin.period
         try:
             if origin.kind == "limit cycle":
-                orbit: Orbit = Cycle(member.point, 1, member.duration, member.derivative, member.residual(osc))
+                orbit: Orbit = Cycle(
+                    member.point[None], 1, member.duration, member.derivative[None], member.residual(osc)
+                )
             else:
-                (monodromy,) = linear_map(osc, member.point[None], self.stepper, intervals=period).derivatives
-                orbit = Orbit(member.point, period, period * osc.section_interval, monodromy, member.residual(osc))
+                point, duration = member.point[None], period * osc.section_interval
+                steps = linear_map(osc, point, self.stepper, intervals=period).derivatives
+                orbit = Orbit(point, period, duration, steps, member.residual(osc))
             attractor = describe_orbit(osc, orbit, self.stepper)
         except VibrokitError:
             return None
