@@ -47,7 +47,7 @@ def reversed_relaxations(problem: ExitProblem, propagator: SegmentPropagator) ->
             if states is not None:
                 path = states[::-1] * np.array([1.0, -1.0])
                 times = np.arange(len(path), dtype=np.float64) * propagator.piece
-                momenta, rates = momenta_of(VectorField(osc), path)
+                momenta, rates = momenta_of(VectorField(osc), path, path * np.array([1.0, -1.0]))
                 action = float(np.trapezoid(rates, dx=propagator.piece))
                 if np.isfinite(momenta).all():  # noise may vanish somewhere on the way
                     found.append(Candidate(problem.source, end.targets[0], times, path, action, FINDER, momenta))
@@ -100,13 +100,14 @@ def _units(problem: ExitProblem) -> Array:
     return np.array([1.0, problem.scene.natural_frequency])
 
 
-def momenta_of(field: VectorField, path: Array, time: float = 0.0) -> tuple[Array, Array]:
+def momenta_of(field: VectorField, path: Array, flipped: Array, time: float = 0.0) -> tuple[Array, Array]:
     """Momenta along a motion run backwards, at a time (s), and the rate at which it costs action.
 
     The damping acts twice, and noise makes up for it: p₂ = (b₂(x, −v) − b₂(x, v)) / g², the difference of the rates of
-    v; p₁ follows from Hamilton's equation for p₂, where the change of g is left out.
+    v at the flipped states and at those of the path; p₁ follows from Hamilton's equation for p₂, where the change of g
+    is left out.
     """
-    flipped, along = path * np.array([1.0, -1.0]), np.tile([0.0, 1.0], (len(path), 1))
+    along = np.tile([0.0, 1.0], (len(path), 1))
     here, there = field.rate(path, time)[:, 1], field.rate(flipped, time)[:, 1]
     own, opposite = field.jacobian(path, time)[:, 1], field.jacobian(flipped, time)[:, 1]
     squared = field.hamiltonian_rate(path, along, time)[:, 1] - here

@@ -6,11 +6,13 @@ the saddle to the attractor, run backwards, under the forces at that time. It en
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 from vibrokit.analyzers.path_ends import AtSaddle
 from vibrokit.analyzers.paths.candidate import Candidate
@@ -18,14 +20,15 @@ from vibrokit.analyzers.paths.reversed_relaxation import FINDER, momenta_of
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
+from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
 from vibrokit.structure.scales import doublings_of
 
-_PHASES = 16  # in a section interval, at which paths end
-_DECAY = math.log(1e4)  # logarithm of the factor by which a deviation from the attractor has fallen
+_PHASES = 16  # in a section interval, at which paths end at first
+_DECAY = math.log(1e3)  # logarithm of the factor by which a deviation from the attractor has fallen
 _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from the saddle a path ends
 _ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
-_PRECISION = 1e-8  # relative, of guesses
+_PRECISION = 1e-5  # relative, of guesses
 _MOST = 2  # for each saddle, the cheapest
 
 Array = NDArray[np.float64]
@@ -40,72 +43,120 @@ def slow_relaxations(problem: ExitProblem, propagator: SegmentPropagator) -> lis
     osc, attractor = problem.scene, problem.attractor
     if osc.autonomous or not doublings_of(osc) or not attractor.is_fixed or propagator.size != 2:
         return []
-    found = []
+    found: list[Candidate] = []
     for end in problem.path_ends:
         if isinstance(end, AtSaddle) and problem.structure.saddles[end.number].kind == "saddle":
-            paths = [_backwards(problem, propagator, end, phase) for phase in _phases(problem, end, propagator)]
-            costs = np.array([np.inf if path is None else path.action for path in paths])
-            least = (costs <= np.roll(costs, 1)) & (costs < np.roll(costs, -1)) & np.isfinite(costs)
-            places = np.flatnonzero(least)
-            found += [paths[place] for place in places[np.argsort(costs[places])][:_MOST]]
+            found += _cheapest(problem, propagator, end)
+    return found
+
+
+def _cheapest(problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> list[Candidate]:
+    """The paths to a saddle whose ends, to a piece, are local minima of the action, the cheapest first.
+
+    Newton's method cannot shift a path in time by more than a fraction of 1/ω_n.
+    """
+    saddle, step = problem.structure.saddles[end.number], propagator.pieces // _PHASES
+    between, pieces = _Between(problem, propagator, saddle), saddle.period * propagator.pieces
+
+    @functools.cache
+    def ending(phase: int) -> Candidate | None:
+        return _backwards(problem, propagator, end, between, phase)
+
+    def cost(phase: int) -> float:
+        path = ending(phase % pieces)
+        return math.inf if path is None else path.action
+
+    costs = [cost(phase) for phase in range(0, pieces, step)]
+    minima = [at for at, here in enumerate(costs) if here <= costs[at - 1] and here < costs[(at + 1) % len(costs)]]
+    found = []
+    for at in sorted(minima, key=costs.__getitem__)[:_MOST]:
+        phase, change = at * step, step
+        while (change := change // 2) >= 1:
+            phase = min((phase, phase - change, phase + change), key=cost)
+        found.append(ending(phase % pieces))
     return [path for path in found if path is not None]
 
 
-def _phases(problem: ExitProblem, end: AtSaddle, propagator: SegmentPropagator) -> range:
-    """Numbers of pieces from the saddle's first point on, at which paths end."""
-    pieces = problem.structure.saddles[end.number].period * propagator.pieces
-    return range(0, pieces, propagator.pieces // _PHASES)
+class _Between:
+    """The attractor's and a saddle's orbit, and the slow motion between them."""
+
+    def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, saddle: Saddle) -> None:
+        osc, attractor, pieces = problem.scene, problem.attractor, propagator.pieces
+        own = states_along(osc, attractor.points, attractor.period, propagator.stepper, pieces)
+        nodes = max(saddle.nodes, saddle.points, key=len)
+        other = states_along(osc, nodes, saddle.period, propagator.stepper, pieces)
+        self.field = VectorField(osc)
+        self.attractor, self.saddle = (_closed(states, propagator.piece) for states in (own, other))
+        times = propagator.piece * np.arange(math.lcm(len(own), len(other)))
+        sides = np.sign(self.saddle(times)[:, 0] - self.attractor(times)[:, 0])
+        self.beside = bool(np.all(sides == sides[0]))
+
+    def flipped(self, time: float, state: Array) -> Array:
+        """Return a state with its velocity against the slow one reversed.
+
+        On either orbit the slow velocity is that of the orbit, which is then left as it is; between them it depends
+        linearly on x. Where the saddle's orbit crosses that of the attractor, it is that of the attractor.
+        """
+        (x, v), (own_x, own_v), (other_x, other_v) = state, self.attractor(time), self.saddle(time)
+        share = (x - own_x) / (other_x - own_x) if self.beside else 0.0
+        return np.array([x, 2 * (own_v + share * (other_v - own_v)) - v])
+
+    def rate(self, time: float, state: Array) -> Array:
+        """Return the rate of a motion whose damping is reversed."""
+        return np.array([state[1], self.field.rate(self.flipped(time, state), time)[1]])
 
 
-def _backwards(problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle, phase: int) -> Candidate | None:
+def _closed(states: Array, spacing: float) -> CubicSpline:
+    times = spacing * np.arange(len(states) + 1)
+    return CubicSpline(times, np.vstack([states, states[:1]]), bc_type="periodic")
+
+
+def _backwards(
+    problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle, between: _Between, phase: int
+) -> Candidate | None:
     """The cheaper of two motions from beside the saddle to the attractor, run backwards; None if neither comes there.
 
     It begins on the section.
     """
-    osc, attractor, saddle = problem.scene, problem.attractor, problem.structure.saddles[end.number]
-    piece, pieces, field = propagator.piece, propagator.pieces, VectorField(osc)
-    along = states_along(osc, max(saddle.nodes, saddle.points, key=len), saddle.period, propagator.stepper, pieces)
-    own = states_along(osc, attractor.points, attractor.period, propagator.stepper, pieces)
-    saddle_state, own_state = along[phase], own[phase % len(own)]
-    values, vectors = np.linalg.eig(field.jacobian(saddle_state, phase * piece))
+    attractor, piece, pieces = problem.attractor, propagator.piece, propagator.pieces
+    time = phase * piece
+    there = between.saddle(time)
+    values, vectors = np.linalg.eig(between.field.jacobian(there, time))
     if np.iscomplexobj(values) or values.max() <= 0:
         return None
     decay = -math.log(float(np.abs(attractor.multipliers).max())) / attractor.duration
     least = (_DECAY / decay - math.log(_BESIDE) / float(values.max())) / piece
     count = phase + pieces * math.ceil(max(0.0, least - phase) / pieces)  # pieces, from a section on
-    away = float(np.linalg.norm((own_state - saddle_state) / propagator.units))
-    unstable = vectors[:, np.argmax(values)] * np.array([1.0, -1.0])
-    unstable *= _BESIDE * away / np.linalg.norm(unstable / propagator.units)
+    away = float(np.linalg.norm((between.attractor(time) - there) / propagator.units))
+    beside = vectors[:, np.argmax(values)] * np.array([1.0, -1.0])
+    beside *= _BESIDE * away / np.linalg.norm(beside / propagator.units)
+    times = time - piece * np.arange(count, -1, -1, dtype=np.float64)
     found = []
-    for side in (1, -1):
-        path = _reversed(field, saddle_state * [1.0, -1.0] + side * unstable, phase * piece, piece, count)
+    for start in (there + beside, there - beside):
+        path = _carried(between, start, times)
         if path is None or problem.is_out(path[:-1]).any():
             continue
-        start = (phase - count) % len(own)
-        if np.linalg.norm((path[0] - own[start]) / propagator.units) > _ARRIVED * away:
-            continue
-        times = piece * np.arange(count + 1, dtype=np.float64)
-        parts = [momenta_of(field, state[None], time) for state, time in zip(path, times, strict=True)]
-        momenta, rates = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        if np.isfinite(momenta).all():
-            action = float(np.trapezoid(rates, dx=piece))
-            found.append(Candidate(problem.source, end.targets[0], times, path, action, FINDER, momenta))
+        if np.linalg.norm((path[0] - between.attractor(times[0])) / propagator.units) <= _ARRIVED * away:
+            found.append(_candidate(problem, end, between, times, path))
     return min(found, key=lambda candidate: candidate.action, default=None)
 
 
-def _reversed(field: VectorField, start: Array, time: float, piece: float, count: int) -> Array | None:
-    """The states (count + 1, 2) of a motion that runs backwards from a time (s), in the order of time.
-
-    Damping acts as in forward motion, and the forcing runs backwards. None if the motion diverges.
-    """
-
-    def rate(elapsed: float, state: Array) -> Array:
-        return field.rate(state, time - elapsed)
-
-    at = piece * np.arange(count + 1)
+def _carried(between: _Between, start: Array, times: Array) -> Array | None:
+    """The states at times (count,) of a motion that ends at a start, followed backwards; None if it diverges."""
+    goes = {"method": "DOP853", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _PRECISION}
     with np.errstate(all="ignore"):
-        solved = solve_ivp(rate, (0.0, at[-1]), start, "DOP853", t_eval=at, rtol=_PRECISION, atol=_PRECISION)
+        solved = solve_ivp(between.rate, (times[-1], times[0]), start, **goes)
     if not solved.success or not np.isfinite(solved.y).all():
         return None
-    path: Array = solved.y.T[::-1] * np.array([1.0, -1.0])
+    path: Array = solved.y.T[::-1]
     return path
+
+
+def _candidate(problem: ExitProblem, end: AtSaddle, between: _Between, times: Array, path: Array) -> Candidate:
+    parts = [
+        momenta_of(between.field, state[None], between.flipped(time, state)[None], time)
+        for state, time in zip(path, times, strict=True)
+    ]
+    momenta, rates = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    action = float(np.trapezoid(rates, times)) if np.isfinite(momenta).all() else math.inf
+    return Candidate(problem.source, end.targets[0], times - times[0], path, action, FINDER, momenta)

@@ -17,6 +17,7 @@ from vibrokit.analyzers.polishing.linear_spaces import normals_of
 from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement
 from vibrokit.errors import StructureError
 
+_GONE = 1e-100  # offset below which squares of its parts could underflow
 _PATIENCE = 5.0  # times the time in which the slowest motion decays: transient growth and spirals take longer
 
 Array = NDArray[np.float64]
@@ -151,6 +152,7 @@ class LinearizedOrbit(ABC):
             shares[: self.neutral] = 0.0  # what is not in the space would not decay
             carried = self.carried(min(phase, phase + sign), leaving=leaving)
             shares = np.asarray(np.linalg.solve(carried, shares)) if leaving else carried @ shares
+            shares[np.abs(shares) < _GONE] = 0.0
             phase += sign
             yield self.space_at(phase, leaving=leaving) @ shares
 
