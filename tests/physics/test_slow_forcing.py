@@ -129,8 +129,7 @@ def test_minimized_directly_it_is_the_same(frequency):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frequency", [0.1, 0.05])
-def test_by_default_both_are_certified(frequency):
-    for energy in vk.LeastAction().run(scene(frequency), structure(frequency)).energies:
-        assert energy.bound is Bound.CERTIFIED
-        assert energy.lower > 0.85 * energy.value
+def test_the_graph_certifies_it():
+    (energy,) = vk.LeastAction(source="left").run(scene(0.05), structure(0.05)).energies
+    assert energy.bound is Bound.CERTIFIED
+    assert energy.lower > 0.9 * energy.value  # `accuracy` is 0.1
