@@ -28,10 +28,10 @@ class Saddle:
         there are more where it is so unstable that rounding errors carry motion away within its duration. Empty for a
         chaotic set.
     multipliers : complex array (n,)
-        Eigenvalues of the map over one period of the orbit, the largest first; of the flow over 2π/ω_n for an
-        equilibrium; empty for a chaotic set.
+        Eigenvalues of the map over one period of the orbit, the largest first, none above 1.8e308; of the flow over
+        2π/ω_n for an equilibrium; empty for a chaotic set.
     exponents : complex array
-        Rates (s⁻¹): eigenvalues at an equilibrium, log(multipliers)/duration for an orbit, the largest Lyapunov
+        Rates (s⁻¹): eigenvalues at an equilibrium, log(multiplier)/duration for an orbit, the largest Lyapunov
         exponent for a chaotic set.
     leads_to : tuple of int
         Labels of the attractors that the two branches of the unstable direction reach; for a chaotic set, of the two

@@ -8,7 +8,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mpmath
 import numpy as np
@@ -54,13 +54,28 @@ class Orbit:
 
     @cached_property
     def monodromy(self) -> Array:
-        """Derivative of the flow over the duration, shape (n, n)."""
-        return _product(self.steps)
+        """Derivative of the flow over the duration, shape (n, n); infinite where deviations grow by more than 1e308."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return functools.reduce(lambda product, step: step @ product, self.steps)
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Eigenvalues of the monodromy matrix, shape (n,)."""
         return multipliers_of(self.steps)
+
+    @cached_property
+    def exponents(self) -> NDArray[np.complex128]:
+        """Growth rates (s⁻¹), shape (n,), in the order of the multipliers; −∞ for a multiplier 0."""
+        if len(self.steps) == 1:
+            with np.errstate(divide="ignore"):
+                return np.asarray(np.log(self.multipliers) / self.duration, dtype=np.complex128)
+        logarithms = [complex(mpmath.log(value)) for value in _eigenvalues(self.steps)]
+        return np.asarray(logarithms, dtype=np.complex128) / self.duration
+
+    @property
+    def unstable_direction(self) -> Array:
+        """Direction (n,) in which motion beside it grows most."""
+        return _growing(self.steps)
 
     def refined(self, osc: Oscillator, stepper: Stepper) -> Orbit:
         """Return the orbit that Newton's method finds from here with another stepper; may raise StructureError."""
@@ -135,11 +150,6 @@ def refine_orbit(osc: Oscillator, guess: Array, period: int, stepper: Stepper) -
             f"residual is {orbit.residual:.1e}. The start is too far away, or the orbit is not hyperbolic; follow the "
             "motion for longer, or take a finer stepper."
         )
-    if not np.isfinite(orbit.monodromy).all():
-        raise StructureError(
-            f"along the orbit of period {period} near {tuple(np.round(guesses[0], 6).tolist())} deviations grow by "
-            "more than a floating-point number can hold; take a shorter forcing period."
-        )
     return orbit
 
 
@@ -194,8 +204,7 @@ def unstable_direction(osc: Oscillator, nodes: Array, period: int, stepper: Step
     steps = linear_map(osc, nodes, stepper, interval=duration, phases=np.arange(len(nodes))).derivatives
     if not np.isfinite(steps).all():
         return None
-    values, vectors = np.linalg.eig(_product(steps))
-    return np.real(vectors[:, int(np.argmax(np.abs(values)))])
+    return _growing(steps)
 
 
 def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
@@ -212,29 +221,36 @@ def arrival_at(orbits: Mapping[int, Array], distances: Array) -> Stop:
     return Stop(points=points, point_labels=labels.astype(np.int64), metrics=metrics)
 
 
-def _product(steps: Array) -> Array:
-    """The product of matrices (count, n, n), the first of them applied first."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return functools.reduce(lambda product, step: step @ product, steps)
+def _growing(steps: Array) -> Array:
+    """The eigenvector (n,) of the largest eigenvalue of a product of matrices (count, n, n)."""
+
+    def scaled_product(product: Array, step: Array) -> Array:
+        after: Array = step @ product
+        return after / np.linalg.norm(after)
+
+    values, vectors = np.linalg.eig(functools.reduce(scaled_product, steps))
+    return np.real(vectors[:, int(np.argmax(np.abs(values)))])
 
 
 def multipliers_of(steps: Array) -> NDArray[np.complex128]:
     """Return the eigenvalues (n,) of a product of matrices (count, n, n), the first of them applied first.
 
-    One that is far smaller than the others would be lost in the rounding errors of the product. So the product is
-    formed with as many digits more as it grows by.
+    One that is larger than any floating-point number is given as the largest of these.
     """
     if len(steps) == 1:
         return np.asarray(np.linalg.eigvals(steps[0]), dtype=complex)
+    return np.nan_to_num([complex(value) for value in _eigenvalues(steps)])
+
+
+def _eigenvalues(steps: Array) -> list[Any]:
+    """The same, as numbers of mpmath.
+
+    One that is far smaller than the others would be lost in the rounding errors of the product. So the product is
+    formed with as many digits more as it grows by.
+    """
     growth = sum(math.log10(np.linalg.cond(step)) for step in steps)
     with mpmath.workdps(30 + math.ceil(growth)):
         product = functools.reduce(
             lambda before, step: mpmath.matrix(step.tolist()) * before, steps, mpmath.eye(steps.shape[1])
         )
-        return np.array([complex(value) for value in mpmath.eig(product, left=False, right=False)])
-
-
-def exponents_of(multipliers: NDArray[np.complex128], duration: float) -> NDArray[np.complex128]:
-    """Return the growth rates (s⁻¹) of multipliers over a duration; −∞ for a multiplier 0."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(multipliers) / duration, dtype=np.complex128)
+        return list(mpmath.eig(product, left=False, right=False))

@@ -124,7 +124,7 @@ def _backwards(
     values, vectors = np.linalg.eig(between.field.jacobian(there, time))
     if np.iscomplexobj(values) or values.max() <= 0:
         return None
-    decay = -math.log(float(np.abs(attractor.multipliers).max())) / attractor.duration
+    decay = -float(attractor.exponents.real.max())
     least = (_DECAY / decay - math.log(_BESIDE) / float(values.max())) / piece
     count = phase + pieces * math.ceil(max(0.0, least - phase) / pieces)  # pieces, from a section on
     away = float(np.linalg.norm((between.attractor(time) - there) / propagator.units))

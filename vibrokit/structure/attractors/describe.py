@@ -20,7 +20,7 @@ from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.wandering import LyapunovEstimate
 from vibrokit.structure.autonomous import equilibrium_exponents
-from vibrokit.structure.orbits import Orbit, exponents_of, visited
+from vibrokit.structure.orbits import Orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -42,15 +42,14 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
     path = _path(osc, orbit.point, orbit.duration, count, stepper)
     still = np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max())
     resting = still and osc.autonomous and orbit.kind != "limit cycle"
-    multipliers = orbit.multipliers
     return _described(
         osc, path, stepper,
         kind="equilibrium" if resting else orbit.kind,
         period=orbit.period,
         duration=0.0 if resting else orbit.duration,
         points=visited(osc, orbit, stepper),
-        multipliers=multipliers,
-        exponents=equilibrium_exponents(osc, orbit.point) if resting else exponents_of(multipliers, orbit.duration),
+        multipliers=orbit.multipliers,
+        exponents=equilibrium_exponents(osc, orbit.point) if resting else orbit.exponents,
         residual=orbit.residual,
         error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
     )  # fmt: skip

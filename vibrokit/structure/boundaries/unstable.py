@@ -14,7 +14,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.orbits import Orbit, exponents_of, least_period, refine_orbit, states_along, visited
+from vibrokit.structure.orbits import Orbit, least_period, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
 _RESIDUAL = 1e-10
@@ -60,8 +60,8 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         exponents = equilibrium_exponents(osc, orbit.point)
         multipliers = np.exp(exponents * osc.section_interval)
     else:
-        multipliers = _sorted(orbit.multipliers)
-        exponents = exponents_of(multipliers, orbit.duration)
+        order = _descending(orbit.multipliers)
+        multipliers, exponents = orbit.multipliers[order], orbit.exponents[order]
     return Saddle(
         # No direction in (x, v) leads to a cycle but its own.
         kind="repeller" if orbit.kind == "limit cycle" else _kind_of(multipliers),
@@ -85,9 +85,9 @@ def _kind_of(multipliers: NDArray[np.complex128]) -> str:
     return "flip saddle" if growing[0].real < 0 else "saddle"
 
 
-def _sorted(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return multipliers, the largest first; of a complex pair the one above the real axis first."""
-    return values[np.lexsort((-values.imag, -np.abs(values).round(14)))]
+def _descending(values: NDArray[np.complex128]) -> NDArray[np.intp]:
+    """The order of multipliers, the largest first; of a complex pair the one above the real axis first."""
+    return np.lexsort((-values.imag, -np.abs(values).round(14)))
 
 
 def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
@@ -102,17 +102,16 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
     with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
         orbit = orbit.refined(classifier.osc, classifier.stepper)
-    values, vectors = np.linalg.eig(orbit.monodromy)
     widths = classifier.region.widths
     if np.sum(np.abs(orbit.multipliers) > 1) > 1:
         angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
         ring = np.zeros((_ROUND, len(orbit.point)))
         ring[:, 0], ring[:, 1] = widths[0] * np.cos(angles), widths[1] * np.sin(angles)
         return tuple(int(label) for label in np.unique(classifier.labels(orbit.point + away * ring)))
-    largest = int(np.argmax(np.abs(values)))
-    direction = vectors[:, largest].real / np.linalg.norm(vectors[:2, largest].real / widths)
+    direction = orbit.unstable_direction
+    direction = direction / np.linalg.norm(direction[:2] / widths)
     direction *= np.copysign(1.0, direction[np.flatnonzero(direction)[0]])
-    growth = np.clip(np.abs(values[largest]), 2.0, _LARGEST_DEPARTURE / away)
+    growth = np.clip(np.abs(orbit.multipliers).max(), 2.0, _LARGEST_DEPARTURE / away)
     distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
     sides = [classifier.labels(orbit.point + side * distances[:, None] * direction) for side in (-1, 1)]
     return _label_of_each(*sides)
