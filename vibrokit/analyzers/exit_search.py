@@ -22,7 +22,7 @@ from vibrokit.analyzers.polishing.leg import pieces_of
 from vibrokit.analyzers.polishing.polish import Polishing
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
-from vibrokit.progress import stage
+from vibrokit.progress import TRAJECTORIES, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
@@ -77,7 +77,7 @@ class ExitSearch:
     def reverse(self) -> None:
         """Run relaxations backwards, to an equilibrium or under slow forcing, and polish these."""
         stepper = self.problem.single_stepper(Flow.STATE)
-        with stage(reversed_relaxation.FINDER, subject=self.problem.attractor.name):
+        with stage(reversed_relaxation.FINDER, subject=self.problem.attractor.name, unit=TRAJECTORIES):
             propagator = SegmentPropagator(self.problem.scene, stepper, max(pieces_of(self.problem.scene)))
             found = reversed_relaxation.reversed_relaxations(self.problem, propagator)
             found += slow_relaxation.slow_relaxations(self.problem, propagator)

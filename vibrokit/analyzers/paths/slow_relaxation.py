@@ -20,6 +20,7 @@ from vibrokit.analyzers.paths.reversed_relaxation import FINDER, momenta_of
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
+from vibrokit.progress import TRAJECTORIES, advance
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
 from vibrokit.structure.scales import doublings_of
@@ -28,7 +29,7 @@ _PHASES = 16  # in a section interval, at which paths end at first
 _DECAY = math.log(1e3)  # logarithm of the factor by which a deviation from the attractor has fallen
 _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from the saddle a path ends
 _ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
-_PRECISION = 1e-5  # relative, of guesses
+_PRECISION, _LEAST = 1e-5, 1e-8  # of guesses: relative error of a step, and relative to the size of the motion
 _MOST = 2  # for each saddle, the cheapest
 
 Array = NDArray[np.float64]
@@ -133,7 +134,7 @@ def _backwards(
     times = time - piece * np.arange(count, -1, -1, dtype=np.float64)
     found = []
     for start in (there + beside, there - beside):
-        path = _carried(between, start, times)
+        path = _carried(between, start, times, propagator.units)
         if path is None or problem.is_out(path[:-1]).any():
             continue
         if np.linalg.norm((path[0] - between.attractor(times[0])) / propagator.units) <= _ARRIVED * away:
@@ -141,9 +142,10 @@ def _backwards(
     return min(found, key=lambda candidate: candidate.action, default=None)
 
 
-def _carried(between: _Between, start: Array, times: Array) -> Array | None:
+def _carried(between: _Between, start: Array, times: Array, units: Array) -> Array | None:
     """The states at times (count,) of a motion that ends at a start, followed backwards; None if it diverges."""
-    goes = {"method": "DOP853", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _PRECISION}
+    advance(unit=TRAJECTORIES)
+    goes = {"method": "DOP853", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _LEAST * units}
     with np.errstate(all="ignore"):
         solved = solve_ivp(between.rate, (times[-1], times[0]), start, **goes)
     if not solved.success or not np.isfinite(solved.y).all():
