@@ -80,9 +80,11 @@ class ExitSearch:
         with stage(reversed_relaxation.FINDER, subject=self.problem.attractor.name, unit=TRAJECTORIES):
             propagator = SegmentPropagator(self.problem.scene, stepper, max(pieces_of(self.problem.scene)))
             found = reversed_relaxation.reversed_relaxations(self.problem, propagator)
-            found += slow_relaxation.slow_relaxations(self.problem, propagator)
+            slow = slow_relaxation.slow_relaxations(self.problem, propagator)
         if found:
             self._polish(found)
+        if slow:
+            self._polish(slow, quick=self._shots_follow)
 
     def shoot(self) -> None:
         """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""

@@ -29,7 +29,7 @@ _PHASES = 16  # in a section interval, at which paths end at first
 _DECAY = math.log(1e3)  # logarithm of the factor by which a deviation from the attractor has fallen
 _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from the saddle a path ends
 _ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
-_PRECISION, _LEAST = 1e-5, 1e-8  # of guesses: relative error of a step, and relative to the size of the motion
+_PRECISION, _LEAST = 1e-5, 1e-6  # of guesses: relative error of a step, and relative to the size of the motion
 _MOST = 2  # for each saddle, the cheapest
 
 Array = NDArray[np.float64]
@@ -87,10 +87,22 @@ class _Between:
         nodes = max(saddle.nodes, saddle.points, key=len)
         other = states_along(osc, nodes, saddle.period, propagator.stepper, pieces)
         self.field = VectorField(osc)
-        self.attractor, self.saddle = (_closed(states, propagator.piece) for states in (own, other))
-        times = propagator.piece * np.arange(math.lcm(len(own), len(other)))
-        sides = np.sign(self.saddle(times)[:, 0] - self.attractor(times)[:, 0])
+        both = math.lcm(len(own), len(other))
+        states = np.hstack([np.tile(states, (both // len(states), 1)) for states in (own, other)])
+        sides = np.sign(states[:, 2] - states[:, 0])
         self.beside = bool(np.all(sides == sides[0]))
+        times = propagator.piece * np.arange(both + 1)
+        self.orbits = CubicSpline(times, np.vstack([states, states[:1]]), bc_type="periodic")
+
+    def attractor(self, time: float) -> Array:
+        """Return the state (2,) of the attractor at a time (s)."""
+        state: Array = self.orbits(time)[:2]
+        return state
+
+    def saddle(self, time: float) -> Array:
+        """Return the state (2,) of the saddle's orbit at a time (s)."""
+        state: Array = self.orbits(time)[2:]
+        return state
 
     def flipped(self, time: float, state: Array) -> Array:
         """Return a state with its velocity against the slow one reversed.
@@ -98,18 +110,13 @@ class _Between:
         On either orbit the slow velocity is that of the orbit, which is then left as it is; between them it depends
         linearly on x. Where the saddle's orbit crosses that of the attractor, it is that of the attractor.
         """
-        (x, v), (own_x, own_v), (other_x, other_v) = state, self.attractor(time), self.saddle(time)
+        (x, v), (own_x, own_v, other_x, other_v) = state, self.orbits(time)
         share = (x - own_x) / (other_x - own_x) if self.beside else 0.0
         return np.array([x, 2 * (own_v + share * (other_v - own_v)) - v])
 
     def rate(self, time: float, state: Array) -> Array:
         """Return the rate of a motion whose damping is reversed."""
         return np.array([state[1], self.field.rate(self.flipped(time, state), time)[1]])
-
-
-def _closed(states: Array, spacing: float) -> CubicSpline:
-    times = spacing * np.arange(len(states) + 1)
-    return CubicSpline(times, np.vstack([states, states[:1]]), bc_type="periodic")
 
 
 def _backwards(
@@ -145,7 +152,7 @@ def _backwards(
 def _carried(between: _Between, start: Array, times: Array, units: Array) -> Array | None:
     """The states at times (count,) of a motion that ends at a start, followed backwards; None if it diverges."""
     advance(unit=TRAJECTORIES)
-    goes = {"method": "DOP853", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _LEAST * units}
+    goes = {"method": "LSODA", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _LEAST * units}
     with np.errstate(all="ignore"):
         solved = solve_ivp(between.rate, (times[-1], times[0]), start, **goes)
     if not solved.success or not np.isfinite(solved.y).all():
