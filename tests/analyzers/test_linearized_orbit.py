@@ -30,7 +30,7 @@ def structure():
 def orbit(request, structure):
     found = structure.attractors[0] if request.param == "attractor" else structure.saddles[0]
     propagator = SegmentPropagator(OSC, single_stepper(OSC, Flow.HAMILTONIAN_VARIATIONAL))
-    return linearized_orbit(propagator, found.points[0], found.period, 0.0)
+    return linearized_orbit(propagator, found.points[:1], found.period, 0.0)
 
 
 def rates(t, z):

@@ -254,9 +254,10 @@ def carry(
     pending = [workers.submit(_counted_apart, work, task) for task in tasks]
     try:
         for number, future in enumerate(pending):
-            futures.wait((future,))
-            if executor is not None and (future.cancelled() or future.exception()):
-                pending[number] = future = workers.submit(_counted_apart, work, tasks[number])
+            if executor is not None:
+                futures.wait((future,))
+                if future.cancelled() or future.exception():
+                    pending[number] = future = workers.submit(_counted_apart, work, tasks[number])
             result, counts = future.result()
             count(**counts)
             yield result

@@ -62,5 +62,10 @@ class Saddle:
         """Whether its branches lead to different attractors."""
         return len(set(self.leads_to)) > 1
 
+    @property
+    def at_equal_times(self) -> NDArray[np.float64]:
+        """Its nodes, or its points if these are more."""
+        return max(self.nodes, self.points, key=len)
+
     def __repr__(self) -> str:
         return f"Saddle: {self.kind}, period {self.period}, {len(self.points)} points, leads to {self.leads_to}"

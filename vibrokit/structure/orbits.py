@@ -81,10 +81,6 @@ class Orbit:
         """Return the orbit that Newton's method finds from here with another stepper; may raise StructureError."""
         return refine_orbit(osc, self.nodes, self.period, stepper)
 
-    def starting_at(self, visit: int) -> Array:
-        """Return its nodes, where it has several, from another visit of the section on."""
-        return np.roll(self.nodes, -visit * (len(self.nodes) // self.period), axis=0)
-
     def moved_by_tightening(self, osc: Oscillator, stepper: Stepper, times: int) -> float:
         """Return how far its point moves when the stepper is refined so many times; infinite if the orbit vanishes."""
         furthest = 0.0
@@ -175,6 +171,16 @@ def visited(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     for _ in range(orbit.period - 1):
         points.append(run_ensemble(osc, Flow.STATE, stepper, points[-1][None], 1).states[0])
     return np.array(points)
+
+
+def nodes_from(visit: int, nodes: Array, points: Array) -> Array:
+    """Return the nodes (count, n) of an orbit from another visit of the section on: that point, if there is one node.
+
+    The points (period, n) are those of all visits.
+    """
+    if len(nodes) == 1:
+        return points[visit : visit + 1]
+    return np.roll(nodes, -visit * (len(nodes) // len(points)), axis=0)
 
 
 def states_along(osc: Oscillator, nodes: Array, period: int, stepper: Stepper, pieces: int) -> Array:

@@ -84,8 +84,7 @@ class _Between:
     def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, saddle: Saddle) -> None:
         osc, attractor, pieces = problem.scene, problem.attractor, propagator.pieces
         own = states_along(osc, attractor.points, attractor.period, propagator.stepper, pieces)
-        nodes = max(saddle.nodes, saddle.points, key=len)
-        other = states_along(osc, nodes, saddle.period, propagator.stepper, pieces)
+        other = states_along(osc, saddle.at_equal_times, saddle.period, propagator.stepper, pieces)
         self.field = VectorField(osc)
         both = math.lcm(len(own), len(other))
         states = np.hstack([np.tile(states, (both // len(states), 1)) for states in (own, other)])

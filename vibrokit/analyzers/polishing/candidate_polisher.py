@@ -87,9 +87,8 @@ class CandidatePolisher:
 
     def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
         """Whether a path to an end is found; by multiple shooting first where momenta are known."""
-        found, at_once = False, candidate.momenta is not None
-        thorough, quickly = PathSolver.solve, PathSolver.solve_at_once if at_once else PathSolver.solve_near
-        ways = (quickly,) if quick else (PathSolver.solve_at_once, thorough)[not at_once :]
+        found, first = False, (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
+        ways = (first or (PathSolver.solve_near,)) if quick else (*first, PathSolver.solve)
         for way in ways:
             try:
                 new = self._add(self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,))))

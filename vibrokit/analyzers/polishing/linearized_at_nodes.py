@@ -116,12 +116,11 @@ def orbit_at_nodes(propagator: SegmentPropagator, guess: Array, period: int) -> 
     orbit, or if it is not hyperbolic.
     """
     osc, stepper, pieces = propagator.osc, propagator.stepper, propagator.pieces
-    orbit = refine_orbit(osc, guess, period, stepper)
-    states = states_along(osc, orbit.nodes, period, stepper, pieces)
-    states = refine_orbit(osc, states, period, stepper).nodes
+    nodes = refine_orbit(osc, guess, period, stepper).nodes if len(guess) == 1 else guess
+    states = refine_orbit(osc, states_along(osc, nodes, period, stepper, pieces), period, stepper).nodes
     linear = gaussian_map(osc, states, stepper, interval=osc.section_interval / pieces, phases=np.arange(len(states)))
     multipliers = multipliers_of(linear.derivatives)
-    check_hyperbolic(orbit.point, multipliers)
+    check_hyperbolic(states[0], multipliers)
     unstable, stable = _spaces(linear, multipliers, propagator)
     return LinearizedAtNodes(propagator, multipliers, states, linear, unstable, stable)
 

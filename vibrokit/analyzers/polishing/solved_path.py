@@ -19,7 +19,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ExitPath
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.orbits import states_along, unstable_direction
+from vibrokit.structure.orbits import nodes_from, states_along, unstable_direction
 from vibrokit.symbolic.flow_kind import Flow
 
 _EQUAL = 1e-6  # relative difference of the actions of one path found twice
@@ -124,9 +124,8 @@ def _along(scene: Oscillator, saddle: Saddle, stepper: Stepper, here: Array, the
         return np.roll(orbit, -first, axis=0)[: (last - first) % count]
     first, last = (_nearest(scene, saddle.points, state) for state in (here, there))
     visited = (first + np.arange((last - first) % len(saddle.points))) % len(saddle.points)
-    nodes = max(saddle.nodes, saddle.points, key=len)
-    states = states_along(scene, nodes, saddle.period, stepper, samples).reshape(saddle.period, samples, -1)
-    return np.concatenate([nothing, *states[visited]])
+    states = states_along(scene, saddle.at_equal_times, saddle.period, stepper, samples)
+    return np.concatenate([nothing, *states.reshape(saddle.period, samples, -1)[visited]])
 
 
 def _relaxation(
@@ -135,8 +134,7 @@ def _relaxation(
     """The motion from a saddle to an attractor, until it is near the state `there` on the section."""
     scene, stepper = problem.scene, problem.single_stepper(Flow.STATE)
     visit, by = _nearest(scene, saddle.points, here), problem.single_stepper(Flow.STATE_VARIATIONAL)
-    start, several = saddle.points[visit], len(saddle.nodes) > 1
-    nodes = np.roll(saddle.nodes, -visit * (len(saddle.nodes) // saddle.period), axis=0) if several else start[None]
+    start, nodes = saddle.points[visit], nodes_from(visit, saddle.nodes, saddle.points)
     direction = unstable_direction(scene, nodes, max(1, saddle.period), by)
     if direction is None:
         raise StructureError(f"motion from the saddle at ({start[0]:.6g}, {start[1]:.6g}) diverges.")

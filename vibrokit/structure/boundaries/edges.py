@@ -41,21 +41,20 @@ Array = NDArray[np.float64]
 class EdgeTrack:
     """A motion on the boundary between two basins, whose labels at its end are given, the lower first.
 
-    Its points (count, n) are the midpoints between the two sides at every section, at every sixteenth of 2π/ω_n in an
+    Its nodes (parts · (count − 1) + 1, n) are the midpoints between the two sides at all times at which these were
+    brought together. Its points (count, n) are those at the sections, of which every sixteenth of 2π/ω_n is one in an
     autonomous scene. Its stretches (count − 1,) are the logarithms of the ratios by which the distance of the two sides
-    grows from each point to the next. Its nodes (parts · (count − 1) + 1, n) are the midpoints at all times at which
-    the sides were brought together; with one part of a section interval, they are the points.
+    grows from each point to the next.
     """
 
     labels: tuple[int, int]
-    points: Array
-    stretches: Array
     nodes: Array
+    stretches: Array
+    parts: int = 1
 
     @property
-    def parts(self) -> int:
-        """Times in a section interval at which the sides were brought together."""
-        return (len(self.nodes) - 1) // max(1, len(self.points) - 1)
+    def points(self) -> Array:
+        return self.nodes[:: self.parts]
 
     def guess(self, period: int) -> Array:
         """Return a guess of an orbit of some period that the motion has converged to, as of `refine_orbit`."""
@@ -162,11 +161,9 @@ class Straddles:
         low, high = sorted(int(label) for label in self.end_labels[index])
         nodes = np.array([points[index] for points in self._points])
         stretches = np.array([stretches[index] for stretches in self._stretches])
-        each, whole = 1 if self.classifier.osc.autonomous else self.parts, len(stretches) // self.parts * self.parts
-        if each == 1:
-            return EdgeTrack((low, high), nodes, stretches, nodes)
-        nodes = nodes[: whole + 1]
-        return EdgeTrack((low, high), nodes[::each], stretches[:whole].reshape(-1, each).sum(axis=1), nodes)
+        parts = 1 if self.classifier.osc.autonomous else self.parts
+        whole = len(stretches) // parts * parts  # up to the last section
+        return EdgeTrack((low, high), nodes[: whole + 1], stretches[:whole].reshape(-1, parts).sum(axis=1), parts)
 
     def _bring_together(self, wide: NDArray[np.intp]) -> None:
         """Bring the ends of some pairs together, drop pairs that lost the boundary, and record all points."""

@@ -179,7 +179,7 @@ class SaddleSearch:
         for strip, points in zip(strips, visits, strict=True):
             period = recurrence(self.region.scaled(points), _LONGEST_PERIOD)
             with contextlib.suppress(StructureError):
-                if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0), points), period):
+                if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0)), period):
                     self._explained.add(strip.labels)
 
     def _explain(self, straddles: Straddles, which: NDArray[np.bool_]) -> None:

@@ -14,7 +14,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.orbits import Orbit, least_period, refine_orbit, states_along, visited
+from vibrokit.structure.orbits import Orbit, least_period, nodes_from, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
 _RESIDUAL = 1e-10
@@ -52,8 +52,7 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
     """Describe an unstable orbit or limit cycle, from its point of least x on, checked with finer steppers."""
     points = visited(osc, orbit, stepper)
     if orbit.period > 1:
-        first = int(np.argmin(points[:, 0]))
-        nodes = orbit.starting_at(first) if len(orbit.nodes) > 1 else points[first]
+        nodes = nodes_from(int(np.argmin(points[:, 0])), orbit.nodes, points)
         orbit = refine_orbit(osc, nodes, orbit.period, stepper)
         points = visited(osc, orbit, stepper)
     if orbit.kind == "equilibrium":
