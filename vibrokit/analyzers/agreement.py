@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
@@ -12,36 +12,50 @@ from vibrokit.results.finding import Finding
 
 VAGUE = 0.5
 """Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
+_SAME = 1e-6  # relative difference of the actions of a path and of its mirror image
 
 
 def combined(
-    attractor: Attractor, branches: Sequence[ActivationEnergy], estimates: Iterable[ActivationEnergy]
+    attractor: Attractor,
+    branches: Sequence[ActivationEnergy],
+    estimates: Iterable[ActivationEnergy],
+    mirrored: Mapping[int, ActivationEnergy] | None = None,
 ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
     """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
     The upper bound is the action of the best path and its numerical error. The lower bound rests on the graph, which
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
-    excludes a cheaper path, and the lower bound is 0.
+    excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
 
-    Given are the polished paths, the cheapest first, and the graph's estimates, one for each target. Returns an energy
-    and a finding for each target.
+    Given are the polished paths, the cheapest first, and by target the graph's estimates and the energies that those of
+    the attractor are mirror images of. Returns an energy and a finding for each target.
     """
     paths: dict[int, ActivationEnergy] = {}
     for branch in branches:
         paths.setdefault(branch.target, branch)
     graph = {estimate.target: estimate for estimate in estimates}
     pairs = [
-        _of_target(attractor, paths.get(target), graph.get(target))
+        _of_target(attractor, paths.get(target), graph.get(target), (mirrored or {}).get(target))
         for target in sorted({*paths, *graph}, key=lambda target: (target < 0, target))
     ]
     return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
 
 
+def cost_the_same(one: ActivationEnergy, other: ActivationEnergy) -> bool:
+    """Return whether two exits, one of which may be the mirror image of the other, cost the same."""
+    return abs(one.value - other.value) <= _SAME * one.value
+
+
 def _of_target(
-    attractor: Attractor, path: ActivationEnergy | None, graph: ActivationEnergy | None
+    attractor: Attractor,
+    path: ActivationEnergy | None,
+    graph: ActivationEnergy | None,
+    mirrored: ActivationEnergy | None,
 ) -> tuple[ActivationEnergy, Finding]:
-    if path is None:
+    if path is not None and mirrored is not None and cost_the_same(path, mirrored):
+        code, energy = Code.MIRROR_IMAGE, dataclasses.replace(path, lower=mirrored.lower, bound=mirrored.bound)
+    elif path is None:
         assert graph is not None
         code, energy = Code.NO_POLISHED_PATH, graph
     elif graph is None:

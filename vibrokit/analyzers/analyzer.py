@@ -166,7 +166,8 @@ class Analyzer(ABC):
         with working(progress, time_limit) as work:
             try:
                 for attractor in sources:
-                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept)
+                    known = tuple(exit_ for one in analyses.values() for exit_ in (*one.estimates, *one.branches))
+                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept, known)
                     with stage(type(self).__name__, subject=attractor.name):
                         analyses[attractor.label] = self._analyzed(problem)
                     if not analyses[attractor.label].complete:

@@ -14,7 +14,7 @@ from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
-from vibrokit.analyzers.paths import closest_approach, reversed_relaxation, slow_relaxation
+from vibrokit.analyzers.paths import closest_approach, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import usable_ends
@@ -34,7 +34,8 @@ from vibrokit.symbolic.flow_kind import Flow
 if TYPE_CHECKING:
     from vibrokit.analyzers.least_action import LeastAction
 
-_AGREED = (Code.AGREEMENT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)  # more nodes change no other one
+_AGREED = (Code.AGREEMENT, Code.MIRROR_IMAGE, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
+"""What more nodes do not change, however many there are."""
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 _GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
@@ -46,6 +47,7 @@ class ExitSearch:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
+        self._mirror = mirror.Mirror(problem)
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
         self._searched = False  # whether there are no more solutions
@@ -54,9 +56,11 @@ class ExitSearch:
     def run(self) -> Analysis:
         """Search, polish and check, step by step, until the end or until the work is stopped."""
         steps = (
+            (mirror.FINDER, self.mirror),
             (reversed_relaxation.FINDER, self.reverse),
             ("graph", self.search_graph),
             ("action plot", self.shoot),
+            (mirror.FINDER, self.mirror),
             ("graph", self.refine_graph),
             (closest_approach.FINDER, self.approach),
             ("graph", self.search_beginnings),
@@ -73,6 +77,13 @@ class ExitSearch:
     @property
     def stopped(self) -> bool:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
+
+    def mirror(self) -> None:
+        """Polish mirror images of known paths; those that leave another attractor take the place of shooting."""
+        images = self._mirror.candidates(self._polished()[0])
+        if images:
+            self._polish(images, quick=self.analyzer.graph is not None)
+            self._shots_follow &= not self._polished()[0]
 
     def reverse(self) -> None:
         """Run relaxations backwards, to an equilibrium or under slow forcing, and polish these."""
@@ -139,7 +150,7 @@ class ExitSearch:
             return
         branches = self._polished()[0]
         least = _least(branches)
-        for target in sorted(least.keys() - self._unresolvable(self.graph, branches)):
+        for target in sorted(least.keys() - self._unresolvable(self.graph, branches) - self._mirror.energies.keys()):
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
                 self._polish(self.analyzer.graph.beginnings(self.problem, least[target], self.graph))
 
@@ -175,17 +186,24 @@ class ExitSearch:
         """Labels of the attractors for which finer grids are of no use.
 
         An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
+        Mirror images have their bounds.
         """
-        with_path = {branch.target for branch in branches}
-        agreed = self._agreed(self._estimates(graph, branches), branches)
-        return self._unresolvable(graph, branches) | {
-            label for label in self._beyond if label in agreed or label not in with_path
-        }
+        with_path, estimates = {branch.target for branch in branches}, self._estimates(graph, branches)
+        agreed, mirrored = (self._agreed(estimates, branches, code) for code in (Code.AGREEMENT, Code.MIRROR_IMAGE))
+        beyond = {label for label in self._beyond if label in agreed or label not in with_path}
+        return self._unresolvable(graph, branches) | mirrored | beyond
 
-    def _agreed(self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy]) -> set[int]:
-        """Labels of the attractors on which estimates and paths agree."""
-        _, compared = combined(self.problem.attractor, branches, estimates)
-        return {finding.target for finding in compared if finding.code is Code.AGREEMENT and finding.target is not None}
+    def _agreed(
+        self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy], code: Code = Code.AGREEMENT
+    ) -> set[int]:
+        """Labels of the attractors for which estimates and paths compare as a code says."""
+        _, compared = self._combined(branches, estimates)
+        return {finding.target for finding in compared if finding.code is code and finding.target is not None}
+
+    def _combined(
+        self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
+    ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+        return combined(self.problem.attractor, branches, estimates, self._mirror.energies)
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
@@ -201,7 +219,7 @@ class ExitSearch:
         branches = self._polished()[0]
         useless = self._useless(graph, branches)
         estimates = [each for each in self._estimates(graph, branches) if each.target not in useless]
-        _, compared = combined(self.problem.attractor, branches, estimates)
+        _, compared = self._combined(branches, estimates)
         if any(finding.code not in _AGREED for finding in compared):
             return math.inf
         return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
@@ -246,7 +264,7 @@ class ExitSearch:
         """Combine what was found."""
         branches, polished = self._polished()
         estimates = () if self.graph is None else self._estimates(self.graph, branches)
-        energies, compared = combined(self.problem.attractor, branches, estimates)
+        energies, compared = self._combined(branches, estimates)
         every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
         findings += compared

@@ -37,6 +37,9 @@ class LeastAction(Analyzer):
     differ by about 0.1 %. Paths are certified after each search. If the work is stopped in between, they are
     returned with the bounds that are known.
 
+    In a scene with odd forces, an attractor may be the mirror image of one that was analyzed before. The mirror images
+    of its paths take the place of shooting and of the finer graphs.
+
     A path that passes saddles and other attractors on its way is polished in legs, from each of these orbits to the
     next.
 

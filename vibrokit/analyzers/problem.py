@@ -20,6 +20,7 @@ from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
+from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.structure import Structure
 from vibrokit.structure.orbits import Orbit, refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -44,6 +45,8 @@ class ExitProblem:
         Where a method may do parts of its work; None for threads of this process.
     checkpoint : Checkpoint
         Where a method may keep what long work has reached.
+    known : tuple of ActivationEnergy
+        What the method has found of other attractors: their energies, and their branches.
     """
 
     osc: Oscillator
@@ -53,6 +56,7 @@ class ExitProblem:
     stepper: Stepper | None = None
     executor: Executor | None = None
     checkpoint: Checkpoint = dataclasses.field(default_factory=lambda: Checkpoint(None, {}))
+    known: tuple[ActivationEnergy, ...] = ()
 
     @property
     def source(self) -> int:

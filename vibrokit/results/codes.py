@@ -354,6 +354,11 @@ class Code(StrEnum):
         "From {state} to {goal} only the graph's estimate {graph:.4g} ± {error:.1g} is available; no path was "
         "polished.",
     )  # fmt: skip
+    MIRROR_IMAGE = (
+        "mirror-image", INFO,
+        "The path from {state} to {goal} with action {path:.6g} is the mirror image of one that leaves another "
+        "attractor; both have the same bounds.",
+    )  # fmt: skip
     NOT_SEARCHED = (
         "not-searched", WARNING,
         "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "

@@ -1,0 +1,89 @@
+"""Mirror images of exit paths: energies are those of a search of its own, and only symmetric scenes have them."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.paths.mirror import Mirror
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.codes import Code
+
+LEAST = vk.LeastAction(graph=vk.GraphSearch(nodes=(120, 120)), shooting=vk.Shooting(points=2000, rounds=8))
+EVEN = {
+    "forced": {"excitations": (vk.Harmonic(amplitude=0.1, frequency=0.8),)},
+    "third harmonic": {"excitations": (vk.Harmonic(0.08, 0.8), vk.Harmonic(0.02, 2.4))},
+    "unforced": {},
+}
+ODD = {
+    "noise": {"noise": vk.StateDependentNoise(1e-4, "1 + c*x", c=0.1)},
+    "second harmonic": {"excitations": (vk.Harmonic(0.1, 0.8), vk.Harmonic(0.02, 1.6))},
+}
+
+
+@functools.cache
+def wells(kind):
+    more = {"noise": vk.WhiteNoise(intensity=1e-4), "excitations": EVEN["forced"]["excitations"]} | (EVEN | ODD)[kind]
+    if kind == "unforced":
+        more["excitations"] = ()
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(-1.0, 1.0), **more)
+    return osc, vk.find_structure(osc, cells=(80, 80), starts=(10, 10), manifolds=False)
+
+
+@functools.cache
+def both(kind):
+    return LEAST.run(*wells(kind))
+
+
+@pytest.mark.parametrize("kind", ["forced", "unforced", pytest.param("third harmonic", marks=pytest.mark.slow)])
+def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
+    osc, structure = wells(kind)
+    first, second = both(kind).energies
+    (image,) = both(kind).found(Code.MIRROR_IMAGE)
+    assert (image.source, image.target) == (second.source, second.target) == (first.target, first.source)
+    assert (second.lower, second.bound) == (first.lower, first.bound)
+    alone = vk.LeastAction(source=second.source, graph=LEAST.graph, shooting=LEAST.shooting).run(osc, structure)
+    assert not alone.found(Code.MIRROR_IMAGE)
+    assert alone.energies[0].value == pytest.approx(second.value, rel=1e-9)
+    assert alone.energies[0].certificate is not None
+    assert second.certificate.residual < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["noise", pytest.param("second harmonic", marks=pytest.mark.slow)])
+def test_other_scenes_have_none(kind):
+    result = both(kind)
+    assert len(result.energies) == 2
+    assert not result.found(Code.MIRROR_IMAGE)
+
+
+def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():
+    osc, structure = wells("forced")
+    left, right = structure.attractors
+    known = both("forced").energies[:1]
+    (image,) = Mirror(ExitProblem(osc, structure, right, vk.LeaveBasin(), known=known)).candidates(())
+    period = 2 * np.pi / 0.8
+    path = known[0].path
+    half = np.searchsorted(path.t, period / 2 - 1e-9)
+    assert image.times[0] == pytest.approx(period)
+    assert np.ptp(np.diff(image.times)) < 1e-9
+    np.testing.assert_allclose(image.times, path.t[half:] + period / 2, atol=1e-9)
+    np.testing.assert_array_equal(image.states, -path.q[half:])
+    np.testing.assert_array_equal(image.momenta, -path.p[half:])
+    assert (image.source, image.target) == (right.label, left.label)
+
+
+def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
+    spring = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.3, spring=spring, excitations=(vk.Harmonic(0.05, 0.8),),
+        noise=vk.WhiteNoise(intensity=1e-3),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, cells=(80, 80), starts=(10, 10), manifolds=False)
+    middle = structure.attractor("middle-oscillation")
+    found = vk.LeastAction(source=middle.label, graph=None, shooting=LEAST.shooting).run(osc, structure)
+    one = found.branches[0]
+    problem = ExitProblem(osc, structure, middle, vk.LeaveBasin())
+    (image,) = Mirror(problem).candidates((one,))
+    assert {image.target, one.target} == {0, 2}
+    assert Mirror(problem).candidates(found.branches) == []
