@@ -156,9 +156,10 @@ class Finder:
         """Track the boundaries between basins to the saddles on them."""
         assert self.grid is not None
         basins = self.grid.basins
-        classifier = self.classifier.sharing(basins, self.request.margin or 2)
         sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
-        self.saddle_search = SaddleSearch(classifier, basins, self.orbit_stepper, sections=sections)
+        self.saddle_search = SaddleSearch(
+            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or 2
+        )
         self.saddle_search.run(self.rng)
 
     def _grow_manifolds(self) -> None:

@@ -45,6 +45,7 @@ _OVERLAP = 4.0  # times the settling distance
 _SAMPLE = 4096  # points of a set that never repeats
 _FAILURES = 8  # states without a limit cycle after which the search for cycles ends
 _REFINEMENTS = 4  # of a stepper, until every attractor persists with it
+_LONG_PERIODS, _FEW_PERIODS, _MANY_TURNS = 512, 8, 8192  # for which that must; units of 2π/ω_n
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
 Array = NDArray[np.float64]
@@ -220,6 +221,12 @@ def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: in
     return np.array(visits)
 
 
+def _lasting(osc: Oscillator) -> int:
+    """Periods for which a repeating attractor must persist; fewer where one has many free oscillations."""
+    turns = osc.section_interval * osc.natural_frequency / (2 * math.pi)
+    return min(_LONG_PERIODS, max(_FEW_PERIODS, math.ceil(_MANY_TURNS / turns)))
+
+
 def _is_on(orbit: Array, point: Array) -> bool:
     """Whether a point lies on a closed curve, within the spacing of its samples."""
     extent = np.ptp(orbit, axis=0)
@@ -243,7 +250,7 @@ def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, distances
         (end,) = run_ensemble(osc, Flow.STATE, stepper, states, periods).states
         return _is_on(attractor.orbit, end)
     if attractor.repeats:
-        known, periods = attractor.points, 512 * attractor.period
+        known, periods = attractor.points, _lasting(osc) * attractor.period
     else:
         known, states = attractor.points, attractor.points[:: max(1, len(attractor.points) // _WATCHED)]
     ends = run_ensemble(osc, Flow.STATE, stepper, states, periods).states[:, :2]

@@ -62,27 +62,33 @@ Pair = tuple[int, int]
 class SaddleSearch:
     """Finds the saddles on the boundaries between basins by edge tracking; an interrupt leaves those found so far.
 
-    The classifier finds where states lead, and integrates those on the boundaries. One that uses a finished grid is
-    fast; a boundary on which it finds no saddle is followed again without the grid. There are at most `trackers`
-    motions for each pair of basins that meet, six after 32 sections, and two when classifying states has taken 10⁶
-    sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat after `sections`, or
-    earlier if classifying states has taken 10⁶ more since the 128th.
+    The classifier finds where states lead, and integrates those on the boundaries. The cells of the grid that lie
+    `margin` cells inside a basin help it; a boundary on which no saddle is found is followed again without them. There
+    are at most `trackers` motions for each pair of basins that meet, six after 32 sections, and two when classifying
+    states has taken 10⁶ sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat
+    after `sections`, or earlier if classifying states has taken 10⁶ more since the 128th.
     """
 
-    classifier: BasinClassifier
+    plain: BasinClassifier
     basins: Basins
     orbit_stepper: Stepper
     trackers: int = 9
     sections: int = _SOON
+    margin: int = 2
 
     def __post_init__(self) -> None:
-        self.osc = self.classifier.osc
-        self.region = self.classifier.region
+        self.osc = self.plain.osc
+        self.region = self.plain.region
         self._found: list[Saddle] = []
         self._places: list[Array] = []  # in units of the region's widths, as all points that are compared
         self._explained: set[Pair] = set()
         self._lost: tuple[Pair, ...] = ()
         self._findings: list[Finding] = []
+
+    @functools.cached_property
+    def classifier(self) -> BasinClassifier:
+        """The one that uses the grid; where no basins meet, none is needed."""
+        return self.plain.sharing(self.basins, self.margin)
 
     @property
     def saddles(self) -> tuple[Saddle, ...]:
@@ -103,7 +109,7 @@ class SaddleSearch:
     def run(self, rng: np.random.Generator) -> None:
         """Track the boundaries, the longest on the grid first."""
         meetings = meeting_cells(self.basins)
-        most = max(_LEAST_MOTIONS, min(_MOST, _MOST * _QUICK // self.classifier.budget))
+        most = max(_LEAST_MOTIONS, min(_MOST, _MOST * _QUICK // self.plain.budget))
         pairs = set(sorted(meetings, key=lambda pair: (-len(meetings[pair]), pair))[: most // 2])
         if len(meetings) > len(pairs):
             skipped = len(meetings) - len(pairs)
@@ -113,8 +119,9 @@ class SaddleSearch:
             if self.osc.autonomous:
                 self._add_equilibria()
             unexplained = pairs  # edge tracking may find other saddles where there is one at rest
-            for classifier in (self.classifier, dataclasses.replace(self.classifier, core=None)):
+            for shared in (True, False):
                 if unexplained:
+                    classifier = self.classifier if shared else self.plain
                     each = max(2, min(self.trackers, most // len(unexplained)))
                     straddles = self._straddles(classifier, each, rng, unexplained)
                     self._follow(straddles, tracked)
