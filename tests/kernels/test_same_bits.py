@@ -38,7 +38,7 @@ free = vk.Oscillator(
     natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(1.0, 0.3), excitations=(vk.Harmonic(0.18, 0.57),),
     noise=vk.WhiteNoise(intensity=1e-4),
 )
-widest = [Flow.HAMILTONIAN_VARIATIONAL]  # every stepper takes it; RK4 and Order8, one of each kind of driver, others too
+widest = [Flow.HAMILTONIAN_VARIATIONAL]  # RK4 and Order8, one of each kind of driver, take others too
 cases = [(smooth, vk.RK4(128), [*widest, Flow.STATE, Flow.NOISY]), (smooth, vk.RK8(64), widest)]
 cases += [(jumping, vk.Order8(1e-8), [*widest, Flow.STATE, Flow.COVARIANCE_REVERSED])]
 cases += [(jumping, vk.FreeFlight(1e-8), widest), (free, vk.RKN12(16), widest)]

@@ -188,8 +188,15 @@ def test_a_weakly_damped_boundary_takes_long_to_reach_its_saddle():
     structure = vk.find_structure(osc, manifolds=False)
     assert [attractor.period for attractor in structure.attractors] == [1, 1, 3]
     assert [(saddle.kind, saddle.period, set(saddle.leads_to)) for saddle in structure.saddles] == [
-        ("saddle", 1, {0, 1}), ("saddle", 3, {0, 2}),
+        ("saddle", 1, {0, 1, 2}), ("saddle", 3, {0, 2}),
     ]  # fmt: skip
+    # One branch of the first saddle winds between the small oscillation and the island.
+    saddle, direction = structure.saddles[0], np.array([0.0264, 0.9997])
+    starts = saddle.points + np.geomspace(1, np.abs(saddle.multipliers).max(), 64)[:, None] * 1e-4 * direction
+    for side, labels in ((-1, {0, 2}), (1, {1})):
+        ends = osc.section_map(saddle.points + side * (starts - saddle.points), 3000)
+        apart = [np.linalg.norm(ends[:, None] - each.points, axis=2).min(axis=1) for each in structure.attractors]
+        assert set(np.argmin(apart, axis=0)) == labels
     for saddle in structure.saddles:
         check_against_scipy(osc, saddle, lambda t, x, v: 3 * np.cos(3.3 * t) - 0.02 * v - x - 0.2 * x**3)
 

@@ -315,6 +315,11 @@ class Code(StrEnum):
         "The path from {state} to {goal} with action {action:.6g} passes {through}: its action is the sum over the "
         "paths between these.", "Where it passes an attractor, exits lead to that attractor first.",
     )  # fmt: skip
+    ONE_SADDLE_TO_SEVERAL = (
+        "one-saddle-to-several", INFO,
+        "Motion from saddle {saddle} leads to {goals}: exits from {state} over this saddle have one energy.",
+        "Which of these attractors is reached depends on the noise near the saddle; MFET counts the exits to each.",
+    )  # fmt: skip
     COMPETING_PATHS = (
         "competing-paths", INFO,
         "Paths from {state} that cost at most {percent:g} % more than the least action {least:.6g}: {actions}.",

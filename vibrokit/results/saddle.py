@@ -34,8 +34,9 @@ class Saddle:
         Rates (s⁻¹): eigenvalues at an equilibrium, log(multiplier)/duration for an orbit, the largest Lyapunov
         exponent for a chaotic set.
     leads_to : tuple of int
-        Labels of the attractors that the two branches of the unstable direction reach; for a chaotic set, of the two
-        basins between which it was found. Negative as in `Basins.labels` where a branch does not settle.
+        Labels of the attractors that the two branches of the unstable direction reach, then of the others that a
+        branch reaches which winds between basins; for a chaotic set, of the two basins between which it was found.
+        Negative as in `Basins.labels` where a branch does not settle.
     residual : float
         Distance between the nodes and the images of those before them, in units of the scene's motions (a length and
         ω_n times it); NaN for a chaotic set.

@@ -46,7 +46,7 @@ def test_a_saddle_is_its_points_with_the_direction_in_which_paths_leave():
     problem, model = setup()
     (target,) = exit_targets(problem, model)
     assert isinstance(target, StateTarget)
-    assert (target.label, target.saddle, target.depth) == (1, 0, None)
+    assert (target.labels, target.saddle, target.depth) == ((1,), 0, None)
     np.testing.assert_allclose(target.states, problem.structure.saddles[0].points[:, :2])
     damping = problem.osc.damping_ratio
     rate = -damping + np.sqrt(damping**2 + 1)  # of x″ + 2ζx′ − x = 0
@@ -58,11 +58,11 @@ def test_a_saddle_between_other_basins_is_ignored():
     assert targets_at(AtSaddle((1,), 0, on_own_boundary=False), *setup()) == []
 
 
-def test_a_saddle_that_leads_to_several_targets_counts_for_the_first_that_is_an_attractor_or_escape():
+def test_a_saddle_counts_for_all_attractors_that_it_leads_to_and_for_escape():
     (target,) = targets_at(AtSaddle((-1, 1, 5), 0), *setup())
-    assert target.label == 1
+    assert target.labels == (1, 5)
     (escape,) = targets_at(AtSaddle((-1, ESCAPED), 0), *setup())
-    assert escape.label == ESCAPED
+    assert escape.labels == (ESCAPED,)
     assert targets_at(AtSaddle((-1,), 0), *setup()) == []
 
 
@@ -73,7 +73,7 @@ def test_orbits_inside_a_chaotic_set_are_left_to_that_set():
 def test_a_basin_is_the_cells_that_surely_belong_to_it_and_the_attractor():
     problem, model = setup()
     (target,) = targets_at(InBasin((1,)), problem, model)
-    assert (target.label, target.saddle, target.direction) == (1, -1, None)
+    assert (target.labels, target.saddle, target.direction) == ((1,), -1, None)
     labels, region = problem.structure.basins.labels, problem.structure.basins.region
     np.testing.assert_allclose(target.depth, 2 * np.diff(region.bounds, axis=1)[:, 0] / labels.shape)
     assert 0 < len(target.states) < (labels == 1).sum()
@@ -87,7 +87,7 @@ def test_a_basin_is_the_cells_that_surely_belong_to_it_and_the_attractor():
 def test_a_face_has_its_axis_and_level(axis, level):
     (target,) = targets_at(AtFace((-1,), axis, level, 1), *setup())
     assert isinstance(target, FaceTarget)
-    assert (target.label, target.saddle, target.axis, target.level) == (-1, -1, axis, level)
+    assert (target.labels, target.saddle, target.axis, target.level) == ((-1,), -1, axis, level)
     assert target.scale > 0
 
 

@@ -39,7 +39,7 @@ def beginnings(
         return ()
     start = int(path.section[early[-1]])
     known = float(path.action[start])
-    target = StateTarget(energy.target, energy.saddle, known, path.q[start, :2][None])
+    target = StateTarget((energy.target,), energy.saddle, known, path.q[start, :2][None])
     nx, nv = (max(_FEWEST_NODES, round(_NODES * nodes)) for nodes in potential.grids.shape)
     found = search.within(potential, target, (nx, nv))
     return tuple(_continued(each, path, start, energy.value - known) for each in found)

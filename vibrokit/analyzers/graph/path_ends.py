@@ -44,13 +44,13 @@ def targets_at(end: PathEnd, problem: ExitProblem, model: StepModel) -> list[Exi
 
 @targets_at.register
 def _(end: AtSaddle, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
-    labels = [label for label in end.targets if label >= 0 or label == ESCAPED]
+    labels = tuple(label for label in end.targets if label >= 0 or label == ESCAPED)
     if end.embedded or not (end.on_own_boundary and labels):
         return []
     saddle = problem.structure.saddles[end.number]
     states = saddle.points[:, :2]
     scale = _straight(problem, model, states)
-    return [StateTarget(labels[0], end.number, scale, states, direction=_unstable_direction(model, saddle))]
+    return [StateTarget(labels, end.number, scale, states, direction=_unstable_direction(model, saddle))]
 
 
 @targets_at.register
@@ -63,7 +63,7 @@ def _(end: InBasin, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     for label in end.targets:
         points = problem.structure.attractors[label].points[:, :2]
         states = np.concatenate([centres[certain == label], points])
-        targets.append(StateTarget(label, -1, _straight(problem, model, points), states, depth=depth))
+        targets.append(StateTarget((label,), -1, _straight(problem, model, points), states, depth=depth))
     return targets
 
 
@@ -73,7 +73,7 @@ def _(end: AtFace, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     frequency = problem.scene.natural_frequency
     distance = (end.level - float(problem.attractor.points[0, end.axis])) * (frequency if end.axis == 0 else 1.0)
     scale = _GENEROUS * distance**2 / (2 * max(1 / frequency, problem.scene.section_interval))
-    return [FaceTarget(end.targets[0], -1, scale, model, end.axis, end.level)]
+    return [FaceTarget(end.targets[:1], -1, scale, model, end.axis, end.level)]
 
 
 def _straight(problem: ExitProblem, model: StepModel, states: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 
 import numpy as np
 
@@ -99,9 +99,7 @@ class GraphSearch:
         *_, best = self.solutions(problem)
         return best
 
-    def solutions(
-        self, problem: ExitProblem, settled: Callable[[], Container[int]] = frozenset
-    ) -> Iterator[GraphSolution]:
+    def solutions(self, problem: ExitProblem, settled: Callable[[], Set[int]] = frozenset) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
@@ -126,7 +124,7 @@ class GraphSearch:
         known, refinements = _Known(), list(self._refinements())
         for number, nodes in enumerate(refinements, start=1):
             known.finer, done = len(refinements) - number, settled()
-            unsettled = [target for target in targets if target.label not in done]
+            unsettled = [target for target in targets if not done >= set(target.labels)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for group in both if group]
@@ -244,15 +242,16 @@ def _solution(
         Code.GRAPH, problem.source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=repr(search.model.stepper)
     )  # fmt: skip
     lost = [
-        Finding.of(Code.GRAPH_PATH_LOST, problem.source, target.label)
+        Finding.of(Code.GRAPH_PATH_LOST, problem.source, label)
         for target, estimate in reached
+        for label in target.labels
         if not estimate.candidates
     ]
     return GraphSolution(
         tuple(
             ActivationEnergy(
                 source=problem.source,
-                target=target.label,
+                target=label,
                 value=estimate.value,
                 lower=max(0.0, estimate.value - estimate.error),
                 upper=estimate.value + estimate.error,
@@ -262,11 +261,12 @@ def _solution(
                 saddle=target.saddle,
             )
             for target, estimate in reached
+            for label in target.labels
         ),
         tuple(candidate for _, estimate in reached for candidate in estimate.candidates),
         potential,
         (used, *lost),
-        {target.label: estimate.by_nodes for target, estimate in reversed(reached)},
+        {label: estimate.by_nodes for target, estimate in reversed(reached) for label in target.labels},
         last,
         known.finer,
     )

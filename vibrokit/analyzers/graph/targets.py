@@ -45,7 +45,7 @@ class Arrival:
 class ExitTarget(ABC):
     """A set of states that an exit path ends on. Abstract."""
 
-    label: int  # label of the attractor that is reached from there; −1 for another exit, −2 for escape
+    labels: tuple[int, ...]  # of the attractors that are reached from there; −1 for another exit, −2 for escape
     saddle: int  # which of the structure's saddles it is; −1 for none
     scale: float  # rough cost of a straight path, from which the search for the ceiling of V starts
 

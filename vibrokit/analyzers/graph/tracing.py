@@ -103,7 +103,7 @@ class SolvedGrid:
         """Return the distinct paths to a target, the cheapest first."""
         if target not in self._paths:
             arrival = self.arrival(target)
-            traced = [self._traced(target.label, arrival.value, start) for start in arrival.starts]
+            traced = [self._traced(target.labels[0], arrival.value, start) for start in arrival.starts]
             self._paths[target] = distinct(path for path in traced if path is not None)
         return self._paths[target]
 

@@ -19,6 +19,7 @@ from vibrokit.progress import advance, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
 from vibrokit.results.finding import Finding
+from vibrokit.results.labels import goal_name
 from vibrokit.structure.orbits import Orbit
 
 METHOD = "least action"
@@ -125,6 +126,9 @@ def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]
             Finding.of(Code.PASSES_ORBITS, source, target, action=action, through=list(solved.through))
             for target in solved.targets
         ]
+    if len(solved.targets) > 1:
+        goals = [goal_name(problem.structure.names, label) for label in solved.targets]
+        findings.append(Finding.of(Code.ONE_SADDLE_TO_SEVERAL, source, saddle=solved.end.saddle, goals=goals))
     derivatives = [sensitivities(problem, leg.end, leg.propagator, leg.found) for leg in solved.legs]
     names = [name for name in derivatives[0] if all(name in each for each in derivatives)]
     return _energies(

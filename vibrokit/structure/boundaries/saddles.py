@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import itertools
 from collections import defaultdict
 
 import numpy as np
@@ -150,7 +151,7 @@ class SaddleSearch:
                 limits = branch_limits(self.classifier, orbit)
                 if len(set(limits)) > 1:
                     self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
-                    self._explained.add((min(limits), max(limits)))
+                    self._explained |= set(itertools.combinations(sorted(set(limits)), 2))
 
     def _follow(self, straddles: Straddles, tracked: int) -> None:
         """Follow motions until each has converged to a saddle, or for the largest number of sections."""

@@ -14,6 +14,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.boundaries.edges import settled
 from vibrokit.structure.orbits import Orbit, least_period, nodes_from, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -93,9 +94,9 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     """Return the labels of the attractors that motion from an unstable orbit leads to.
 
     Each branch is followed from a fundamental domain: from points between one distance from the orbit and its image
-    under the map. Two labels are returned, first that of the branch towards smaller x. If a branch winds between
-    basins, its label is the most frequent one, or the next if both branches have the same one. A repeller has the
-    labels of all directions.
+    under the map. The first label is that of the branch towards smaller x, the second that of the other one. If a
+    branch winds between basins, its label is the most frequent one, or the next if both branches have the same one; the
+    other attractors that are reached follow. A repeller has the labels of all directions.
     """
     # Nearer than that, coarse steps across contacts may have orbits of their own.
     away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
@@ -113,7 +114,10 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     growth = np.clip(np.abs(orbit.multipliers).max(), 2.0, _LARGEST_DEPARTURE / away)
     distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
     sides = [classifier.labels(orbit.point + side * distances[:, None] * direction) for side in (-1, 1)]
-    return _label_of_each(*sides)
+    first, second = _label_of_each(*sides)
+    reached = np.unique(np.concatenate(sides))
+    others = [int(label) for label in reached[settled(reached)] if label not in (first, second)]
+    return (first, second, *others)
 
 
 def _mismatch(classifier: BasinClassifier, orbit: Orbit) -> float:
