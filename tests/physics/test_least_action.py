@@ -57,7 +57,8 @@ def test_double_well_from_both_sides(damping):
     osc, structure = double_well(damping)
     result = vk.LeastAction(graph=None, shooting=QUICK).run(osc, structure)
     check_double_well(result, damping, (0, 1))
-    assert [finding.code for finding in result.found(Code.NOT_SEARCHED)] == [Code.NOT_SEARCHED] * 2
+    assert [finding.source for finding in result.found(Code.NOT_SEARCHED)] == [0]
+    assert [finding.source for finding in result.found(Code.MIRROR_IMAGE)] == [1]
 
 
 SEARCHES = {"graph": {"shooting": None}, "shooting": {"graph": None}, "both": {}}
