@@ -11,20 +11,24 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
 
 LEAST = vk.LeastAction(graph=vk.GraphSearch(nodes=(120, 120)), shooting=vk.Shooting(points=2000, rounds=8))
-EVEN = {
+SYMMETRIC = {
     "forced": {"excitations": (vk.Harmonic(amplitude=0.1, frequency=0.8),)},
     "third harmonic": {"excitations": (vk.Harmonic(0.08, 0.8), vk.Harmonic(0.02, 2.4))},
     "unforced": {},
 }
-ODD = {
+STOP = vk.Barrier(vk.Linear(30.0), 1.7, "right")  # beyond the paths
+OTHERS = {
     "noise": {"noise": vk.StateDependentNoise(1e-4, "1 + c*x", c=0.1)},
+    "one stop": {"barriers": (STOP,)},
     "second harmonic": {"excitations": (vk.Harmonic(0.1, 0.8), vk.Harmonic(0.02, 1.6))},
 }
 
 
 @functools.cache
 def wells(kind):
-    more = {"noise": vk.WhiteNoise(intensity=1e-4), "excitations": EVEN["forced"]["excitations"]} | (EVEN | ODD)[kind]
+    more = {"noise": vk.WhiteNoise(intensity=1e-4), "excitations": SYMMETRIC["forced"]["excitations"]} | (
+        SYMMETRIC | OTHERS
+    )[kind]
     if kind == "unforced":
         more["excitations"] = ()
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(-1.0, 1.0), **more)
@@ -50,7 +54,7 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     assert second.certificate.residual < 1e-9
 
 
-@pytest.mark.parametrize("kind", ["noise", pytest.param("second harmonic", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["noise", "one stop", pytest.param("second harmonic", marks=pytest.mark.slow)])
 def test_other_scenes_have_none(kind):
     result = both(kind)
     assert len(result.energies) == 2

@@ -263,10 +263,19 @@ def _solution(
             for target, estimate in reached
             for label in target.labels
         ),
-        tuple(candidate for _, estimate in reached for candidate in estimate.candidates),
+        tuple(_labelled(reached)),
         potential,
         (used, *lost),
         {label: estimate.by_nodes for target, estimate in reversed(reached) for label in target.labels},
         last,
         known.finer,
     )
+
+
+def _labelled(reached: Sequence[tuple[ExitTarget, TargetEstimate]]) -> Iterator[Candidate]:
+    """The candidates of targets, the cheapest first, each for an attractor that no cheaper target leads to, if any."""
+    known = set[int]()
+    for target, estimate in reached:
+        label = next((label for label in target.labels if label not in known), target.labels[0])
+        known |= set(target.labels)
+        yield from (dataclasses.replace(candidate, target=label) for candidate in estimate.candidates)

@@ -21,8 +21,9 @@ from vibrokit.results.energy import ActivationEnergy, ExitPath
 
 FINDER = "mirror images"
 _ALIKE = 1e-2  # of the region's widths: largest distance between samples of an orbit and those of its mirror image
-_COMPARED = 32  # samples of an orbit or of a path that are compared with their mirror images
-_ODD = 1e-9  # of the largest rate: difference of the two sides, from rounding
+_COMPARED, _TIMES = 32, 4  # samples of an orbit, of the region and of each stop that are compared; at these many times
+_SHALLOW = 1e-9  # of the region: least depth past a stop
+_ODD = 1e-9  # of the rates: difference of the two sides, from rounding
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Mirror:
     def __init__(self, problem: ExitProblem) -> None:
         self._problem, scene = problem, problem.scene
         self._spacing = scene.section_interval / samples_of(scene)
+        self._size = problem.attractor.points.shape[1]
         self._half = 0 if scene.autonomous else samples_of(scene) // 2  # samples after which the scene is mirrored
 
     def candidates(self, own: Sequence[ActivationEnergy]) -> list[Candidate]:
@@ -60,7 +62,9 @@ class Mirror:
         """Target of the mirror image of an exit; None unless that leaves the attractor on a path to a saddle."""
         if exit_.path is None or exit_.saddle < 0 or self._labels[exit_.source] != self._problem.source:
             return None
-        return self._labels.get(exit_.target, exit_.target) if self._is_odd(exit_.path) else None
+        target = self._labels.get(exit_.target, exit_.target)
+        wanted = any(target in end.targets for end in self._problem.path_ends)
+        return target if wanted and self._is_odd else None
 
     @cached_property
     def _labels(self) -> dict[int, int | None]:
@@ -69,20 +73,28 @@ class Mirror:
         widths = np.ptp(self._problem.structure.basins.region.bounds, axis=1)[:2]
         return {each.label: _mirror_image(each, attractors, widths) for each in attractors}
 
-    def _is_odd(self, path: ExitPath) -> bool:
-        """Whether the mirror image of a path solves Hamilton's equations as well as the path does."""
-        field, later = VectorField(self._problem.scene), self._half * self._spacing
-        rates = np.array(
-            [
-                (
-                    field.hamiltonian_rate(path.q[place], path.p[place], path.t[place]),
-                    -field.hamiltonian_rate(-path.q[place], -path.p[place], path.t[place] + later),
-                )
-                for place in _some(len(path.t))
-            ]
-        )
-        differences = np.abs(rates[:, 1] - rates[:, 0]).max(axis=0)
-        return bool((differences <= _ODD * np.abs(rates).max(axis=(0, 1))).all())
+    @cached_property
+    def _is_odd(self) -> bool:
+        """Whether Hamilton's equations are odd: anywhere in the region, and at small and large depths of each stop."""
+        points, later = self._points(), self._half * self._spacing
+        field, n = VectorField(self._problem.scene), points.shape[1] // 2
+        for time in self._problem.scene.section_interval * np.arange(_TIMES) / _TIMES:
+            here = field.hamiltonian_rate(points[:, :n], points[:, n:], time)
+            there = -field.hamiltonian_rate(-points[:, :n], -points[:, n:], time + later)
+            if not (np.abs(there - here) <= _ODD * (np.abs(here) + np.median(np.abs(here), axis=0))).all():
+                return False
+        return True
+
+    def _points(self) -> Array:
+        """Points (count, 2n) at which both sides of the scene are compared."""
+        scene, bounds = self._problem.scene, self._problem.structure.basins.region.bounds
+        states = np.random.default_rng(0).normal(size=(_COMPARED * (1 + len(scene.barriers)), 2 * self._size))
+        reach = np.abs(bounds).max(axis=1)
+        states[:, :2] *= reach
+        for number, barrier in enumerate(scene.barriers, start=1):
+            depths = reach[0] * np.geomspace(_SHALLOW, 1.0, _COMPARED)
+            states[number * _COMPARED : (number + 1) * _COMPARED, 0] = barrier.position + barrier.sign * depths
+        return states
 
     def _mirrored(self, target: int, path: ExitPath, action: float) -> Candidate:
         """The mirror image from where it is first on the section; without momenta if it has several legs."""
@@ -93,15 +105,10 @@ class Mirror:
 
 def _mirror_image(attractor: Attractor, attractors: Iterable[Attractor], widths: Array) -> int | None:
     """Label of the attractor that is the mirror image of one; None if there is none."""
-    some = attractor.orbit[_some(len(attractor.orbit)), None]
+    some = attractor.orbit[np.linspace(0, len(attractor.orbit) - 1, _COMPARED).astype(np.int64), None]
     for other in attractors:
         if attractor.repeats and (other.kind, other.period) == (attractor.kind, attractor.period):
             offsets = np.linalg.norm((some + other.orbit) / widths, axis=2)
             if offsets.min(axis=1).max() < _ALIKE:
                 return other.label
     return None
-
-
-def _some(count: int) -> NDArray[np.int64]:
-    """Places of samples to compare, of a number of them."""
-    return np.unique(np.linspace(0, count - 1, _COMPARED).astype(np.int64))
