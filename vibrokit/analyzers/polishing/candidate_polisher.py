@@ -102,15 +102,11 @@ class CandidatePolisher:
         return found
 
     def reach(self, end: PathEnd, ranked: Sequence[Candidate]) -> None:
-        """Polish candidates to an end that none led to: those that come near it, then the cheapest one.
-
-        Once there are paths, that is the cheapest one for an attractor to which none of them leads.
-        """
+        """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
         near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
-        others = [each for each in ranked if not self.solved or self._may_reach(end, each)]
-        for candidate in itertools.chain(near, others[:1]):
+        for candidate in itertools.chain(near, ranked[:1]):
             if not self._is_wanted(end, candidate):
                 return
             try:
@@ -118,11 +114,6 @@ class CandidatePolisher:
                 return
             except StructureError:
                 self._failures[end] += 1
-
-    def _may_reach(self, end: PathEnd, candidate: Candidate) -> bool:
-        """Whether an end leads to the target of a candidate, and no known path does."""
-        ends = (each for each in self._every if candidate.target in each.targets)
-        return candidate.target in end.targets and np.isinf(self._least(ends))
 
     def _add(self, one: SolvedPath) -> bool:
         """Whether a path is new; it is added then."""
