@@ -14,7 +14,7 @@ LEAST = vk.LeastAction(graph=vk.GraphSearch(nodes=(120, 120)), shooting=vk.Shoot
 SYMMETRIC = {
     "forced": {"excitations": (vk.Harmonic(amplitude=0.1, frequency=0.8),)},
     "third harmonic": {"excitations": (vk.Harmonic(0.08, 0.8), vk.Harmonic(0.02, 2.4))},
-    "unforced": {},
+    "unforced": {"excitations": ()},
 }
 STOP = vk.Barrier(vk.Linear(30.0), 1.7, "right")  # beyond the paths
 OTHERS = {
@@ -26,11 +26,7 @@ OTHERS = {
 
 @functools.cache
 def wells(kind):
-    more = {"noise": vk.WhiteNoise(intensity=1e-4), "excitations": SYMMETRIC["forced"]["excitations"]} | (
-        SYMMETRIC | OTHERS
-    )[kind]
-    if kind == "unforced":
-        more["excitations"] = ()
+    more = {"noise": vk.WhiteNoise(intensity=1e-4)} | SYMMETRIC["forced"] | (SYMMETRIC | OTHERS)[kind]
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(-1.0, 1.0), **more)
     return osc, vk.find_structure(osc, cells=(80, 80), starts=(10, 10), manifolds=False)
 

@@ -6,8 +6,8 @@
 Trajectories start near the last attractor of the scene, with momenta of 1e-3, and cost microseconds per trajectory and
 period, on all threads. The error is the median distance in (x, v), after all periods, from the reference: FreeFlight at
 1e-13 for Order8 and RK4, Order8 at 1e-13 for FreeFlight. With --errors, the tolerances are the loosest ones that have
-these errors. Every round runs all contestants one after another; a row has
-the median of the ratios to RK4(256) of the same round, with their smallest and largest.
+these errors. Every round runs all contestants one after another; a row has the median of the ratios to RK4(256) of the
+same round, with their smallest and largest.
 """
 
 import argparse

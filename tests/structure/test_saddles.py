@@ -25,12 +25,11 @@ from vibrokit.trade.reference import reference_map
 
 
 def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
-    """Return a classifier that uses a grid of basins, and the grid."""
+    """Return a classifier, and the grid of its basins."""
     region = Region.of(bounds)
     chosen = stepper or ensemble_stepper(osc, Flow.STATE)
     classifier = BasinClassifier(osc, attractors, region, 1e-3, budget, chosen)
-    basins = classify_grid(classifier, cells)
-    return classifier.sharing(basins, 2), basins
+    return classifier, classify_grid(classifier, cells)
 
 
 def orbits(osc, *starts, period=1):

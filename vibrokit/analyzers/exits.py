@@ -17,6 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.structure import Structure
+from vibrokit.structure.scales import turns_of
 
 _CHECKS_WITHOUT_SECTION = 16  # exit tests per unit of time where no section sets them
 _CHECKS_BY_POSITION = 32  # per turn of the free mass: if it turns back between two tests it has gone little further
@@ -92,8 +93,7 @@ class Exit(ABC):
     def checks_per_period(self, osc: Oscillator) -> int:
         """Return how many times in a section interval the test is made."""
         if self.by_position:
-            turns = osc.section_interval * osc.natural_frequency / (2.0 * math.pi)
-            return _CHECKS_BY_POSITION * 2 ** max(0, math.floor(math.log2(max(turns, 1.0))))
+            return _CHECKS_BY_POSITION * 2 ** max(0, math.floor(math.log2(max(turns_of(osc), 1.0))))
         return _CHECKS_WITHOUT_SECTION if osc.autonomous else 1
 
     def holds_at(self, osc: Oscillator, attractor: Attractor) -> bool:

@@ -51,12 +51,17 @@ def length_of(osc: Oscillator) -> float:
     return length or 1.0
 
 
+def turns_of(osc: Oscillator) -> float:
+    """Return the number of free oscillations in a section interval."""
+    return osc.section_interval * osc.natural_frequency / (2 * math.pi)
+
+
 def doublings_of(osc: Oscillator) -> int:
     """Return how often a number of parts of a section interval is doubled, to stay as fine in 2π/ω_n.
 
     A section interval is the period of the forcing. Up to two of 2π/ω_n it counts as one.
     """
-    turns = osc.section_interval * osc.natural_frequency / (2 * math.pi)
+    turns = turns_of(osc)
     return max(0, math.ceil(math.log2(turns / 2) - 1e-9))
 
 

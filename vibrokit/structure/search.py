@@ -24,7 +24,7 @@ from vibrokit.structure.attractors.describe import describe_orbit, describe_wand
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
-from vibrokit.structure.scales import units_of
+from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
@@ -223,8 +223,7 @@ def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: in
 
 def _lasting(osc: Oscillator) -> int:
     """Periods for which a repeating attractor must persist; fewer where one has many free oscillations."""
-    turns = osc.section_interval * osc.natural_frequency / (2 * math.pi)
-    return min(_LONG_PERIODS, max(_FEW_PERIODS, math.ceil(_MANY_TURNS / turns)))
+    return min(_LONG_PERIODS, max(_FEW_PERIODS, math.ceil(_MANY_TURNS / turns_of(osc))))
 
 
 def _is_on(orbit: Array, point: Array) -> bool:

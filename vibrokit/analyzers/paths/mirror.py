@@ -34,7 +34,6 @@ class Mirror:
     def __init__(self, problem: ExitProblem) -> None:
         self._problem, scene = problem, problem.scene
         self._spacing = scene.section_interval / samples_of(scene)
-        self._size = problem.attractor.points.shape[1]
         self._half = 0 if scene.autonomous else samples_of(scene) // 2  # samples after which the scene is mirrored
 
     def candidates(self, own: Sequence[ActivationEnergy]) -> list[Candidate]:
@@ -68,7 +67,7 @@ class Mirror:
 
     @cached_property
     def _labels(self) -> dict[int, int | None]:
-        """Labels of the mirror images of all attractors; None where there is none."""
+        """The label of the mirror image of each attractor; None for an attractor without one."""
         attractors = self._problem.structure.attractors
         widths = np.ptp(self._problem.structure.basins.region.bounds, axis=1)[:2]
         return {each.label: _mirror_image(each, attractors, widths) for each in attractors}
@@ -88,7 +87,8 @@ class Mirror:
     def _points(self) -> Array:
         """Points (count, 2n) at which both sides of the scene are compared."""
         scene, bounds = self._problem.scene, self._problem.structure.basins.region.bounds
-        states = np.random.default_rng(0).normal(size=(_COMPARED * (1 + len(scene.barriers)), 2 * self._size))
+        size = self._problem.attractor.points.shape[1]
+        states = np.random.default_rng(0).normal(size=(_COMPARED * (1 + len(scene.barriers)), 2 * size))
         reach = np.abs(bounds).max(axis=1)
         states[:, :2] *= reach
         for number, barrier in enumerate(scene.barriers, start=1):
@@ -104,7 +104,7 @@ class Mirror:
 
 
 def _mirror_image(attractor: Attractor, attractors: Iterable[Attractor], widths: Array) -> int | None:
-    """Label of the attractor that is the mirror image of one; None if there is none."""
+    """Find the mirror image of an attractor among others; return its label, or None."""
     some = attractor.orbit[np.linspace(0, len(attractor.orbit) - 1, _COMPARED).astype(np.int64), None]
     for other in attractors:
         if attractor.repeats and (other.kind, other.period) == (attractor.kind, attractor.period):
