@@ -20,6 +20,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import usable_ends
 from vibrokit.analyzers.polishing.leg import pieces_of
 from vibrokit.analyzers.polishing.polish import Polishing
+from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
 from vibrokit.progress import TRAJECTORIES, stage
@@ -38,7 +39,6 @@ _AGREED = (Code.AGREEMENT, Code.MIRROR_IMAGE, Code.BRACKET, Code.NO_POLISHED_PAT
 """What more nodes do not change, however many there are."""
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 _GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
-_EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
 class ExitSearch:
@@ -234,9 +234,10 @@ class ExitSearch:
     def _polishings(self) -> list[Polishing]:
         """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
         found = list[Polishing]()
-        for orbit in (None,) if self.problem.attractor.repeats else self._orbits_inside():
+        repeats, shared = self.problem.attractor.repeats, list[SolvedPath]()
+        for orbit in (None,) if repeats else self._orbits_inside():
             try:
-                found.append(Polishing(self.problem, orbit))
+                found.append(Polishing(self.problem, orbit, None if repeats else shared))
             except (StructureError, StepperError) as error:
                 self._failed("polishing", error)
         return found
@@ -256,9 +257,9 @@ class ExitSearch:
         if not self._polishing_begun:
             return (), ()
         found = [polishing.polished() for polishing in self._polishings]
-        branches = tuple(branch for each in found for branch in each.branches)
+        branches = sorted((branch for each in found for branch in each.branches), key=lambda branch: branch.value)
         findings = tuple(finding for each in found for finding in each.findings)
-        return branches if self.problem.attractor.repeats else _once(branches), findings
+        return tuple(branches), findings
 
     def analysis(self) -> Analysis:
         """Combine what was found."""
@@ -303,16 +304,3 @@ class ExitSearch:
 def _least(branches: Sequence[ActivationEnergy]) -> dict[int, ActivationEnergy]:
     """The cheapest branch to each target; the branches are sorted, the cheapest first."""
     return {branch.target: branch for branch in reversed(branches)}
-
-
-def _once(branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
-    """The branches, the cheapest first; of those that differ only in the orbit that they start on, the cheapest."""
-    kept: list[ActivationEnergy] = []
-    for branch in sorted(branches, key=lambda branch: branch.value):
-        if not any(
-            (branch.target, branch.saddle) == (other.target, other.saddle)
-            and branch.value <= (1 + _EQUAL) * other.value
-            for other in kept
-        ):
-            kept.append(branch)
-    return tuple(kept)

@@ -5,7 +5,7 @@ import pytest
 
 from tests.analyzers.graph import linear
 from vibrokit.analyzers.graph.grids import Grids
-from vibrokit.analyzers.graph.potential import quasi_potential, seeds
+from vibrokit.analyzers.graph.potential import ValueIteration, seeds
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.tracing import backtrack
 from vibrokit.kernels.rk4 import RK4
@@ -20,7 +20,7 @@ def solved(request):
     model = StepModel(linear.oscillator(request.param), RK4(256))
     (attractor,) = linear.structure(request.param).attractors
     ceiling = linear.potential(request.param, 1.0, np.array([1.2, 0.0]))
-    return request.param, model, attractor, quasi_potential(model, attractor, GRIDS, ceiling)
+    return request.param, model, attractor, ValueIteration(model, attractor, GRIDS).up_to(ceiling)
 
 
 def test_seeds_are_the_quadratic_form_on_an_ellipse(solved):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.graph.grids import Grids
-from vibrokit.analyzers.graph.potential import Potential, quasi_potential
+from vibrokit.analyzers.graph.potential import Potential, ValueIteration
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.targets import ExitTarget
 from vibrokit.analyzers.graph.tracing import SolvedGrid, distinct
@@ -221,9 +221,9 @@ class HierarchySearch:
 
     def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it."""
+        iteration = ValueIteration(self.model, self.problem.attractor, grids)
         for _ in range(_RAISES):
-            potential = quasi_potential(self.model, self.problem.attractor, grids, ceiling)
-            solved = SolvedGrid(self.problem, self.model, potential)
+            solved = SolvedGrid(self.problem, self.model, iteration.up_to(ceiling))
             highest = solved.highest(targets)
             if not highest:
                 raise StructureError(

@@ -180,45 +180,43 @@ class Potential:
         return self.values[phase][max(i - reach[0], 0) : i + reach[0] + 1, max(j - reach[1], 0) : j + reach[1] + 1]
 
 
-def quasi_potential(model: StepModel, attractor: Attractor, grids: Grids, ceiling: float) -> Potential:
-    """Return the least action from an attractor to the nodes of some grids, as far as it is below a ceiling.
+class ValueIteration:
+    """Value iteration on some grids; raises StructureError if the attractor is not hyperbolic."""
 
-    Raises StructureError if the attractor is not hyperbolic.
-    """
-    return _Iteration(model, attractor, grids, ceiling).run()
-
-
-class _Iteration:
-    """Value iteration: sweeps over the phases until V no longer changes."""
-
-    def __init__(
-        self,
-        model: StepModel,
-        attractor: Attractor,
-        grids: Grids,
-        ceiling: float,
-    ) -> None:
-        self.grids, self.ceiling = grids, ceiling
+    def __init__(self, model: StepModel, attractor: Attractor, grids: Grids) -> None:
+        self.grids = grids
         self.sweeps = max(grids.phases, grids.steps)  # over all phases, or a section interval
         known = seeds(model, attractor, grids)
         self.orbit = known.orbit
         self.fixed = [np.isfinite(values) for values in known.values]
-        self.ceilings = [np.full(grids.shape, ceiling) for _ in known.values]
+        self.bounds = [np.full(grids.shape, np.inf) for _ in known.values]  # of V: costs of one step from the orbit
         self.centres, self.roots, self.predecessors, self.uphill = [], [], [], []
+        last = np.array(grids.shape) - 2.0
         for phase in range(grids.phases):
             after = (phase + 1) % grids.phases
             costs = model.into(grids.nodes(after).reshape(-1, 2), grids, phase)
             for visit in grids.index(phase, known.orbit[phase :: grids.phases]):
                 direct = costs.cost(visit).reshape(grids.shape)
-                np.fmin(self.ceilings[after], direct, out=self.ceilings[after])
-            last = np.array(grids.shape) - 2.0
+                np.fmin(self.bounds[after], direct, out=self.bounds[after])
             self.centres.append(costs.centres.reshape(*grids.shape, 2))
             self.roots.append(costs.roots.reshape(*grids.shape, 3))
             self.predecessors.append(np.clip(np.nan_to_num(self.centres[-1], nan=1.0), 1.0, last))
             self.uphill.append(np.clip(costs.uphill.reshape(*grids.shape, 2), 1.0, last))
-        self.values = [np.minimum(*both) for both in zip(known.values, self.ceilings, strict=True)]
+        self.ceilings = self.bounds
+        self.values = [np.minimum(*both) for both in zip(known.values, self.bounds, strict=True)]
 
-    def run(self) -> Potential:
+    def up_to(self, ceiling: float) -> Potential:
+        """Return V, as far as it is below a ceiling; a higher one than before goes on from what is known."""
+        reached, self.ceilings = self.ceilings, [np.minimum(bound, ceiling) for bound in self.bounds]
+        self.values = [
+            np.where(values < limits, values, limit)
+            for values, limits, limit in zip(self.values, reached, self.ceilings, strict=True)
+        ]
+        self.predecessors = [known.copy() for known in self.predecessors]
+        self._improve()
+        return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, ceiling)
+
+    def _improve(self) -> None:
         """Sweep, period by period, until V stays the same even after every node was evaluated once more."""
         active, risen = self._all(), False
         before, at_rest = self._level(), np.inf
@@ -234,7 +232,6 @@ class _Iteration:
                         break
                     at_rest, active = level, self._all()
                 risen, before = risen or level > before, level
-        return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, self.ceiling)
 
     def _all(self) -> list[Flags]:
         return [np.ones(self.grids.shape, dtype=np.uint8) for _ in range(self.grids.phases)]

@@ -26,6 +26,7 @@ METHOD = "least action"
 _COMPETING = 0.01  # of the least action: at ΔU/D = 100 such a path still carries a third as many exits
 _FLAT = 1e-3  # sine of the angle between the manifolds
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
+_EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,18 +51,19 @@ class Polishing:
     finished. A path whose certificate fails is kept without.
 
     For an attractor that is not an orbit, `orbit` is an unstable one inside it; an exit from there costs at least as
-    much as leaving the attractor. Raises StructureError if none is given, or if the orbit is not hyperbolic, and
+    much as leaving the attractor. Several such orbits share the list `known`: of paths that differ only in the orbit
+    that they start on, one is kept. Raises StructureError if no orbit is given, or if it is not hyperbolic, and
     StepperError if the stepper cannot integrate Hamilton's equations of this scene.
     """
 
-    def __init__(self, problem: ExitProblem, orbit: Orbit | None = None) -> None:
-        self._problem = problem
+    def __init__(self, problem: ExitProblem, orbit: Orbit | None = None, known: list[SolvedPath] | None = None) -> None:
+        self._problem, self._shared = problem, known
         with stage("ends of exit paths", subject=problem.attractor.name):
             self._ends, self._findings = usable_ends(problem)
             self._polisher = CandidatePolisher(problem, self._ends, orbit)
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
-        self._known = set[tuple[int, bytes]]()
+        self._seen = set[tuple[int, bytes]]()
         self._waiting: list[Candidate] = []  # for a call that is not quick, which tries to reach all ends
 
     def add(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
@@ -71,8 +73,8 @@ class Polishing:
         left for the next call, after the candidates of that one.
         """
         new = {(each.target, each.states.tobytes()): each for each in candidates}
-        ranked = sorted((new[key] for key in new if key not in self._known), key=lambda each: each.action)
-        self._known |= new.keys()
+        ranked = sorted((new[key] for key in new if key not in self._seen), key=lambda each: each.action)
+        self._seen |= new.keys()
         self._tried += len(ranked)
         try:
             with stage("polishing", unit="candidates", total=len(ranked)):
@@ -87,18 +89,28 @@ class Polishing:
                     self._waiting = []
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))
-        found = self._polisher.solved[self._certified :]
+        found = [solved for solved in self._polisher.solved[self._certified :] if self._is_new(solved)]
+        self._certified, certified = len(self._polisher.solved), 0
         try:
             with stage("certifying", unit="paths", total=len(found)):
                 for solved in found:
                     self._branches += _certified(self._problem, solved, self._findings)
-                    self._certified += 1
+                    certified += 1
                     advance()
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("certifying", error, self._problem.source))
-            for solved in self._polisher.solved[self._certified :]:
+            for solved in found[certified:]:
                 self._branches += _energies(self._problem, solved)
-            self._certified = len(self._polisher.solved)
+
+    def _is_new(self, solved: SolvedPath) -> bool:
+        """Whether no orbit that shares its paths has led to the same one, which is noted."""
+        if self._shared is None:
+            return True
+        alike = (other for other in self._shared if other.end is solved.end)
+        new = all(abs(solved.action - other.action) > _EQUAL * other.action for other in alike)
+        if new:
+            self._shared.append(solved)
+        return new
 
     def polished(self) -> Polished:
         """Return what all candidates led to."""

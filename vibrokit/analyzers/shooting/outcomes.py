@@ -79,25 +79,31 @@ class Shooter:
             begun, section, ended.states, ended.status, ended.intervals, ended.label, confirmed, 0 * section
         )
 
-    def confirm(self, outcomes: Outcomes, factor: float = 1.0) -> None:
-        """Confirm the cheapest exits, in place, until the best one to each target is certain.
-
-        The motion without noise from the exit decides. If it settles on another attractor, the exit is confirmed. If it
-        settles on the source, the path only touched coarse cells of the basin boundary and is continued, each time for
-        twice as long before it is tested again: it may stay in those cells. If it settles nowhere, the path is no
-        exit. All exits up to `factor` times the least action of their target are confirmed.
-        """
-        for _ in range(0 if self.problem.exit.by_position else _BATCHES):
-            open_ = np.flatnonzero(np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION)) & ~outcomes.confirmed)
-            least = outcomes.least(len(self.problem.structure.attractors))
-            ceilings = np.append(factor * least[:-1], least.min())
-            doubtful = open_[outcomes.actions[open_] < ceilings[outcomes.targets[open_]]]
+    def confirm(self, outcomes: Outcomes) -> None:
+        """Confirm the cheapest exits, in place, until the best one to each target is certain."""
+        for _ in range(_BATCHES):
+            doubtful = self.doubtful(outcomes)
             if not len(doubtful):
                 return
             ranked = doubtful[np.argsort(outcomes.actions[doubtful], kind="stable")]
-            self._settle(outcomes, ranked[: max(_BATCH, len(ranked) // _PARTS)])
+            self.settle(outcomes, ranked[: max(_BATCH, len(ranked) // _PARTS)])
 
-    def _settle(self, outcomes: Outcomes, which: Whole) -> None:
+    def doubtful(self, outcomes: Outcomes, factor: float = 1.0) -> Whole:
+        """Return the exits below `factor` times the least action of their target that are not confirmed."""
+        if self.problem.exit.by_position:
+            return np.empty(0, dtype=np.int64)
+        open_ = np.flatnonzero(np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION)) & ~outcomes.confirmed)
+        least = outcomes.least(len(self.problem.structure.attractors))
+        ceilings = factor * np.append(least[:-1], least.min())
+        return open_[outcomes.actions[open_] < ceilings[outcomes.targets[open_]]]
+
+    def settle(self, outcomes: Outcomes, which: Whole) -> None:
+        """Let the motion without noise decide about some exits, in place.
+
+        If it settles on another attractor, the exit is confirmed. If it settles on the source, the path only touched
+        coarse cells of the basin boundary and is continued, each time for twice as long before it is tested again: it
+        may stay in those cells. If it settles nowhere, the path is no exit.
+        """
         states = outcomes.states[which]
         reached = self._classifier.labels(states[:, : (states.shape[1] - 1) // 2])
         returned = reached == self.problem.source
