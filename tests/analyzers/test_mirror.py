@@ -14,7 +14,7 @@ LEAST = vk.LeastAction(graph=vk.GraphSearch(nodes=(120, 120)), shooting=vk.Shoot
 SYMMETRIC = {
     "forced": {"excitations": (vk.Harmonic(amplitude=0.1, frequency=0.8),)},
     "third harmonic": {"excitations": (vk.Harmonic(0.08, 0.8), vk.Harmonic(0.02, 2.4))},
-    "unforced": {"excitations": ()},
+    "unforced": {"excitations": (), "noise": vk.StateDependentNoise(1e-4, "1 + c*x**2", c=0.1)},
 }
 STOP = vk.Barrier(vk.Linear(30.0), 1.7, "right")  # beyond the paths
 OTHERS = {

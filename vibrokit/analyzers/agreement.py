@@ -12,6 +12,7 @@ from vibrokit.results.finding import Finding
 
 VAGUE = 0.5
 """Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
+_TIGHT = 0.01  # of a path's action: an exact lower bound so near to it certifies it; most graphs leave more
 _SAME = 1e-6  # relative difference of the actions of a path and of its mirror image
 
 
@@ -20,6 +21,7 @@ def combined(
     branches: Sequence[ActivationEnergy],
     estimates: Iterable[ActivationEnergy],
     mirrored: Mapping[int, ActivationEnergy] | None = None,
+    least: Mapping[int, float] | None = None,
 ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
     """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
@@ -27,16 +29,23 @@ def combined(
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
+    Where it is known what no path can cost less than, the lower bound is at least that.
 
-    Given are the polished paths, the cheapest first, and by target the graph's estimates and the energies that those of
-    the attractor are mirror images of. Returns an energy and a finding for each target.
+    Given are the polished paths, the cheapest first, and by target the graph's estimates, the energies that those of
+    the attractor are mirror images of, and the least possible actions. Returns an energy and a finding for each target.
     """
     paths: dict[int, ActivationEnergy] = {}
     for branch in branches:
         paths.setdefault(branch.target, branch)
     graph = {estimate.target: estimate for estimate in estimates}
     pairs = [
-        _of_target(attractor, paths.get(target), graph.get(target), (mirrored or {}).get(target))
+        _of_target(
+            attractor,
+            paths.get(target),
+            graph.get(target),
+            (mirrored or {}).get(target),
+            (least or {}).get(target, 0.0),
+        )
         for target in sorted({*paths, *graph}, key=lambda target: (target < 0, target))
     ]
     return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
@@ -52,8 +61,13 @@ def _of_target(
     path: ActivationEnergy | None,
     graph: ActivationEnergy | None,
     mirrored: ActivationEnergy | None,
+    least: float,
 ) -> tuple[ActivationEnergy, Finding]:
-    if path is not None and mirrored is not None and cost_the_same(path, mirrored):
+    if path is not None and path.value - least <= _TIGHT * path.value:
+        code, energy = Code.DETAILED_BALANCE, path
+        if path.certificate is not None:
+            energy = dataclasses.replace(path, bound=Bound.CERTIFIED)
+    elif path is not None and mirrored is not None and cost_the_same(path, mirrored):
         code, energy = Code.MIRROR_IMAGE, dataclasses.replace(path, lower=mirrored.lower, bound=mirrored.bound)
     elif path is None:
         assert graph is not None
@@ -66,6 +80,9 @@ def _of_target(
         code, energy = _compared(path, graph)
     values = {} if graph is None else {"graph": graph.value, "error": graph.numerical_error}
     values |= {} if path is None else {"path": path.value}
+    values |= {"least": least} if least else {}
+    if (lower := min(least, energy.value - energy.numerical_error)) > energy.lower:
+        energy = dataclasses.replace(energy, lower=lower)
     return energy, Finding(code, attractor.label, energy.target, values)
 
 

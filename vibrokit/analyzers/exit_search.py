@@ -14,7 +14,7 @@ from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
-from vibrokit.analyzers.paths import closest_approach, mirror, reversed_relaxation, slow_relaxation
+from vibrokit.analyzers.paths import closest_approach, detailed_balance, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import usable_ends
@@ -23,7 +23,7 @@ from vibrokit.analyzers.polishing.polish import Polishing
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
-from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.progress import TRAJECTORIES, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
@@ -35,8 +35,11 @@ from vibrokit.symbolic.flow_kind import Flow
 if TYPE_CHECKING:
     from vibrokit.analyzers.least_action import LeastAction
 
-_AGREED = (Code.AGREEMENT, Code.MIRROR_IMAGE, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
+_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE)
+"""Energies with bounds that no graph gave."""
+_AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
 """What more nodes do not change, however many there are."""
+_AFTERWARDS = 10.0  # s, for polishing what an action plot has found when it is stopped
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 _GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
 
@@ -48,6 +51,7 @@ class ExitSearch:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
         self._mirror = mirror.Mirror(problem)
+        self._least = detailed_balance.least_actions(problem)
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
         self._searched = False  # whether there are no more solutions
@@ -70,13 +74,18 @@ class ExitSearch:
                 step()
             except KeyboardInterrupt as error:
                 self.findings.append(Finding.stopped(doing, error, self.problem.source))
-            if self.stopped:
+            if self.stopped or self._is_exact:
                 break
         return self.analysis()
 
     @property
     def stopped(self) -> bool:
         return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
+
+    @property
+    def _is_exact(self) -> bool:
+        """Whether all exits cost what no path can cost less than."""
+        return bool(self._least) and self._least.keys() <= self._agreed((), self._polished()[0], Code.DETAILED_BALANCE)
 
     def mirror(self) -> None:
         """Polish mirror images of known paths; those that leave another attractor take the place of shooting."""
@@ -103,15 +112,17 @@ class ExitSearch:
         if shooting is None or not follow:
             return
         candidates: Sequence[Candidate] = ()
+        limit = None
         if self.analyzer.graph is None or usable_ends(self.problem)[0]:
             try:
                 found = shooting.search(self.problem)
-                candidates = found.candidates
+                candidates, limit = found.candidates, None if found.complete else _AFTERWARDS
                 self.findings += found.findings
             except (StructureError, StepperError) as error:
                 self._failed("action plot", error, only=self.analyzer.graph is None)
         if candidates or self._polishing_begun:  # candidates of the first graph may wait
-            self._polish(candidates)
+            with working(time_limit=limit):
+                self._polish(candidates, quick=limit is not None)
 
     def search_graph(self) -> None:
         """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
@@ -186,24 +197,24 @@ class ExitSearch:
         """Labels of the attractors for which finer grids are of no use.
 
         An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
-        Mirror images have their bounds.
+        Mirror images have their bounds, and so have paths that cost the least possible.
         """
         with_path, estimates = {branch.target for branch in branches}, self._estimates(graph, branches)
-        agreed, mirrored = (self._agreed(estimates, branches, code) for code in (Code.AGREEMENT, Code.MIRROR_IMAGE))
+        agreed, exact = self._agreed(estimates, branches), self._agreed(estimates, branches, *_EXACT)
         beyond = {label for label in self._beyond if label in agreed or label not in with_path}
-        return self._unresolvable(graph, branches) | mirrored | beyond
+        return self._unresolvable(graph, branches) | exact | beyond
 
     def _agreed(
-        self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy], code: Code = Code.AGREEMENT
+        self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy], *codes: Code
     ) -> set[int]:
-        """Labels of the attractors for which estimates and paths compare as a code says."""
-        _, compared = self._combined(branches, estimates)
-        return {finding.target for finding in compared if finding.code is code and finding.target is not None}
+        """Labels of the attractors for which estimates and paths compare as some codes say; by default they agree."""
+        wanted, (_, compared) = codes or (Code.AGREEMENT,), self._combined(branches, estimates)
+        return {finding.target for finding in compared if finding.code in wanted and finding.target is not None}
 
     def _combined(
         self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
     ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
-        return combined(self.problem.attractor, branches, estimates, self._mirror.energies)
+        return combined(self.problem.attractor, branches, estimates, self._mirror.energies, self._least)
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""

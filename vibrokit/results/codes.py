@@ -364,6 +364,11 @@ class Code(StrEnum):
         "The path from {state} to {goal} with action {path:.6g} is the mirror image of one that leaves another "
         "attractor; both have the same bounds.",
     )  # fmt: skip
+    DETAILED_BALANCE = (
+        "detailed-balance", INFO,
+        "Detailed balance holds: no path from {state} to {goal} costs less than {least:.10g}, which follows from the "
+        "potential energy of the barrier. The polished path costs {path:.10g}.",
+    )  # fmt: skip
     NOT_SEARCHED = (
         "not-searched", WARNING,
         "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "

@@ -216,7 +216,7 @@ class Result(Record):
 
         known = self._quasi_potentials()
         if not known:
-            raise StructureError("the result has no quasi-potential.")
+            raise StructureError("the result has no quasi-potential; ActionGraph computes one.")
         label = source_among(known, source, self.names, "quasi-potential", "of")
         values, bounds = known[label]
         own = [energy for energy in self.energies if energy.source == label]

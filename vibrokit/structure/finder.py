@@ -59,9 +59,7 @@ class Finder:
         self.orbit_stepper = request.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
         self.stepper = request.stepper or ensemble_stepper(osc, Flow.STATE)
         self.searched = self.region or search_region(osc)
-        self.search = Search(
-            osc, _SEARCH_SETTLING * self.searched.widths, self._search_stepper(), self.orbit_stepper, executor
-        )
+        self.search = Search(osc, self.searched, _SEARCH_SETTLING, self._search_stepper(), self.orbit_stepper, executor)
         self.attractors: tuple[Attractor, ...] = ()
         self.shift = 0.0  # along x, between copies of the attractors (m); 0 for none
         self.grid: BasinGrid | None = None

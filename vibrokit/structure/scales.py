@@ -114,7 +114,8 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
 
     def gain(logarithm: float) -> float:
         motion = math.exp(logarithm) * shape
-        powers = field.rate(states_at(osc, motion))[:, 1] * motion[:, 1]
+        with np.errstate(all="ignore"):  # a force may be singular
+            powers = field.rate(states_at(osc, motion))[:, 1] * motion[:, 1]
         gained, exchanged = float(powers.mean()), float(np.abs(powers).mean())
         return gained if abs(gained) > _LEAST_GAIN * exchanged else 0.0
 

@@ -19,10 +19,11 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
+from vibrokit.results.region import Region
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
-from vibrokit.structure.autonomous import find_cycle
+from vibrokit.structure.autonomous import equilibria, find_cycle
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -56,12 +57,14 @@ class Search:
     """Finds the steady states of a scene, one after another; an interrupt leaves those found so far."""
 
     osc: Oscillator
-    distances: Array  # (2,) in x and v, at which a state counts as settled on a known orbit
+    region: Region
+    settling: float  # distance at which a state counts as settled on a known orbit, as a part of the region's widths
     stepper: Stepper  # of ensembles
     orbit_stepper: Stepper
     executor: concurrent.futures.Executor | None
 
     def __post_init__(self) -> None:
+        self.distances = self.settling * self.region.widths  # (2,) in x and v
         self.attractors: list[Attractor] = []
         self.survival: tuple[Survival, ...] = ()
         self.starts = self.diverged = 0
@@ -76,6 +79,9 @@ class Search:
         """
         self.starts = len(states)
         with stage("attractors", unit="starts", total=self.starts):
+            if self.osc.autonomous:  # then starts need not be followed until they rest, which is long on stiff stops
+                for rest in equilibria(self.osc, *self.region.x):
+                    self._add_orbit(rest.point, 1)
             for periods in _rounds(wait):
                 states = self._after(states, periods)
                 states = self._add_orbits(states, LONGEST_PERIOD)

@@ -186,6 +186,25 @@ class Model:
         laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
         return friction == 0 and all(law == 0 for law in laws)
 
+    @cached_property
+    def balance(self) -> sympy.Expr | None:
+        """The ratio 2γ/a₂₂ of the action to the energy that it climbs, where detailed balance holds; otherwise None.
+
+        It holds without forcing if the friction γ and the noise are constant and all other forces depend on x only,
+        at the parameters of the scene (Freidlin & Wentzell, 4.3).
+        """
+        if self.forcing != 0 or len(self.state) > 2:
+            return None
+        values = self.scene.parameters
+        numbers = {symbol: values[path] for path, symbol in self.symbols.items()}
+        x, v = self.state
+        friction = -sympy.diff(self.smooth_force.subs(numbers), v)
+        noise = self.diffusion[1, 1].subs(numbers)
+        laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
+        if {x, v} & (friction.free_symbols | noise.free_symbols) or any(law != 0 for law in laws) or noise == 0:
+            return None
+        return 2 * friction / noise
+
     @property
     def latex(self) -> str:
         """The equations as an ``aligned`` block of LaTeX."""

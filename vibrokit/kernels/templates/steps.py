@@ -147,8 +147,11 @@ def plan(course, sigma, length, last, grain, depth, lane, memory, settings, lane
 def shortened(error, factor, tiny, lane, memory, settings, lanes):
     """Length of the next attempt after one with too large an error; 0 if the attempt is taken.
 
-    It is taken, too, where shortening the step has not reduced its error, which is then rounding.
+    It is taken, too, where shortening the step has not reduced its error, which is then rounding. Tiny attempts count
+    as many: next to a singular force time does not go on, and motion ends after 2000 of them.
     """
+    if tiny:
+        memory[COUNT] += 99.0
     if not (error > 1.0) or tiny or memory[MISSES] >= 2.0:
         return 0.0
     stuck = error > 0.8 * memory[BEFORE] and error * settings[0] < 1e-6

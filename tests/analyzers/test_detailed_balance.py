@@ -1,0 +1,114 @@
+"""What exits cost at least where detailed balance holds, by closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.paths.detailed_balance import least_actions
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.basins import ESCAPED
+from vibrokit.results.codes import Code
+from vibrokit.results.energy import Bound
+from vibrokit.symbolic.model import Model
+
+ZETA = 0.05
+WELLS = vk.CubicSpring(-1.0, 1.0)
+
+
+def scene(spring=None, noise=None, **more):
+    parts = {"damping_ratio": ZETA, "noise": noise or vk.WhiteNoise(1e-4)} | more
+    return vk.Oscillator(natural_frequency=1.0, **({} if spring is None else {"spring": spring}), **parts)
+
+
+def stopped(law, position=0.9):
+    return scene(WELLS, barriers=(vk.Barrier(law, position, "right"), vk.Barrier(law, -position, "left")))
+
+
+def least(osc, source=0, exit_=None):
+    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    return structure, least_actions(ExitProblem(osc, structure, structure.attractors[source], exit_ or vk.LeaveBasin()))
+
+
+@pytest.mark.parametrize(
+    ("osc", "ratio"),
+    [
+        (scene(), 4 * ZETA),
+        (scene(WELLS, damping_ratio=2.0), 8.0),
+        (scene(vk.CustomSpring("x + c*v", c=0.3)), 4 * ZETA + 0.6),  # friction that is constant
+        (stopped(vk.Hertz(100.0)), 4 * ZETA),
+        (scene(excitations=(vk.Constant(0.3),)), 4 * ZETA),
+        (stopped(vk.CustomLaw("k*depth*(1 + c*rate)", k=5.0, c=0.0)), 4 * ZETA),
+        (scene(noise=vk.StateDependentNoise(1e-4, "2 + c*x**2", c=0.0)), ZETA),
+        (scene(noise=vk.StateDependentNoise(1e-4, "1 + c*x**2", c=0.3)), None),
+        (scene(vk.CustomSpring("x + c*x**2*v", c=0.3)), None),
+        (stopped(vk.CustomLaw("k*depth*(1 + c*rate)", k=5.0, c=0.1)), None),
+        (scene(excitations=(vk.Harmonic(0.1, 0.7),)), None),
+        (vk.Oscillator(natural_frequency=1.0, damping_ratio=ZETA), None),
+    ],
+)  # fmt: skip
+def test_where_it_holds(osc, ratio):
+    balance = Model(osc).balance
+    assert balance is None if ratio is None else float(balance) == pytest.approx(ratio, rel=1e-15)
+
+
+def test_two_wells():
+    _, found = least(scene(WELLS))
+    assert found == {1: pytest.approx(4 * ZETA / 4, rel=1e-9)}
+
+
+def test_a_tilted_well_and_its_neighbour():
+    osc = scene(WELLS, excitations=(vk.Constant(0.1),))
+    places = np.sort(np.roots([1.0, 0.0, -1.0, -0.1]).real)  # x³ − x = 0.1
+    left, saddle, right = places**4 / 4 - places**2 / 2 - 0.1 * places
+    assert least(osc, 0)[1] == {1: pytest.approx(4 * ZETA * (saddle - left), rel=1e-9)}
+    assert least(osc, 1)[1] == {0: pytest.approx(4 * ZETA * (saddle - right), rel=1e-9)}
+
+
+@pytest.mark.parametrize("stiffness", [20.0, 1e6, pytest.param(1e12, marks=pytest.mark.slow)])
+def test_wells_that_end_in_stiff_stops(stiffness):
+    """Pressed against a stop at 0.9 by the force x − x³; the depth d solves k d^1.5 = x − x³ there."""
+    _, found = least(stopped(vk.Hertz(stiffness)))
+    depth = 0.0
+    for _ in range(100):
+        x = 0.9 + depth
+        depth = ((x - x**3) / stiffness) ** (2 / 3)
+    x = 0.9 + depth
+    well = x**4 / 4 - x**2 / 2 + 0.4 * stiffness * depth**2.5
+    assert found == {1: pytest.approx(-4 * ZETA * well, rel=1e-8)}
+
+
+def test_escape_on_one_side():
+    _, found = least(scene(vk.CustomSpring("x - x**2")))
+    assert found == {ESCAPED: pytest.approx(4 * ZETA / 6, rel=1e-9)}
+
+
+def test_first_contact():
+    osc = scene(barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.8, "left")))
+    _, found = least(osc, exit_=vk.FirstContact())
+    assert list(found.values()) == [pytest.approx(4 * ZETA * 0.5 * 0.5**2, rel=1e-9)]
+
+
+def test_a_well_behind_another_costs_at_least_the_highest_barrier():
+    structure, found = least(scene(vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")))
+    names = {structure.names[label]: value for label, value in found.items()}
+    assert names == {"middle-rest": pytest.approx(0.1125, rel=1e-9), "right-rest": pytest.approx(0.1125, rel=1e-9)}
+
+
+def test_none_without_it():
+    assert least(scene(WELLS, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 0.8),)))[1] == {}
+    assert least(scene(vk.CustomSpring("x**3 - x + c*x**2*v", c=0.3)))[1] == {}
+
+
+def test_least_action_needs_no_other_search():
+    osc = stopped(vk.Hertz(1e4))
+    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    result = vk.LeastAction().run(osc, structure)
+    assert [finding.code for finding in result.findings if finding.code is Code.DETAILED_BALANCE] * 2
+    assert not {Code.GRAPH, Code.SHOTS} & {finding.code for finding in result.findings}
+    for energy in result.energies:
+        assert energy.bound is Bound.CERTIFIED
+        assert energy.certificate is not None
+        assert energy.lower <= energy.value <= energy.upper
+        assert math.isclose(energy.lower, energy.value, rel_tol=1e-6)
