@@ -28,14 +28,14 @@ class LeastAction(Analyzer):
     or on a face of the region that is left, by multiple shooting on Hamilton's equations and their variational
     equations. The least action is the energy; all others are listed in the result's `branches`. The certificate shows
     how well a path solves its equations. The graph search tests, within its error estimate, whether a cheaper path
-    exists, and the lower bound of the energy rests on it.
+    exists, and the lower bound of the energy rests on it, or, exactly, on detailed balance.
 
     Without forcing, the motion from each end back to an equilibrium, run backwards, is the first candidate; where
-    detailed balance holds, it is the path of least action. The graph is solved on a quarter of its nodes along each
-    side first, and shooting follows. Then it is solved on twice as many, and on all, until it agrees with the paths
-    within the `accuracy`. Last, the graph is solved around the beginning of the cheapest path, where paths compete that
-    differ by about 0.1 %. Paths are certified after each search. If the work is stopped in between, they are
-    returned with the bounds that are known.
+    detailed balance holds, it is the path of least action, and nothing else is searched. Otherwise, the graph is solved
+    on a quarter of its nodes along each side, and shooting follows. Then the graph is solved on twice as many, and on
+    all, until it agrees with the paths within the `accuracy`. Last, it is solved around the beginning of the cheapest
+    path, where paths compete that differ by about 0.1 %. Paths are certified after each search. If the work is stopped
+    in between, they are returned with the bounds that are known.
 
     In a scene with odd forces, an attractor may be the mirror image of one that was analyzed before. The mirror images
     of its paths take the place of shooting and of the finer graphs.
