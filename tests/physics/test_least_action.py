@@ -1,5 +1,6 @@
 """Least actions that are known: in closed form, or from a minimisation that shares nothing with the toolkit."""
 
+import dataclasses
 import functools
 import math
 
@@ -57,8 +58,8 @@ def test_double_well_from_both_sides(damping):
     osc, structure = double_well(damping)
     result = vk.LeastAction(graph=None, shooting=QUICK).run(osc, structure)
     check_double_well(result, damping, (0, 1))
-    assert [finding.source for finding in result.found(Code.NOT_SEARCHED)] == [0]
-    assert [finding.source for finding in result.found(Code.MIRROR_IMAGE)] == [1]
+    assert [finding.source for finding in result.found(Code.DETAILED_BALANCE)] == [0, 1]
+    assert all(energy.bound is Bound.CERTIFIED for energy in result.energies)
 
 
 SEARCHES = {"graph": {"shooting": None}, "shooting": {"graph": None}, "both": {}}
@@ -66,7 +67,9 @@ SEARCHES = {"graph": {"shooting": None}, "shooting": {"graph": None}, "both": {}
 
 @pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES)
 def test_each_search_by_its_defaults(search):
+    """Noise that changes by rounding errors, since detailed balance makes the searches needless."""
     osc, structure = double_well(0.1)
+    osc = dataclasses.replace(osc, noise=vk.StateDependentNoise(1e-4, "1 + c*x**2", c=1e-13))
     result = vk.LeastAction(source=1, **search).run(osc, structure)
     check_double_well(result, 0.1, (1,))
     (energy,) = result.energies

@@ -202,16 +202,16 @@ class ValueIteration:
             self.roots.append(costs.roots.reshape(*grids.shape, 3))
             self.predecessors.append(np.clip(np.nan_to_num(self.centres[-1], nan=1.0), 1.0, last))
             self.uphill.append(np.clip(costs.uphill.reshape(*grids.shape, 2), 1.0, last))
-        self.ceilings = self.bounds
-        self.values = [np.minimum(*both) for both in zip(known.values, self.bounds, strict=True)]
+        self.known = known.values
 
     def up_to(self, ceiling: float) -> Potential:
-        """Return V, as far as it is below a ceiling; a higher one than before goes on from what is known."""
-        reached, self.ceilings = self.ceilings, [np.minimum(bound, ceiling) for bound in self.bounds]
-        self.values = [
-            np.where(values < limits, values, limit)
-            for values, limits, limit in zip(self.values, reached, self.ceilings, strict=True)
-        ]
+        """Return V, as far as it is below a ceiling; a higher one than before begins with the predecessors known.
+
+        It does not begin with the values known: next to a ceiling they are too small, and a value that is too small
+        stays where motion without noise returns to, in the basin of another attractor.
+        """
+        self.ceilings = [np.minimum(bound, ceiling) for bound in self.bounds]
+        self.values = [np.minimum(*both) for both in zip(self.known, self.ceilings, strict=True)]
         self.predecessors = [known.copy() for known in self.predecessors]
         self._improve()
         return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, ceiling)
