@@ -18,7 +18,7 @@ from vibrokit.analyzers.polishing.ending import resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
-from vibrokit.analyzers.polishing.polish import polish
+from vibrokit.analyzers.polishing.polish import Polishing, Shared, polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import single_stepper
@@ -26,6 +26,7 @@ from vibrokit.progress import working
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
+from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
 
 DAMPING = 0.3
@@ -112,6 +113,21 @@ def test_a_guess_far_costlier_than_a_known_path_is_skipped_and_counted(problem):
     (finding,) = found.findings
     assert finding.code is Code.CANDIDATES_SKIPPED
     assert finding.values == {"skipped": 1, "total": 2, "factor": 1.25}
+
+
+NO_PATH = [[-1.0, 0.0], [np.nan, 0.0], [0.5, 0.0]]
+
+
+@pytest.mark.parametrize(("path", "paths"), [(straight(), 1), (NO_PATH, 0)], ids=["path", "no path"])
+def test_a_candidate_is_polished_from_two_of_several_orbits_that_lead_to_the_same(problem, path, paths):
+    (well,), shared = equilibria(problem.scene, -1.5, -0.5), Shared()
+    several, iterations = [Polishing(problem, well, shared) for _ in range(4)], []
+    for one in several:
+        with working() as work:
+            one.add((guess(path),))
+        iterations.append(work.stats.newton_iterations)
+    assert iterations[2:] == [0, 0]
+    assert [len(one.polished().branches) for one in several] == [paths, 0, 0, 0]
 
 
 NOWHERE = {

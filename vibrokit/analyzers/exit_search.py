@@ -19,8 +19,7 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import usable_ends
 from vibrokit.analyzers.polishing.leg import pieces_of
-from vibrokit.analyzers.polishing.polish import Polishing
-from vibrokit.analyzers.polishing.solved_path import SolvedPath
+from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
 from vibrokit.progress import TRAJECTORIES, stage, working
@@ -245,10 +244,10 @@ class ExitSearch:
     def _polishings(self) -> list[Polishing]:
         """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
         found = list[Polishing]()
-        repeats, shared = self.problem.attractor.repeats, list[SolvedPath]()
-        for orbit in (None,) if repeats else self._orbits_inside():
+        shared = Shared()
+        for orbit in (None,) if self.problem.attractor.repeats else self._orbits_inside():
             try:
-                found.append(Polishing(self.problem, orbit, None if repeats else shared))
+                found.append(Polishing(self.problem, orbit, shared))
             except (StructureError, StepperError) as error:
                 self._failed("polishing", error)
         return found

@@ -26,6 +26,7 @@ METHOD = "least action"
 _COMPETING = 0.01  # of the least action: at ΔU/D = 100 such a path still carries a third as many exits
 _FLAT = 1e-3  # sine of the angle between the manifolds
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
+_ORBITS = 2  # inside an attractor from which paths are polished to ends that no candidate led to
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -35,6 +36,24 @@ class Polished:
 
     branches: tuple[ActivationEnergy, ...]  # each path once for each attractor that it leads to, the cheapest first
     findings: tuple[Finding, ...]  # `Code.STOPPED` is among them if the work was stopped before its end
+
+
+@dataclasses.dataclass(eq=False)
+class Shared:
+    """What the paths from several orbits inside one attractor share.
+
+    A candidate is polished from two orbits, and from another one as long as it leads to something new: motion inside
+    the attractor is free, so that most paths differ in their beginnings only.
+    """
+
+    orbits: int = 0
+    solved: list[SolvedPath] = dataclasses.field(default_factory=list)  # those kept
+    fruitless: set[tuple[int, bytes]] = dataclasses.field(default_factory=set)  # candidates
+
+    def is_new(self, one: SolvedPath) -> bool:
+        """Whether no orbit has led to the same path, as far as its beginning does not matter."""
+        alike = (other for other in self.solved if other.end is one.end)
+        return all(abs(one.action - other.action) > _EQUAL * other.action for other in alike)
 
 
 def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit | None = None) -> Polished:
@@ -51,16 +70,18 @@ class Polishing:
     finished. A path whose certificate fails is kept without.
 
     For an attractor that is not an orbit, `orbit` is an unstable one inside it; an exit from there costs at least as
-    much as leaving the attractor. Several such orbits share the list `known`: of paths that differ only in the orbit
-    that they start on, one is kept. Raises StructureError if no orbit is given, or if it is not hyperbolic, and
-    StepperError if the stepper cannot integrate Hamilton's equations of this scene.
+    much as leaving the attractor. Several of them may share what they lead to. Raises StructureError if no orbit is
+    given, or if it is not hyperbolic, and StepperError if the stepper cannot integrate Hamilton's equations of this
+    scene.
     """
 
-    def __init__(self, problem: ExitProblem, orbit: Orbit | None = None, known: list[SolvedPath] | None = None) -> None:
-        self._problem, self._shared = problem, known
+    def __init__(self, problem: ExitProblem, orbit: Orbit | None = None, shared: Shared | None = None) -> None:
+        self._problem, self._shared = problem, shared or Shared()
         with stage("ends of exit paths", subject=problem.attractor.name):
             self._ends, self._findings = usable_ends(problem)
             self._polisher = CandidatePolisher(problem, self._ends, orbit)
+        self._number = self._shared.orbits
+        self._shared.orbits += 1
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
         self._seen = set[tuple[int, bytes]]()
@@ -72,24 +93,28 @@ class Polishing:
         Those that came before are left out: finer graphs give some paths again. Those that lead to no path quickly are
         left for the next call, after the candidates of that one.
         """
-        new = {(each.target, each.states.tobytes()): each for each in candidates}
+        new = {_key(each): each for each in candidates}
         ranked = sorted((new[key] for key in new if key not in self._seen), key=lambda each: each.action)
         self._seen |= new.keys()
         self._tried += len(ranked)
         try:
             with stage("polishing", unit="candidates", total=len(ranked)):
                 for candidate in ranked:
-                    self._polisher.polish(candidate, quick=quick)
+                    if _key(candidate) not in self._shared.fruitless:
+                        before = len(self._polisher.solved)
+                        self._polisher.polish(candidate, quick=quick)
+                        if self._number and not any(map(self._shared.is_new, self._polisher.solved[before:])):
+                            self._shared.fruitless.add(_key(candidate))
                     advance()
                 self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
                 if not quick:
                     self._polisher.polish_the_rest()
-                    for end in self._ends:
+                    for end in self._ends if self._number < _ORBITS else ():
                         self._polisher.reach(end, self._waiting)
                     self._waiting = []
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))
-        found = [solved for solved in self._polisher.solved[self._certified :] if self._is_new(solved)]
+        found = self._new()
         self._certified, certified = len(self._polisher.solved), 0
         try:
             with stage("certifying", unit="paths", total=len(found)):
@@ -102,14 +127,16 @@ class Polishing:
             for solved in found[certified:]:
                 self._branches += _energies(self._problem, solved)
 
-    def _is_new(self, solved: SolvedPath) -> bool:
-        """Whether no orbit that shares its paths has led to the same one, which is noted."""
-        if self._shared is None:
-            return True
-        alike = (other for other in self._shared if other.end is solved.end)
-        new = all(abs(solved.action - other.action) > _EQUAL * other.action for other in alike)
-        if new:
-            self._shared.append(solved)
+    def _new(self) -> list[SolvedPath]:
+        """The paths that were solved for since the last call, without those that another orbit has led to."""
+        found = self._polisher.solved[self._certified :]
+        if self._shared.orbits == 1:
+            return found
+        new = list[SolvedPath]()
+        for one in found:
+            if self._shared.is_new(one):
+                self._shared.solved.append(one)
+                new.append(one)
         return new
 
     def polished(self) -> Polished:
@@ -120,6 +147,10 @@ class Polishing:
             findings.append(Finding(Code.CANDIDATES_SKIPPED, self._problem.source, values=values))
         branches = sorted(self._branches, key=lambda branch: branch.value)
         return Polished(tuple(branches), (*findings, *_valleys(branches)))
+
+
+def _key(candidate: Candidate) -> tuple[int, bytes]:
+    return candidate.target, candidate.states.tobytes()
 
 
 def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]) -> list[ActivationEnergy]:
