@@ -36,6 +36,7 @@ _FEWEST = 2  # nodes of a path
 _NEARLY = 1e-4  # misfit of a path that may converge if it begins nearer to its source
 _ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
+_COMPARED = 512  # nodes of a path, at most, that are compared with another one
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
@@ -223,9 +224,12 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
     if not len(own) or len(line) < _FEWEST:
         return False
     starts, ways = line[:-1], np.diff(line, axis=0)
-    along = np.einsum("akj,kj->ak", own[:, None] - starts, ways) / np.maximum((ways**2).sum(axis=1), 1e-300)
-    nearest = starts + np.clip(along, 0, 1)[..., None] * ways
-    return bool(np.linalg.norm(own[:, None] - nearest, axis=2).min(axis=1).max() < _SAME)
+    lengths = np.maximum((ways**2).sum(axis=1), 1e-300)
+    for state in own[np.linspace(0, len(own) - 1, min(len(own), _COMPARED)).astype(np.int64)]:
+        along = np.clip(((state - starts) * ways).sum(axis=1) / lengths, 0, 1)
+        if np.linalg.norm(state - starts - along[:, None] * ways, axis=1).min() >= _SAME:
+            return False
+    return True
 
 
 def solved_again(
