@@ -28,7 +28,9 @@ def stopped(law, position=0.9):
 
 def least(osc, source=0, exit_=None):
     structure = vk.find_structure(osc, rng=0, manifolds=False)
-    return structure, least_actions(ExitProblem(osc, structure, structure.attractors[source], exit_ or vk.LeaveBasin()))
+    found = least_actions(ExitProblem(osc, structure, structure.attractors[source], exit_ or vk.LeaveBasin()))
+    assert all(each.lower <= each.value <= each.upper for each in found)
+    return structure, {each.target: each.value for each in found}
 
 
 @pytest.mark.parametrize(
@@ -112,3 +114,17 @@ def test_least_action_needs_no_other_search():
         assert energy.certificate is not None
         assert energy.lower <= energy.value <= energy.upper
         assert math.isclose(energy.lower, energy.value, rel_tol=1e-6)
+
+
+def test_an_energy_without_a_path():
+    """A stop of 1e6: reversed relaxation from the saddle is found, but has too many impacts to be polished."""
+    osc = stopped(vk.Hertz(1e7))
+    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    result = vk.LeastAction(source=0).run(osc, structure)
+    (energy,) = result.energies
+    assert energy.saddle == 0
+    assert energy.value == pytest.approx(-4 * ZETA * (0.9**4 / 4 - 0.9**2 / 2), rel=1e-3)  # depth neglected
+    assert energy.upper - energy.lower < 1e-6 * energy.value
+    if energy.path is None:
+        assert result.found(Code.BARRIER_ENERGY)
+        assert energy.bound is Bound.ESTIMATE

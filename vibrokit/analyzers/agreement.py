@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from vibrokit.results.attractor import Attractor
@@ -21,7 +22,7 @@ def combined(
     branches: Sequence[ActivationEnergy],
     estimates: Iterable[ActivationEnergy],
     mirrored: Mapping[int, ActivationEnergy] | None = None,
-    least: Mapping[int, float] | None = None,
+    least: Iterable[ActivationEnergy] = (),
 ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
     """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
@@ -29,24 +30,26 @@ def combined(
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
-    Where it is known what no path can cost less than, the lower bound is at least that.
+    Where it is known what no path can cost less than, the lower bound is at least that; where that is what the exit
+    costs, no path is needed.
 
-    Given are the polished paths, the cheapest first, and by target the graph's estimates, the energies that those of
-    the attractor are mirror images of, and the least possible actions. Returns an energy and a finding for each target.
+    Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
+    attractor are mirror images of, and the least possible actions. Returns an energy and a finding for each target.
     """
     paths: dict[int, ActivationEnergy] = {}
     for branch in branches:
         paths.setdefault(branch.target, branch)
-    graph = {estimate.target: estimate for estimate in estimates}
+    graph, lowest = ({each.target: each for each in some} for some in (estimates, least))
+    known = [target for target, each in lowest.items() if math.isfinite(each.upper)]
     pairs = [
         _of_target(
             attractor,
             paths.get(target),
             graph.get(target),
             (mirrored or {}).get(target),
-            (least or {}).get(target, 0.0),
+            lowest.get(target),
         )
-        for target in sorted({*paths, *graph}, key=lambda target: (target < 0, target))
+        for target in sorted({*paths, *graph, *known}, key=lambda target: (target < 0, target))
     ]
     return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
 
@@ -61,9 +64,11 @@ def _of_target(
     path: ActivationEnergy | None,
     graph: ActivationEnergy | None,
     mirrored: ActivationEnergy | None,
-    least: float,
+    least: ActivationEnergy | None,
 ) -> tuple[ActivationEnergy, Finding]:
-    if path is not None and path.value - least <= _TIGHT * path.value:
+    if path is None and least is not None and math.isfinite(least.upper):
+        code, energy = Code.BARRIER_ENERGY, least
+    elif path is not None and least is not None and path.value - least.lower <= _TIGHT * path.value:
         code, energy = Code.DETAILED_BALANCE, path
         if path.certificate is not None:
             energy = dataclasses.replace(path, bound=Bound.CERTIFIED)
@@ -80,9 +85,10 @@ def _of_target(
         code, energy = _compared(path, graph)
     values = {} if graph is None else {"graph": graph.value, "error": graph.numerical_error}
     values |= {} if path is None else {"path": path.value}
-    values |= {"least": least} if least else {}
-    if (lower := min(least, energy.value - energy.numerical_error)) > energy.lower:
-        energy = dataclasses.replace(energy, lower=lower)
+    if least is not None:
+        values["least"] = least.value
+        lower = min(least.lower, energy.value - energy.numerical_error)
+        energy = energy if lower <= energy.lower else dataclasses.replace(energy, lower=lower)
     return energy, Finding(code, attractor.label, energy.target, values)
 
 

@@ -34,7 +34,7 @@ from vibrokit.symbolic.flow_kind import Flow
 if TYPE_CHECKING:
     from vibrokit.analyzers.least_action import LeastAction
 
-_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE)
+_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
 """Energies with bounds that no graph gave."""
 _AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
 """What more nodes do not change, however many there are."""
@@ -53,7 +53,7 @@ class ExitSearch:
         self._least = detailed_balance.least_actions(problem)
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
-        self._searched = False  # whether there are no more solutions
+        self._searched = self._reversed = False  # whether there are no more solutions, and no more relaxations
         self.findings: list[Finding] = []
 
     def run(self) -> Analysis:
@@ -83,8 +83,9 @@ class ExitSearch:
 
     @property
     def _is_exact(self) -> bool:
-        """Whether all exits cost what no path can cost less than."""
-        return bool(self._least) and self._least.keys() <= self._agreed((), self._polished()[0], Code.DETAILED_BALANCE)
+        """Whether all exits cost what no path can cost less than, after reversed relaxations were polished."""
+        exact = self._agreed((), self._polished()[0], Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
+        return self._reversed and bool(self._least) and {each.target for each in self._least} <= exact
 
     def mirror(self) -> None:
         """Polish mirror images of known paths; those that leave another attractor take the place of shooting."""
@@ -104,6 +105,7 @@ class ExitSearch:
             self._polish(found)
         if slow:
             self._polish(slow, quick=self._shots_follow)
+        self._reversed = True
 
     def shoot(self) -> None:
         """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""

@@ -369,6 +369,11 @@ class Code(StrEnum):
         "Detailed balance holds: no path from {state} to {goal} costs less than {least:.10g}, which follows from the "
         "potential energy of the barrier. The polished path costs {path:.10g}.",
     )  # fmt: skip
+    BARRIER_ENERGY = (
+        "barrier-energy", INFO,
+        "Detailed balance holds: leaving {state} for {goal} costs {least:.10g}, which follows from the potential "
+        "energy of the barrier. No path was polished.",
+    )  # fmt: skip
     NOT_SEARCHED = (
         "not-searched", WARNING,
         "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "

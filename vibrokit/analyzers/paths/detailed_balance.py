@@ -20,34 +20,53 @@ from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.symbolic.model import Model
 
 _RELATIVE = 1e-11  # error of the potential energy
 _PARTS = 200  # of an interval, at most
 
 
-def least_actions(problem: ExitProblem) -> dict[int, float]:
-    """Return by target what no exit can cost less than; empty where detailed balance does not hold.
+METHOD = "detailed balance"
+
+
+def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
+    """Return for each target what no exit can cost less than; none where detailed balance does not hold.
 
     A path passes every x between the equilibrium and its end. So it climbs at least to the highest potential energy
-    there, which is that of a saddle or of the end.
+    there, which is that of a saddle or of the end. If that is the end of the cheapest way, reversed relaxation from
+    there costs as much, and the estimate is exact within its numerical error. Others have no upper bound.
     """
     attractor, ends = problem.attractor, problem.path_ends
     if attractor.kind != "equilibrium" or not problem.scene.autonomous:
-        return {}
+        return ()
     places = {end: _place(end, problem) for end in ends}
     balance = Model(problem.scene).balance
     if balance is None or not balance > 0 or not all(math.isfinite(place) for place in places.values()):
-        return {}
+        return ()
     start = float(attractor.points[0, 0])
     summits = [float(saddle.points[0, 0]) for saddle in problem.structure.saddles]
-    least: dict[int, float] = {}
+    least: dict[int, ActivationEnergy] = {}
     for end, place in places.items():
         between = [x for x in summits if min(start, place) < x < max(start, place)]
-        cost = float(balance) * _highest(problem.scene, [start, *sorted(between, key=lambda x: abs(x - start)), place])
+        along = [start, *sorted(between, key=lambda x: abs(x - start)), place]
+        energy, error, last = _highest(problem.scene, along)
+        value, error = float(balance) * energy, float(balance) * error
+        reached = last and isinstance(end, AtSaddle) and end.on_own_boundary
         for target in end.targets:
-            least[target] = min(cost, least.get(target, math.inf))
-    return least
+            if target not in least or value < least[target].value:
+                least[target] = ActivationEnergy(
+                    source=problem.source,
+                    target=target,
+                    value=value,
+                    lower=max(0.0, value - error),
+                    upper=value + error if reached else math.inf,
+                    method=METHOD,
+                    bound=Bound.ESTIMATE,
+                    numerical_error=error,
+                    saddle=end.saddle,
+                )
+    return tuple(least.values())
 
 
 def _place(end: PathEnd, problem: ExitProblem) -> float:
@@ -61,9 +80,9 @@ def _place(end: PathEnd, problem: ExitProblem) -> float:
     return math.inf
 
 
-def _highest(scene: Oscillator, places: list[float]) -> float:
-    """The highest potential energy at some places, one after the other, above that at the first, less its error."""
-    field, energy, highest = VectorField(scene), 0.0, 0.0
+def _highest(scene: Oscillator, places: list[float]) -> tuple[float, float, bool]:
+    """The highest potential energy at some places in turn, above the first, its error, and whether the last has it."""
+    field, energy, total, highest = VectorField(scene), 0.0, 0.0, (0.0, 0.0, False)
     stops = [barrier.position for barrier in scene.barriers]
 
     def force(x: float) -> float:
@@ -74,6 +93,7 @@ def _highest(scene: Oscillator, places: list[float]) -> float:
         work, error = quad(
             force, one, other, epsabs=0.0, epsrel=_RELATIVE, limit=_PARTS, points=kinks or None, full_output=True
         )[:2]  # it would warn where rounding limits the accuracy
-        energy -= work + error
-        highest = max(highest, energy)
+        energy, total = energy - work, total + error
+        if energy > highest[0]:
+            highest = energy, total, other == places[-1]
     return highest
