@@ -79,14 +79,23 @@ class Shooter:
             begun, section, ended.states, ended.status, ended.intervals, ended.label, confirmed, 0 * section
         )
 
-    def confirm(self, outcomes: Outcomes) -> None:
-        """Confirm the cheapest exits, in place, until the best one to each target is certain."""
+    def confirm(self, outcomes: Outcomes, factor: float = 1.0) -> None:
+        """Confirm exits, in place: the cheapest ones until the best one to each target is certain, then all others.
+
+        These are the exits up to `factor` times the least action of their target; they settle all at once, because a
+        few take as long as many.
+        """
         for _ in range(_BATCHES):
             doubtful = self.doubtful(outcomes)
             if not len(doubtful):
-                return
+                break
             ranked = doubtful[np.argsort(outcomes.actions[doubtful], kind="stable")]
             self.settle(outcomes, ranked[: max(_BATCH, len(ranked) // _PARTS)])
+        for _ in range(_BATCHES if factor > 1 else 0):
+            doubtful = self.doubtful(outcomes, factor)
+            if not len(doubtful):
+                break
+            self.settle(outcomes, doubtful)
 
     def doubtful(self, outcomes: Outcomes, factor: float = 1.0) -> Whole:
         """Return the exits below `factor` times the least action of their target that are not confirmed."""

@@ -17,7 +17,7 @@ from vibrokit.analyzers.shooting.starts import Starts
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION, STALLED
 
 _PART = 4  # a round adds the points of the first grid divided by this
-_CERTAIN = 1.5  # times the least action of a target, up to which local minima are confirmed
+_CERTAIN = 1.5  # times the least action of a target, up to which all exits are confirmed
 _SETTLINGS = 40  # after each, paths that were no exits have given way to others
 
 _STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED)
@@ -93,7 +93,7 @@ class Shots:
     def minima(self, most: int) -> NDArray[np.int64]:
         """Return confirmed exits with no cheaper one next to them, the cheapest first, and at most so many.
 
-        Those that are not confirmed yet are, in place: every exit takes long where boundaries of basins are fractal.
+        Local minima of the first grid that are not confirmed yet are, in place.
         """
         outcomes = self.outcomes
         for _ in range(_SETTLINGS):
@@ -161,6 +161,6 @@ class Shots:
         boxes = self.boxes.split(which)
         new = self.shooter.shoot(*self.starts.states(boxes.centres[len(self.boxes.centres) :]))
         outcomes = self.outcomes.joined(new)
-        self.shooter.confirm(outcomes)
+        self.shooter.confirm(outcomes, _CERTAIN)
         least = outcomes.least(len(self.shooter.problem.structure.attractors))
         return dataclasses.replace(self, boxes=boxes, outcomes=outcomes, history=(*self.history, least))
