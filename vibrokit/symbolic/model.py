@@ -180,11 +180,7 @@ class Model:
     @cached_property
     def undamped(self) -> bool:
         """Whether the motion conserves energy at the parameters of the scene: no friction, and conservative stops."""
-        values = self.scene.parameters
-        numbers = {symbol: values[path] for path, symbol in self.symbols.items()}
-        friction = sympy.diff(self.smooth_force, self.state[1]).subs(numbers)
-        laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
-        return friction == 0 and all(law == 0 for law in laws)
+        return self._friction == 0 and self._conservative_stops
 
     @cached_property
     def balance(self) -> sympy.Expr | None:
@@ -195,15 +191,26 @@ class Model:
         """
         if self.forcing != 0 or len(self.state) > 2:
             return None
-        values = self.scene.parameters
-        numbers = {symbol: values[path] for path, symbol in self.symbols.items()}
-        x, v = self.state
-        friction = -sympy.diff(self.smooth_force.subs(numbers), v)
-        noise = self.diffusion[1, 1].subs(numbers)
-        laws = (sympy.diff(contact.law.subs(numbers), RATE) for contact in self.contacts)
-        if {x, v} & (friction.free_symbols | noise.free_symbols) or any(law != 0 for law in laws) or noise == 0:
+        friction, noise = self._friction, self.diffusion[1, 1].subs(self._numbers)
+        if noise == 0 or not self._conservative_stops or (friction.free_symbols | noise.free_symbols) & {*self.state}:
             return None
         return 2 * friction / noise
+
+    @cached_property
+    def _numbers(self) -> dict[sympy.Symbol, float]:
+        """The values of the parameters of the scene."""
+        values = self.scene.parameters
+        return {symbol: values[path] for path, symbol in self.symbols.items()}
+
+    @cached_property
+    def _friction(self) -> sympy.Expr:
+        """γ = −∂v′/∂v without stops, at the parameters of the scene."""
+        return -sympy.diff(self.smooth_force.subs(self._numbers), self.state[1])
+
+    @cached_property
+    def _conservative_stops(self) -> bool:
+        """Whether no force of a stop depends on the rate, at the parameters of the scene."""
+        return all(sympy.diff(contact.law.subs(self._numbers), RATE) == 0 for contact in self.contacts)
 
     @property
     def latex(self) -> str:

@@ -23,11 +23,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.symbolic.model import Model
 
+METHOD = "detailed balance"
 _RELATIVE = 1e-11  # error of the potential energy
 _PARTS = 200  # of an interval, at most
-
-
-METHOD = "detailed balance"
 
 
 def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:

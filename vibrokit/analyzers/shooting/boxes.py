@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,13 +71,6 @@ class Boxes:
         """Return each box's neighbours, itself included: as many as in a regular grid."""
         return nearest(self.centres, self.first)
 
-    @cached_property
-    def _cells(self) -> tuple[Whole, Whole]:
-        """The first-grid box that each box is in, and the neighbours of each first-grid box."""
-        cells = np.floor(self.centres / self.first * (1 - _ROUNDING)).astype(np.int64)
-        distinct, which = np.unique(cells, axis=0, return_inverse=True)
-        return which.ravel(), nearest((distinct + 0.5) * self.first, self.first)
-
     def promising(self, values: Array, kinds: Whole, count: int) -> Whole:
         """Return about `count` boxes to split: of each size, those with the least values in their neighbourhoods.
 
@@ -100,11 +92,12 @@ class Boxes:
 
     def minima(self, values: Array) -> Whole:
         """Return the best box in each first-grid box that has no better neighbour, the best first."""
-        cells, near = self._cells
-        ranked = np.lexsort((-np.arange(len(values)), -values))
-        best = np.empty(len(near), dtype=np.int64)
-        best[cells[ranked]] = ranked  # of those in one cell, the last one stays
-        around = values[best][near].min(axis=1)
+        ranked = np.lexsort((np.arange(len(values)), values))
+        cell = np.floor(self.centres / self.first * (1 - _ROUNDING)).astype(np.int64)
+        _, first = np.unique(cell[ranked], axis=0, return_index=True)
+        best = ranked[first]
+        middles = (cell[best] + 0.5) * self.first
+        around = values[best][nearest(middles, self.first)].min(axis=1)
         which = best[np.isfinite(values[best]) & (values[best] <= around)]
         return which[np.argsort(values[which], kind="stable")]
 

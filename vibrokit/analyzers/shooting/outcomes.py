@@ -85,19 +85,16 @@ class Shooter:
         These are the exits up to `factor` times the least action of their target; they settle all at once, because a
         few take as long as many.
         """
-        for _ in range(_BATCHES):
-            doubtful = self.doubtful(outcomes)
-            if not len(doubtful):
-                break
-            ranked = doubtful[np.argsort(outcomes.actions[doubtful], kind="stable")]
-            self.settle(outcomes, ranked[: max(_BATCH, len(ranked) // _PARTS)])
-        for _ in range(_BATCHES if factor > 1 else 0):
-            doubtful = self.doubtful(outcomes, factor)
-            if not len(doubtful):
-                break
-            self.settle(outcomes, doubtful)
+        for up_to in sorted({1.0, factor}):
+            for _ in range(_BATCHES):
+                doubtful = self._doubtful(outcomes, up_to)
+                if not len(doubtful):
+                    break
+                ranked = doubtful[np.argsort(outcomes.actions[doubtful], kind="stable")]
+                some = max(_BATCH, len(ranked) // _PARTS) if up_to == 1.0 else len(ranked)
+                self._settle(outcomes, ranked[:some])
 
-    def doubtful(self, outcomes: Outcomes, factor: float = 1.0) -> Whole:
+    def _doubtful(self, outcomes: Outcomes, factor: float) -> Whole:
         """Return the exits below `factor` times the least action of their target that are not confirmed."""
         if self.problem.exit.by_position:
             return np.empty(0, dtype=np.int64)
@@ -106,7 +103,7 @@ class Shooter:
         ceilings = factor * np.append(least[:-1], least.min())
         return open_[outcomes.actions[open_] < ceilings[outcomes.targets[open_]]]
 
-    def settle(self, outcomes: Outcomes, which: Whole) -> None:
+    def _settle(self, outcomes: Outcomes, which: Whole) -> None:
         """Let the motion without noise decide about some exits, in place.
 
         If it settles on another attractor, the exit is confirmed. If it settles on the source, the path only touched

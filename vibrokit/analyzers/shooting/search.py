@@ -128,7 +128,7 @@ class Search:
     def of(cls, shots: Shots) -> Search:
         """Find the distinct exit paths among some shots."""
         problem = shots.shooter.problem
-        branches = branches_of(shots.shooter, shots.outcomes, shots.minima(_TRIED))
+        branches = branches_of(shots.shooter, shots.outcomes, shots.minima()[:_TRIED])
         findings = [Finding.of(Code.SHOTS, problem.source, branches=len(branches), **shots.counts())]
         if not branches:
             findings.append(Finding.of(Code.NO_EXIT_FOUND, problem.source))

@@ -18,7 +18,6 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGI
 
 _PART = 4  # a round adds the points of the first grid divided by this
 _CERTAIN = 1.5  # times the least action of a target, up to which all exits are confirmed
-_SETTLINGS = 40  # after each, paths that were no exits have given way to others
 
 _STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED)
 _MEANINGS = "remaining left_region left_basin diverged stalled"
@@ -90,21 +89,9 @@ class Shots:
             if number >= depth and shots.change <= tolerance:
                 return
 
-    def minima(self, most: int) -> NDArray[np.int64]:
-        """Return confirmed exits with no cheaper one next to them, the cheapest first, and at most so many.
-
-        Local minima of the first grid that are not confirmed yet are, in place.
-        """
-        outcomes = self.outcomes
-        for _ in range(_SETTLINGS):
-            exits = outcomes.confirmed.copy()
-            exits[self.shooter.doubtful(outcomes, _CERTAIN)] = True
-            found = self.boxes.minima(np.where(exits, outcomes.actions, np.inf))[:most]
-            doubtful = found[~outcomes.confirmed[found]]
-            if not len(doubtful):
-                return found
-            self.shooter.settle(outcomes, doubtful)
-        return found[outcomes.confirmed[found]]
+    def minima(self) -> NDArray[np.int64]:
+        """Return confirmed exits with no cheaper one next to them, the cheapest first."""
+        return self.boxes.minima(np.where(self.outcomes.confirmed, self.outcomes.actions, np.inf))
 
     def counts(self) -> dict[str, int]:
         """Return how many paths ended in which way."""
