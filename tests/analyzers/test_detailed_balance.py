@@ -1,11 +1,14 @@
 """What exits cost at least where detailed balance holds, by closed forms."""
 
+import dataclasses
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.agreement import combined
 from vibrokit.analyzers.paths.detailed_balance import least_actions
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.basins import ESCAPED
@@ -117,8 +120,8 @@ def test_least_action_needs_no_other_search():
 
 
 @pytest.mark.slow
-def test_an_energy_without_a_path():
-    """A stop of 1e7: reversed relaxation from the saddle is found, but has too many impacts to be polished."""
+def test_a_path_that_cannot_be_polished():
+    """A stop of 1e7: reversed relaxation from the saddle has too many impacts to be polished, and is the path."""
     osc = stopped(vk.Hertz(1e7))
     structure = vk.find_structure(osc, rng=0, manifolds=False)
     result = vk.LeastAction(source=0).run(osc, structure)
@@ -126,6 +129,44 @@ def test_an_energy_without_a_path():
     assert energy.saddle == 0
     assert energy.value == pytest.approx(-4 * ZETA * (0.9**4 / 4 - 0.9**2 / 2), rel=1e-3)  # depth neglected
     assert energy.upper - energy.lower < 1e-6 * energy.value
-    if energy.path is None:
+    if energy.certificate is None:
         assert result.found(Code.BARRIER_ENERGY)
-        assert energy.bound is Bound.ESTIMATE
+        assert energy.bound is Bound.EXACT
+    assert energy.path.action[-1] == pytest.approx(energy.value, rel=1e-2)
+    climbed = energy.path.q[:, 1] ** 2 / 2 + energy.path.q[:, 0] ** 4 / 4 - energy.path.q[:, 0] ** 2 / 2
+    free = np.abs(energy.path.q[:, 0]) < 0.9
+    expected = energy.value + 4 * ZETA * climbed[free]  # along a path of least action: 4ζ times the energy
+    np.testing.assert_allclose(energy.path.action[free], expected, atol=1e-2 * energy.value)
+    velocities = energy.path.q[:, 1]
+    np.testing.assert_allclose(energy.path.p[:, 1], 4 * ZETA * velocities, atol=1e-9)  # of H at detailed balance
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8])
+def test_close_to_a_fold(distance):
+    """A saddle and a node 1e-2 to 1e-4 apart, in closed form with more digits."""
+    push = 2 / math.sqrt(27) * (1 - distance)
+    with mpmath.workdps(50):
+        places = sorted(mpmath.polyroots([1, 0, -1, mpmath.mpf(push)], maxsteps=500, extraprec=400), key=mpmath.re)
+        _, inner, outer = (mpmath.re(x) for x in places)  # of x³ − x = −push
+        depth = [x**4 / 4 - x**2 / 2 + mpmath.mpf(push) * x for x in (inner, outer)]
+        expected = float(4 * ZETA * (depth[0] - depth[1]))
+    osc = scene(WELLS, excitations=(vk.Constant(-push),))
+    structure, found = least(osc, 1)
+    assert [saddle.leads_to for saddle in structure.saddles] == [(0, 1)]
+    assert found == {0: pytest.approx(expected, rel=1e-5)}
+    (energy,) = least_actions(ExitProblem(osc, structure, structure.attractors[1], vk.LeaveBasin()))
+    assert abs(energy.value - expected) <= max(energy.numerical_error, 1e-12 * expected)
+
+
+def test_a_structure_without_its_saddles():
+    """What is known of the equilibria bounds the energy all the same, and raises a graph's estimate below it."""
+    osc = stopped(vk.Hertz(1e4))
+    structure = vk.find_structure(osc, rng=0, saddles=False, manifolds=False)
+    (bound,) = least_actions(ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin()))
+    assert bound.value == pytest.approx(4 * ZETA * (0.9**2 / 2 - 0.9**4 / 4), rel=1e-2)
+    assert bound.bound is Bound.ESTIMATE
+    low = dataclasses.replace(bound, value=0.5 * bound.value, lower=0.0, upper=0.6 * bound.value)
+    (energy,), _ = combined(structure.attractors[0], (), [low], least=[bound])
+    assert bound.lower <= energy.lower <= energy.value <= energy.upper
+    high = dataclasses.replace(bound, value=2 * bound.value, lower=bound.value, upper=3 * bound.value)
+    assert combined(structure.attractors[0], (), [high], least=[bound])[0][0].value == high.value

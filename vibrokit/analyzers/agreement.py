@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from vibrokit.results.attractor import Attractor
@@ -40,7 +39,7 @@ def combined(
     for branch in branches:
         paths.setdefault(branch.target, branch)
     graph, lowest = ({each.target: each for each in some} for some in (estimates, least))
-    known = [target for target, each in lowest.items() if math.isfinite(each.upper)]
+    known = [target for target, each in lowest.items() if each.bound is Bound.EXACT]
     pairs = [
         _of_target(
             attractor,
@@ -66,7 +65,7 @@ def _of_target(
     mirrored: ActivationEnergy | None,
     least: ActivationEnergy | None,
 ) -> tuple[ActivationEnergy, Finding]:
-    if path is None and least is not None and math.isfinite(least.upper):
+    if path is None and least is not None and least.bound is Bound.EXACT:
         code, energy = Code.BARRIER_ENERGY, least
     elif path is not None and least is not None and path.value - least.lower <= _TIGHT * path.value:
         code, energy = Code.DETAILED_BALANCE, path
@@ -87,9 +86,19 @@ def _of_target(
     values |= {} if path is None else {"path": path.value}
     if least is not None:
         values["least"] = least.value
-        lower = min(least.lower, energy.value - energy.numerical_error)
-        energy = energy if lower <= energy.lower else dataclasses.replace(energy, lower=lower)
+        energy = _raised(energy, least)
     return energy, Finding(code, attractor.label, energy.target, values)
+
+
+def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
+    """An energy that is at least what no path can cost less than."""
+    if energy.path is not None:
+        lower = max(energy.lower, min(least.lower, energy.value - energy.numerical_error))
+        return dataclasses.replace(energy, lower=lower)
+    value = max(energy.value, least.value)
+    error = max(energy.numerical_error, value - energy.value)
+    upper, lower = max(energy.upper, value), max(energy.lower, least.lower)
+    return dataclasses.replace(energy, value=value, lower=lower, upper=upper, numerical_error=error)
 
 
 def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, ActivationEnergy]:

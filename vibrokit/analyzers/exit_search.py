@@ -101,8 +101,9 @@ class ExitSearch:
             propagator = SegmentPropagator(self.problem.scene, stepper, max(pieces_of(self.problem.scene)))
             found = reversed_relaxation.reversed_relaxations(self.problem, propagator)
             slow = slow_relaxation.slow_relaxations(self.problem, propagator)
+        self._least = detailed_balance.with_paths(self.problem, self._least, found)
         if found:
-            self._polish(found)
+            self._polish(found, quick=all(each.bound is Bound.EXACT for each in self._least) and bool(self._least))
         if slow:
             self._polish(slow, quick=self._shots_follow)
         self._reversed = True

@@ -35,6 +35,8 @@ from vibrokit.results.table import Table
 class Bound(StrEnum):
     """What the bounds of an activation energy rest on."""
 
+    EXACT = "exact"
+    """Both: the potential energy of the barrier, where detailed balance holds; up to the error of a quadrature."""
     CERTIFIED = "certified"
     """Upper: a certified path. Lower: the graph search found no cheaper path within its error estimate."""
     UPPER = "upper"

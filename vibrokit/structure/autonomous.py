@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
@@ -26,6 +26,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
 _PLACES = 1024  # at which the force at rest is compared with 0
+_LEAST_FORCE = 1e-8  # of the distance between them: where a force is smallest, to rounding
 _AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
 _SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
 _RECURRENCE = 1e-2  # of the extent of the motion: distance between turning points from which Newton's method starts
@@ -81,25 +82,44 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
 
 
 def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
-    """Return the equilibria between two places (m): the force at rest changes its sign there.
+    """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 
-    Two that are closer to each other than a thousandth of the range may be missed. A StructureError is raised for a
-    scene with periodic excitation.
+    Between the places where it is evaluated, the force is searched for changes of sign where it comes near 0 and turns
+    back, so that a node and a saddle next to it are both found. A StructureError is raised for a scene with periodic
+    excitation.
     """
     refuse_forcing(osc)
     field, rest = VectorField(osc), np.zeros(1 if osc.noise is None else 1 + len(osc.noise.extra_states))
 
-    def force(x: float) -> float:
-        return float(field.rate(np.concatenate([[x], rest]))[1])
+    def force(places: Array) -> Array:
+        states = np.hstack([places[:, None], np.broadcast_to(rest, (len(places), len(rest)))])
+        return field.rate(states)[:, 1]
+
+    def force_at(x: float) -> float:
+        return float(force(np.array([x]))[0])
 
     places = np.linspace(low, high, _PLACES)
-    forces = np.array([force(x) for x in places])
-    found = []
+    places = np.sort([*places, *_turns_back(force_at, places, force(places))])
+    forces, found = force(places), []
     crossed = np.flatnonzero(forces[:-1] * forces[1:] < 0)
-    guesses = [*places[forces == 0], *(float(brentq(force, places[at], places[at + 1])) for at in crossed)]
+    guesses = [*places[forces == 0], *(float(brentq(force_at, places[at], places[at + 1])) for at in crossed)]
     for guess in sorted(guesses):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
             found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
+    return found
+
+
+def _turns_back(force: Callable[[float], float], places: Array, forces: Array) -> list[float]:
+    """Where, next to the places at which a force is smaller than at their neighbours, it is smallest or beyond 0."""
+    sizes = np.abs(forces)
+    least = (sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] <= sizes[2:]) & (forces[:-2] * forces[2:] > 0)
+    found = []
+    for at in np.flatnonzero(least) + 1:
+        side, low, high = math.copysign(1.0, forces[at]), float(places[at - 1]), float(places[at + 1])
+        nearest = minimize_scalar(
+            lambda x, side=side: side * force(x), bounds=(low, high), options={"xatol": _LEAST_FORCE * (high - low)}
+        )
+        found.append(float(nearest.x))
     return found
 
 

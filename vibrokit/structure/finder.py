@@ -42,6 +42,7 @@ _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
 _EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a motion on a boundary converges to its saddle
 _SEARCH_SETTLING = 1e-3
+_CLEAR = 0.25  # of the distance between two equilibria
 _MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
 _MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
 
@@ -103,7 +104,7 @@ class Finder:
             raise StructureError(_none_inside(self.region, self.attractors))
         if self.request.stepper is None:
             self.stepper = persistent_stepper(
-                self.osc, self.attractors, self.stepper, self.request.settling * self.frame.widths
+                self.osc, self.attractors, self.stepper, self.settling * self.frame.widths
             )
         lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
         if self.request.budget is None and lifetimes:
@@ -133,11 +134,17 @@ class Finder:
         """Region of the basin grid."""
         return self.region or frame_of(self.osc, self.search.attractors)
 
+    @cached_property
+    def settling(self) -> float:
+        """Distance at which a state counts as settled, in widths; less than that between a node and a saddle."""
+        gaps = np.diff([float(rest.point[0]) for rest in self.search.at_rest]) / self.frame.widths[0]
+        return float(min([self.request.settling, *(_CLEAR * gaps)]))
+
     @property
     def classifier(self) -> BasinClassifier:
         """Finds the attractor that a state leads to."""
         return BasinClassifier(
-            self.osc, self.attractors, self.frame, self.request.settling, self.budget, self.stepper, self.executor,
+            self.osc, self.attractors, self.frame, self.settling, self.budget, self.stepper, self.executor,
             shift=self.shift,
         )  # fmt: skip
 
@@ -194,7 +201,7 @@ class Finder:
             manifolds=self.manifolds,
             basins=grid.basins,
             survival=self.search.survival,
-            settling=self.request.settling,
+            settling=self.settling,
             budget=self.budget,
             stepper=name_of(self.stepper),
             shift=self.shift,

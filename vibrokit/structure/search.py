@@ -23,7 +23,7 @@ from vibrokit.results.region import Region
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
-from vibrokit.structure.autonomous import equilibria, find_cycle
+from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -66,6 +66,7 @@ class Search:
     def __post_init__(self) -> None:
         self.distances = self.settling * self.region.widths  # (2,) in x and v
         self.attractors: list[Attractor] = []
+        self.at_rest: tuple[Equilibrium, ...] = ()  # by position
         self.survival: tuple[Survival, ...] = ()
         self.starts = self.diverged = 0
         self.findings: list[Finding] = []
@@ -80,7 +81,8 @@ class Search:
         self.starts = len(states)
         with stage("attractors", unit="starts", total=self.starts):
             if self.osc.autonomous:  # then starts need not be followed until they rest, which is long on stiff stops
-                for rest in equilibria(self.osc, *self.region.x):
+                self.at_rest = tuple(equilibria(self.osc, *self.region.x))
+                for rest in self.at_rest:
                     self._add_orbit(rest.point, 1)
             for periods in _rounds(wait):
                 states = self._after(states, periods)

@@ -10,22 +10,32 @@ holds for reversed relaxation (Freidlin and Wentzell, Random Perturbations of Dy
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import cumulative_trapezoid, quad
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.reversed_relaxation import momenta_of
+from vibrokit.analyzers.polishing.leg import samples_of
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.kernels.single import record
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
+from vibrokit.structure.autonomous import equilibria
+from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
 
 METHOD = "detailed balance"
 _RELATIVE = 1e-11  # error of the potential energy
 _PARTS = 200  # of an interval, at most
+_ROUNDING = 1e-15  # of a force of the size ω_n² x
+_ALIKE = 0.01  # of an energy: its path, sampled and integrated by the trapezoidal rule, costs the same
 
 
 def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
@@ -43,7 +53,8 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
     if balance is None or not balance > 0 or not all(math.isfinite(place) for place in places.values()):
         return ()
     start = float(attractor.points[0, 0])
-    summits = [float(saddle.points[0, 0]) for saddle in problem.structure.saddles]
+    reach = (min(start, *places.values()), max(start, *places.values())) if places else (start, start)
+    summits = [float(rest.point[0]) for rest in equilibria(problem.scene, *reach)]  # structure may have been stopped
     least: dict[int, ActivationEnergy] = {}
     for end, place in places.items():
         between = [x for x in summits if min(start, place) < x < max(start, place)]
@@ -60,11 +71,46 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
                     lower=max(0.0, value - error),
                     upper=value + error if reached else math.inf,
                     method=METHOD,
-                    bound=Bound.ESTIMATE,
+                    bound=Bound.EXACT if reached else Bound.ESTIMATE,
                     numerical_error=error,
                     saddle=end.saddle,
                 )
     return tuple(least.values())
+
+
+def with_paths(
+    problem: ExitProblem, least: Sequence[ActivationEnergy], relaxations: Sequence[Candidate]
+) -> tuple[ActivationEnergy, ...]:
+    """Return energies with the reversed relaxation of each that is exact, which is its path of least action.
+
+    Its action is that of the trapezoidal rule between samples.
+    """
+    found = [(each, _nearest(problem, each, relaxations)) for each in least]
+    return tuple(dataclasses.replace(each, path=_path(problem, one)) if one else each for each, one in found)
+
+
+def _nearest(problem: ExitProblem, energy: ActivationEnergy, relaxations: Sequence[Candidate]) -> Candidate | None:
+    """The relaxation from the end of an exact energy whose action is nearest to it; None if none has that action."""
+    ends = [end for end in problem.path_ends if energy.target in end.targets and end.saddle == energy.saddle]
+    among = [one for one in relaxations if any(one.target == end.targets[0] for end in ends)]
+    found = min(among, key=lambda one: abs(one.action - energy.value), default=None)
+    if found is None or not math.isfinite(energy.upper) or abs(found.action - energy.value) > _ALIKE * energy.value:
+        return None
+    return found
+
+
+def _path(problem: ExitProblem, relaxation: Candidate) -> ExitPath:
+    """The reversed relaxation with as many samples as polished paths have."""
+    scene, stepper, flip = problem.scene, problem.single_stepper(Flow.STATE), np.array([1.0, -1.0])
+    duration = float(relaxation.times[-1] - relaxation.times[0])
+    samples = samples_of(scene)
+    spacing = scene.section_interval / samples
+    count = math.ceil(duration / spacing)
+    motion = record(scene, Flow.STATE, stepper, relaxation.states[-1] * flip, 0.0, spacing, count)[::-1]
+    momenta, rates = momenta_of(VectorField(scene), motion * flip, motion)
+    times = spacing * np.arange(len(motion), dtype=np.float64)
+    action = np.asarray(cumulative_trapezoid(rates, times, initial=0.0))
+    return ExitPath(times, motion * flip, momenta, action, np.arange(0, len(times), samples))
 
 
 def _place(end: PathEnd, problem: ExitProblem) -> float:
@@ -91,7 +137,8 @@ def _highest(scene: Oscillator, places: list[float]) -> tuple[float, float, bool
         work, error = quad(
             force, one, other, epsabs=0.0, epsrel=_RELATIVE, limit=_PARTS, points=kinks or None, full_output=True
         )[:2]  # it would warn where rounding limits the accuracy
-        energy, total = energy - work, total + error
+        rounding = _ROUNDING * scene.natural_frequency**2 * max(abs(one), abs(other)) * abs(other - one)
+        energy, total = energy - work, total + error + rounding
         if energy > highest[0]:
             highest = energy, total, other == places[-1]
     return highest

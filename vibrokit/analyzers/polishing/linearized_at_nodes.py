@@ -21,6 +21,7 @@ from vibrokit.analyzers.polishing.linear_spaces import (
 )
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
+from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map
 from vibrokit.structure.orbits import multipliers_of, refine_orbit, states_along
 
@@ -113,12 +114,15 @@ def orbit_at_nodes(propagator: SegmentPropagator, guess: Array, period: int) -> 
     in these directions they attract.
 
     The guess (count, n) consists of nodes as of `refine_orbit`; it is refined. Raises StructureError if there is no
-    orbit, or if it is not hyperbolic.
+    orbit, or if it is not hyperbolic, or if the stepper fails along it.
     """
     osc, stepper, pieces = propagator.osc, propagator.stepper, propagator.pieces
     nodes = refine_orbit(osc, guess, period, stepper).nodes if len(guess) == 1 else guess
     states = refine_orbit(osc, states_along(osc, nodes, period, stepper, pieces), period, stepper).nodes
     linear = gaussian_map(osc, states, stepper, interval=osc.section_interval / pieces, phases=np.arange(len(states)))
+    if not np.isfinite(linear.derivatives).all():
+        place = tuple(np.round(states[0], 6).tolist())
+        raise StructureError(f"{stepper} does not carry deviations along the orbit through {place}: it is too stiff.")
     multipliers = multipliers_of(linear.derivatives)
     check_hyperbolic(states[0], multipliers)
     unstable, stable = _spaces(linear, multipliers, propagator)

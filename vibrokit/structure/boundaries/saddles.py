@@ -145,10 +145,13 @@ class SaddleSearch:
             parts *= 2
 
     def _add_equilibria(self) -> None:
-        """Add those that one direction leaves, on both sides to different attractors."""
-        for orbit in equilibria(self.osc, *self.classifier.region.bounds[0]):
+        """Add those that one direction leaves, on both sides to different attractors.
+
+        The cells of the grid do not help: a basin may be smaller than a cell.
+        """
+        for orbit in equilibria(self.osc, *self.region.bounds[0]):
             if np.sum(np.abs(orbit.multipliers) > 1) == 1:
-                limits = branch_limits(self.classifier, orbit)
+                limits = branch_limits(self.plain, orbit)
                 if len(set(limits)) > 1:
                     self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
                     self._explained |= set(itertools.combinations(sorted(set(limits)), 2))
