@@ -105,6 +105,23 @@ def test_without_a_path_there_is_the_graph_s_estimate():
     assert finding.values == {"graph": 0.9, "error": 0.2}
 
 
+@pytest.mark.parametrize(
+    ("estimate", "expected"),
+    [((0.003, 0.6), (0.0, 1.0, 1.1)), ((0.95, 0.1), (0.85, 0.95, 1.1)), ((2.0, 0.1), (0.9, 1.0, 1.1)), (None, None)],
+    ids=str,
+)
+def test_a_path_of_the_action_plot_bounds_the_energy_where_none_was_polished(estimate, expected):
+    shot = ActivationEnergy(0, 1, 1.0, 0.0, 1.1, "action plot", Bound.UPPER, numerical_error=0.1)
+    estimates = () if estimate is None else (graph(*estimate),)
+    (energy,), (finding,) = combined(ORBIT, (), estimates, shots=[shot])
+    assert finding.code is Code.NOT_POLISHED
+    assert finding.values["shot"] == 1.0
+    assert energy.bound is Bound.UPPER
+    assert (energy.lower, energy.value, energy.upper) == pytest.approx(expected or (0.0, 1.0, 1.1))
+    (polished,), _ = combined(ORBIT, (path(0.9),), estimates, shots=[shot])
+    assert polished.value == 0.9
+
+
 @pytest.mark.parametrize("attractor", [ORBIT, CHAOS], ids=["orbit", "set"])
 def test_without_a_graph_nothing_excludes_a_cheaper_path(attractor):
     energy, finding = only(attractor, (path(1.0),), ())

@@ -298,6 +298,16 @@ def test_the_action_is_what_the_noise_pays(path):
     assert path.action[-1] == pytest.approx(4 * DAMPING * BARRIER, rel=1e-5)
 
 
+def test_a_candidate_with_momenta_follows_hamilton_s_equations_between_its_samples(problem, path):
+    """Every 16th sample of a path, brought to nodes at half that distance, is the path again."""
+    few = slice(None, None, 16)
+    candidate = Candidate(0, 1, path.t[few], path.q[few], 0.33, "samples", path.p[few])
+    propagator = SegmentPropagator(problem.scene, single_stepper(problem.scene, Flow.HAMILTONIAN_VARIATIONAL), 16)
+    found = resampled(propagator, candidate)
+    np.testing.assert_allclose(found.states[:40], path.q[::8][:40], atol=1e-8)
+    np.testing.assert_allclose(found.momenta[:40], path.p[::8][:40], atol=1e-8)
+
+
 # --- paths that start on the orbit itself and take a finite time
 
 

@@ -182,7 +182,7 @@ LIES = {
     "no branches": (drop("branch_method"), "no array 'branch_method'"),
     "methods that are numbers": (replaced("branch_method", [1, 2, 3, 4]), "'branch_method' is of type"),
     "one method more": (replaced("branch_method", ["ring"] * 5, "five"), "'branch_method' has shape"),
-    "an unknown bound": (put("energy_bound", 0, "certain"), "'energy_bound' holds 'certain'; it may hold certified"),
+    "an unknown bound": (put("energy_bound", 0, "certain"), "'energy_bound' holds 'certain'; it may hold exact"),
     "no value of branches": (drop("branch_value"), "no array 'branch_value'"),
     "no numerical error": (drop("energy_numerical_error"), "no array 'energy_numerical_error'"),
     "a value in words": (replaced("energy_value", ["a", "b", "c"]), "'energy_value' is of type"),

@@ -22,6 +22,7 @@ def combined(
     estimates: Iterable[ActivationEnergy],
     mirrored: Mapping[int, ActivationEnergy] | None = None,
     least: Iterable[ActivationEnergy] = (),
+    shots: Iterable[ActivationEnergy] = (),
 ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
     """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
@@ -30,15 +31,16 @@ def combined(
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
     Where it is known what no path can cost less than, the lower bound is at least that; where that is what the exit
-    costs, no path is needed.
+    costs, no path is needed. An action plot's path that was not polished is an upper bound within its own error.
 
     Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
-    attractor are mirror images of, and the least possible actions. Returns an energy and a finding for each target.
+    attractor are mirror images of, the least possible actions, and the action plot's energies. Returns an energy and a
+    finding for each target.
     """
     paths: dict[int, ActivationEnergy] = {}
     for branch in branches:
         paths.setdefault(branch.target, branch)
-    graph, lowest = ({each.target: each for each in some} for some in (estimates, least))
+    graph, lowest, shot = ({each.target: each for each in some} for some in (estimates, least, shots))
     known = [target for target, each in lowest.items() if each.bound is Bound.EXACT]
     pairs = [
         _of_target(
@@ -47,8 +49,9 @@ def combined(
             graph.get(target),
             (mirrored or {}).get(target),
             lowest.get(target),
+            shot.get(target),
         )
-        for target in sorted({*paths, *graph, *known}, key=lambda target: (target < 0, target))
+        for target in sorted({*paths, *graph, *known, *shot}, key=lambda target: (target < 0, target))
     ]
     return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
 
@@ -64,6 +67,7 @@ def _of_target(
     graph: ActivationEnergy | None,
     mirrored: ActivationEnergy | None,
     least: ActivationEnergy | None,
+    shot: ActivationEnergy | None,
 ) -> tuple[ActivationEnergy, Finding]:
     if path is None and least is not None and least.bound is Bound.EXACT:
         code, energy = Code.BARRIER_ENERGY, least
@@ -73,17 +77,20 @@ def _of_target(
             energy = dataclasses.replace(path, bound=Bound.CERTIFIED)
     elif path is not None and mirrored is not None and cost_the_same(path, mirrored):
         code, energy = Code.MIRROR_IMAGE, dataclasses.replace(path, lower=mirrored.lower, bound=mirrored.bound)
+    elif path is None and shot is not None:
+        code, energy = Code.NOT_POLISHED, shot if graph is None else _bracket(shot, graph, Bound.UPPER)
     elif path is None:
         assert graph is not None
         code, energy = Code.NO_POLISHED_PATH, graph
     elif graph is None:
         code, energy = Code.NOT_SEARCHED, path
     elif not attractor.repeats or path.bound is Bound.BRACKET:
-        code, energy = Code.BRACKET, _bracket(path, graph)
+        code, energy = Code.BRACKET, _bracket(path, graph, Bound.BRACKET)
     else:
         code, energy = _compared(path, graph)
     values = {} if graph is None else {"graph": graph.value, "error": graph.numerical_error}
     values |= {} if path is None else {"path": path.value}
+    values |= {} if shot is None else {"shot": shot.value}
     if least is not None:
         values["least"] = least.value
         energy = _raised(energy, least)
@@ -114,12 +121,12 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
     return code, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
 
 
-def _bracket(path: ActivationEnergy, graph: ActivationEnergy) -> ActivationEnergy:
-    """Between the graph and a path from or to an orbit inside a set: only a few of its orbits were tried.
+def _bracket(path: ActivationEnergy, graph: ActivationEnergy, bound: Bound) -> ActivationEnergy:
+    """Between the graph and a path that need not be the best: of a few orbits inside a set, or not polished.
 
     The value is the smaller one of both, and that of the path where the graph's error is as large.
     """
     vague = graph.numerical_error > VAGUE * path.value
     value = path.value if vague else min(path.value, graph.value)
-    lower = min(path.value - path.numerical_error, graph.lower)
-    return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=Bound.BRACKET)
+    lower = min(2 * path.value - path.upper, graph.lower)
+    return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=bound)

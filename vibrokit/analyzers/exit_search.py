@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 from collections.abc import Sequence, Set
 from functools import cached_property
@@ -21,6 +22,7 @@ from vibrokit.analyzers.polishing.ends import usable_ends
 from vibrokit.analyzers.polishing.leg import pieces_of
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.search import Search
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
 from vibrokit.progress import TRAJECTORIES, stage, working
 from vibrokit.results.codes import Code
@@ -53,6 +55,7 @@ class ExitSearch:
         self._least = detailed_balance.least_actions(problem)
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
+        self._shots: Search | None = None
         self._searched = self._reversed = False  # whether there are no more solutions, and no more relaxations
         self.findings: list[Finding] = []
 
@@ -117,7 +120,7 @@ class ExitSearch:
         limit = None
         if self.analyzer.graph is None or usable_ends(self.problem)[0]:
             try:
-                found = shooting.search(self.problem)
+                found = self._shots = shooting.search(self.problem)
                 candidates, limit = found.candidates, None if found.complete else _AFTERWARDS
                 self.findings += found.findings
             except (StructureError, StepperError) as error:
@@ -214,9 +217,26 @@ class ExitSearch:
         return {finding.target for finding in compared if finding.code in wanted and finding.target is not None}
 
     def _combined(
-        self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
+        self,
+        branches: Sequence[ActivationEnergy],
+        estimates: Sequence[ActivationEnergy],
+        shots: Sequence[ActivationEnergy] = (),
     ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
-        return combined(self.problem.attractor, branches, estimates, self._mirror.energies, self._least)
+        return combined(self.problem.attractor, branches, estimates, self._mirror.energies, self._least, shots)
+
+    def _unpolished(
+        self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
+    ) -> tuple[ActivationEnergy, ...]:
+        """The action plot's energies of exits without a polished path; their errors take time, which may be over."""
+        wanted = {label for end in self.problem.path_ends for label in end.targets} | {
+            each.target for each in estimates
+        }
+        wanted -= {branch.target for branch in branches}
+        if self._shots is None or wanted.isdisjoint(candidate.target for candidate in self._shots.candidates):
+            return ()
+        complete = self._shots.complete and not self.stopped
+        shots = dataclasses.replace(self._shots, complete=complete)
+        return tuple(each for each in shots.estimates if each.target in wanted)
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
@@ -278,7 +298,7 @@ class ExitSearch:
         """Combine what was found."""
         branches, polished = self._polished()
         estimates = () if self.graph is None else self._estimates(self.graph, branches)
-        energies, compared = self._combined(branches, estimates)
+        energies, compared = self._combined(branches, estimates, self._unpolished(branches, estimates))
         every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
         findings += compared

@@ -359,6 +359,10 @@ class Code(StrEnum):
         "From {state} to {goal} only the graph's estimate {graph:.4g} ± {error:.1g} is available; no path was "
         "polished.",
     )  # fmt: skip
+    NOT_POLISHED = (
+        "not-polished", WARNING,
+        "From {state} to {goal} the path of the action plot costs {shot:.4g}; it could not be polished.",
+    )  # fmt: skip
     MIRROR_IMAGE = (
         "mirror-image", INFO,
         "The path from {state} to {goal} with action {path:.6g} is the mirror image of one that leaves another "

@@ -148,29 +148,35 @@ class Ending(ABC):
 def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledCandidate:
     """Bring a candidate to the nodes, and follow the noise-free motion from its end.
 
-    Raises StructureError if the candidate has no duration, or states that are not finite.
+    Between the samples of a candidate, motion follows Hamilton's equations where momenta are known, and is free of
+    noise otherwise. Raises StructureError if the candidate has no duration, or states that are not finite.
     """
     if not np.isfinite(candidate.states).all():
         raise StructureError("it has states that are not finite.")
-    times, given = candidate.times - candidate.times[0], candidate.states
+    times, n = candidate.times - candidate.times[0], propagator.size
+    momenta = candidate.momenta
+    given = candidate.states if momenta is None else np.hstack([candidate.states, momenta])
     if len(times) < 2 or not times[-1] > 0:
         raise StructureError("it has only one state, so there is no path to polish.")
     nodes = int(np.ceil(times[-1] / propagator.piece - _ROUNDING))
     at = propagator.piece * np.arange(nodes + 1)
     before = np.searchsorted(times, at + _ROUNDING * propagator.piece, side="right") - 1
-    states = [
-        _carried(propagator, given[last], times[last], time - times[last])
-        for time, last in zip(at, before, strict=True)
-    ]
-    after = propagator.onward(states[-1], nodes, _AFTER * propagator.pieces)
-    momenta = None if candidate.momenta is None else candidate.momenta[before]
-    return ResampledCandidate(candidate, np.array(states), after, momenta)
+    points = np.array(
+        [
+            _carried(propagator, given[last], times[last], time - times[last])
+            for time, last in zip(at, before, strict=True)
+        ]
+    )
+    after = propagator.onward(points[-1, :n], nodes, _AFTER * propagator.pieces)
+    return ResampledCandidate(candidate, points[:, :n], after, None if momenta is None else points[:, n:])
 
 
-def _carried(propagator: SegmentPropagator, state: Array, start: float, duration: float) -> Array:
+def _carried(propagator: SegmentPropagator, point: Array, start: float, duration: float) -> Array:
+    """Carry q or (q, p)."""
     if duration <= _ROUNDING * propagator.piece:
-        return state
-    osc, begin = propagator.osc, start % propagator.osc.section_interval
+        return point
+    osc, begin, size = propagator.osc, start % propagator.osc.section_interval, len(point)
+    flow, full = (Flow.STATE, point) if size == propagator.size else (Flow.HAMILTONIAN, np.append(point, 0.0))
     return run_ensemble(
-        osc, Flow.STATE, propagator.stepper, state[None], start_time=begin, interval=duration
-    ).states[0]  # fmt: skip
+        osc, flow, propagator.stepper, full[None], start_time=begin, interval=duration
+    ).states[0, :size]  # fmt: skip
