@@ -106,7 +106,8 @@ class ExitSearch:
             slow = slow_relaxation.slow_relaxations(self.problem, propagator)
         self._least = detailed_balance.with_paths(self.problem, self._least, found)
         if found:
-            self._polish(found, quick=all(each.bound is Bound.EXACT for each in self._least) and bool(self._least))
+            exact = bool(self._least) and all(each.bound is Bound.EXACT for each in self._least)
+            self._polish([dataclasses.replace(each, exact=bool(self._least)) for each in found], quick=exact)
         if slow:
             self._polish(slow, quick=self._shots_follow)
         self._reversed = True

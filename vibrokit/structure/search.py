@@ -24,6 +24,7 @@ from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
+from vibrokit.structure.basins.wells import wells
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -97,8 +98,12 @@ class Search:
             report(self.starts)
 
     def _arrival(self) -> Stop:
-        """The test for having reached a known attractor."""
-        return arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.distances)
+        """The test for having reached a known attractor, or a state from which motion cannot leave the well of one."""
+        reached = arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.distances)
+        trapped = wells(self.osc, self.attractors, self.region)
+        if trapped is None:
+            return reached
+        return dataclasses.replace(reached, area=trapped.region.bounds, labels=trapped.labels)
 
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit and those that diverged."""

@@ -189,12 +189,21 @@ class Model:
         It holds without forcing if the friction γ and the noise are constant and all other forces depend on x only,
         at the parameters of the scene (Freidlin & Wentzell, 4.3).
         """
-        if self.forcing != 0 or len(self.state) > 2:
+        if not self._from_potential:
             return None
-        friction, noise = self._friction, self.diffusion[1, 1].subs(self._numbers)
-        if noise == 0 or not self._conservative_stops or (friction.free_symbols | noise.free_symbols) & {*self.state}:
-            return None
-        return 2 * friction / noise
+        noise = self.diffusion[1, 1].subs(self._numbers)
+        return None if noise == 0 or noise.free_symbols & {*self.state} else 2 * self._friction / noise
+
+    @cached_property
+    def relaxes(self) -> bool:
+        """Whether motion without noise loses energy until it rests: constant friction, all other forces of x only."""
+        return self._from_potential and bool(self._friction > 0)
+
+    @cached_property
+    def _from_potential(self) -> bool:
+        """Whether friction is constant and all other forces derive from a potential, at the parameters of the scene."""
+        plain = self.forcing == 0 and len(self.state) == 2 and self._conservative_stops
+        return plain and not self._friction.free_symbols & {*self.state}
 
     @cached_property
     def _numbers(self) -> dict[sympy.Symbol, float]:

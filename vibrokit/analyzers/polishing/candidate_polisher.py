@@ -87,7 +87,8 @@ class CandidatePolisher:
 
     def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
         """Whether a path to an end is found; by multiple shooting first where momenta are known."""
-        found, first = False, (PathSolver.solve_at_once,) if candidate.momenta is not None else ()
+        found, at_once = False, PathSolver.solve_exact if candidate.exact else PathSolver.solve_at_once
+        first = () if candidate.momenta is None else (at_once,)
         ways = (first or (PathSolver.solve_near,)) if quick else (*first, PathSolver.solve)
         for way in ways:
             try:

@@ -25,6 +25,7 @@ LONG_ENOUGH = 1e-6
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 _FROM_MOMENTA = 60  # evaluations for a candidate with momenta: paths that converge need no more
+_FROM_EXACT = 12  # for one that is a path but for its ends: those that converge need 3 to 6
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
@@ -98,12 +99,19 @@ class PathSolver:
         It stays at the candidate, while descent may end at a cheaper path; between stiff stops descent often fails.
         Raises StructureError if no way converges.
         """
+        return self._at_once(cuts, _FROM_MOMENTA)
+
+    def solve_exact(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
+        """Polish, as `solve_at_once` does, a candidate that is a path but for its ends: in few evaluations or not."""
+        return self._at_once(cuts, _FROM_EXACT, nearly=0.0)
+
+    def _at_once(self, cuts: Sequence[Cut], evaluations: int, nearly: float = _NEARLY) -> ExtremalPath:
         for cut in cuts:
             assert cut.momenta is not None
             source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
             points = np.hstack([cut.states, cut.momenta])
             try:
-                found = self._shot(source, first, points, cut, evaluations=_FROM_MOMENTA)
+                found = self._shot(source, first, points, cut, evaluations, nearly)
                 return self._once(found, _give_up)
             except StructureError as error:
                 failure = error
@@ -140,11 +148,17 @@ class PathSolver:
         return self._shot(source, first, points, cut)
 
     def _shot(
-        self, source: LinearizedOrbit, first: int, points: Array, cut: Cut, evaluations: int = MOST_EVALUATIONS
+        self,
+        source: LinearizedOrbit,
+        first: int,
+        points: Array,
+        cut: Cut,
+        evaluations: int = MOST_EVALUATIONS,
+        nearly: float = _NEARLY,
     ) -> ExtremalPath:
         return extremal_path(
             self.propagator, source, first, cut.ending, points, cut.last,
-            evaluations=evaluations, accepted=_ROUGHLY_ACCEPTED, nearly=_NEARLY,
+            evaluations=evaluations, accepted=_ROUGHLY_ACCEPTED, nearly=nearly,
         )  # fmt: skip
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:

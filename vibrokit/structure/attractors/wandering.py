@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import COMPLETED, REACHED
+from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.survival import Survival
@@ -48,7 +48,7 @@ def follow(
     """
     ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
     without = np.where(ended.status == COMPLETED, UNSETTLED, ESCAPED)
-    return ended, np.where(ended.status == REACHED, ended.label, without)
+    return ended, np.where(np.isin(ended.status, (REACHED, LEFT_BASIN)), ended.label, without)
 
 
 def watch(

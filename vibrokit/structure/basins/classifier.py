@@ -21,6 +21,7 @@ from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.stop_cells import AttractorMask, core_of, is_extended, mask_of
+from vibrokit.structure.basins.wells import wells
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -41,8 +42,9 @@ Whole = NDArray[np.int64]
 class BasinClassifier:
     """Finds the attractor that a state of the section leads to.
 
-    A periodic orbit or an equilibrium is reached within `settling` of one of its points. An attractor that meets the
-    section in a curve or a cloud (a limit cycle, quasiperiodic and chaotic motion) is marked on a fine grid; it is
+    A periodic orbit or an equilibrium is reached within `settling` of one of its points; where motion only loses
+    energy, an equilibrium also once there is too little of it to leave the well. An attractor that meets the section in
+    a curve or a cloud (a limit cycle, quasiperiodic and chaotic motion) is marked on a fine grid; it is
     reached by a trajectory that enters a marked cell and stays near the attractor for 64 more sections.
 
     Attributes
@@ -118,7 +120,11 @@ class BasinClassifier:
 
     def sharing(self, basins: Basins, margin: int) -> BasinClassifier:
         """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.stop_cells`."""
-        return dataclasses.replace(self, core=core_of(self.osc, self.stepper, basins, margin, self.executor))
+        core = core_of(self.osc, self.stepper, basins, margin, self.executor)
+        trapped = wells(self.osc, self.attractors, self.region, basins.labels.shape)
+        if trapped is not None:
+            core = Basins(core.region, np.where(trapped.labels == UNSETTLED, core.labels, trapped.labels))
+        return dataclasses.replace(self, core=core)
 
     @cached_property
     def points(self) -> Stop:
@@ -129,9 +135,10 @@ class BasinClassifier:
     @cached_property
     def arriving(self) -> Stop:
         """The test for points and for cells of the core."""
-        if self.core is None:
+        cells = self.core or wells(self.osc, self.attractors, self.region)
+        if cells is None:
             return self.points
-        return dataclasses.replace(self.points, area=self.core.region.bounds, labels=self.core.labels)
+        return dataclasses.replace(self.points, area=cells.region.bounds, labels=cells.labels)
 
     @cached_property
     def mask(self) -> AttractorMask | None:

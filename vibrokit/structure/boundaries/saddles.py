@@ -119,7 +119,8 @@ class SaddleSearch:
         with stage("saddles", unit="motions"):
             if self.osc.autonomous:
                 self._add_equilibria()
-            unexplained = pairs  # edge tracking may find other saddles where there is one at rest
+            # Where motion may gain energy, edge tracking may find other saddles where there is one at rest.
+            unexplained = pairs - self._explained if self.osc.model.relaxes else pairs
             for shared in (True, False):
                 if unexplained:
                     classifier = self.classifier if shared else self.plain
