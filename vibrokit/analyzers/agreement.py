@@ -37,21 +37,15 @@ def combined(
     attractor are mirror images of, the least possible actions, and the action plot's energies. Returns an energy and a
     finding for each target.
     """
-    paths: dict[int, ActivationEnergy] = {}
+    path: dict[int, ActivationEnergy] = {}
     for branch in branches:
-        paths.setdefault(branch.target, branch)
+        path.setdefault(branch.target, branch)
     graph, lowest, shot = ({each.target: each for each in some} for some in (estimates, least, shots))
+    images = mirrored or {}
     known = [target for target, each in lowest.items() if each.bound is Bound.EXACT]
     pairs = [
-        _of_target(
-            attractor,
-            paths.get(target),
-            graph.get(target),
-            (mirrored or {}).get(target),
-            lowest.get(target),
-            shot.get(target),
-        )
-        for target in sorted({*paths, *graph, *known, *shot}, key=lambda target: (target < 0, target))
+        _of_target(attractor, _Known(*(some.get(target) for some in (path, graph, images, lowest, shot))))
+        for target in sorted({*path, *graph, *known, *shot}, key=lambda target: (target < 0, target))
     ]
     return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
 
@@ -61,40 +55,56 @@ def cost_the_same(one: ActivationEnergy, other: ActivationEnergy) -> bool:
     return abs(one.value - other.value) <= _SAME * one.value
 
 
-def _of_target(
-    attractor: Attractor,
-    path: ActivationEnergy | None,
-    graph: ActivationEnergy | None,
-    mirrored: ActivationEnergy | None,
-    least: ActivationEnergy | None,
-    shot: ActivationEnergy | None,
-) -> tuple[ActivationEnergy, Finding]:
-    if path is None and least is not None and least.bound is Bound.EXACT:
-        code, energy = Code.BARRIER_ENERGY, least
-    elif path is not None and least is not None and path.value - least.lower <= _TIGHT * path.value:
-        code, energy = Code.DETAILED_BALANCE, path
-        if path.certificate is not None:
-            energy = dataclasses.replace(path, bound=Bound.CERTIFIED)
-    elif path is not None and mirrored is not None and cost_the_same(path, mirrored):
-        code, energy = Code.MIRROR_IMAGE, dataclasses.replace(path, lower=mirrored.lower, bound=mirrored.bound)
-    elif path is None and shot is not None:
-        code, energy = Code.NOT_POLISHED, shot if graph is None else _bracket(shot, graph, Bound.UPPER)
-    elif path is None:
-        assert graph is not None
-        code, energy = Code.NO_POLISHED_PATH, graph
-    elif graph is None:
-        code, energy = Code.NOT_SEARCHED, path
-    elif not attractor.repeats or path.bound is Bound.BRACKET:
-        code, energy = Code.BRACKET, _bracket(path, graph, Bound.BRACKET)
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Known:
+    """What was found of the exit to one target."""
+
+    path: ActivationEnergy | None  # polished
+    graph: ActivationEnergy | None
+    image: ActivationEnergy | None  # the energy of which it is the mirror image
+    least: ActivationEnergy | None
+    shot: ActivationEnergy | None  # by the action plot
+
+    @property
+    def values(self) -> dict[str, float]:
+        """For the finding."""
+        values = {} if self.graph is None else {"graph": self.graph.value, "error": self.graph.numerical_error}
+        named = {"path": self.path, "shot": self.shot, "least": self.least}
+        return values | {name: energy.value for name, energy in named.items() if energy is not None}
+
+
+def _of_target(attractor: Attractor, known: _Known) -> tuple[ActivationEnergy, Finding]:
+    if known.path is None:
+        code, energy = _without_path(known)
     else:
-        code, energy = _compared(path, graph)
-    values = {} if graph is None else {"graph": graph.value, "error": graph.numerical_error}
-    values |= {} if path is None else {"path": path.value}
-    values |= {} if shot is None else {"shot": shot.value}
-    if least is not None:
-        values["least"] = least.value
-        energy = _raised(energy, least)
-    return energy, Finding(code, attractor.label, energy.target, values)
+        code, energy = _with_path(attractor, known.path, known)
+    if known.least is not None:
+        energy = _raised(energy, known.least)
+    return energy, Finding(code, attractor.label, energy.target, known.values)
+
+
+def _without_path(known: _Known) -> tuple[Code, ActivationEnergy]:
+    graph, least, shot = known.graph, known.least, known.shot
+    if least is not None and least.bound is Bound.EXACT:
+        return Code.BARRIER_ENERGY, least
+    if shot is not None:
+        return Code.NOT_POLISHED, shot if graph is None else _bracket(shot, graph, Bound.UPPER)
+    assert graph is not None
+    return Code.NO_POLISHED_PATH, graph
+
+
+def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[Code, ActivationEnergy]:
+    graph, image, least = known.graph, known.image, known.least
+    if least is not None and path.value - least.lower <= _TIGHT * path.value:
+        bound = path.bound if path.certificate is None else Bound.CERTIFIED
+        return Code.DETAILED_BALANCE, dataclasses.replace(path, bound=bound)
+    if image is not None and cost_the_same(path, image):
+        return Code.MIRROR_IMAGE, dataclasses.replace(path, lower=image.lower, bound=image.bound)
+    if graph is None:
+        return Code.NOT_SEARCHED, path
+    if not attractor.repeats or path.bound is Bound.BRACKET:
+        return Code.BRACKET, _bracket(path, graph, Bound.BRACKET)
+    return _compared(path, graph)
 
 
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:

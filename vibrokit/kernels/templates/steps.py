@@ -61,6 +61,7 @@ SIZE = NUMBERS  # where the number of variables is
 WORK = NUMBERS + 2  # where the room is, after the time of its first state
 ROOM = WORK + SERIES + TERMS * ROW
 EPSILON = 2.220446049250313e-16
+MORE = 99.0  # attempts that a tiny one counts as, besides itself
 
 
 @njit(**INNER)
@@ -151,7 +152,7 @@ def shortened(error, factor, tiny, lane, memory, settings, lanes):
     as many: next to a singular force time does not go on, and motion ends after 2000 of them.
     """
     if tiny:
-        memory[COUNT] += 99.0
+        memory[COUNT] += MORE
     if not (error > 1.0) or tiny or memory[MISSES] >= 2.0:
         return 0.0
     stuck = error > 0.8 * memory[BEFORE] and error * settings[0] < 1e-6
