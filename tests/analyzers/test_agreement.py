@@ -4,11 +4,12 @@ import dataclasses
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from vibrokit.analyzers.agreement import combined
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
+from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
 
 ORBIT = SimpleNamespace(label=0, repeats=True)
 CHAOS = SimpleNamespace(label=0, repeats=False)
@@ -120,6 +121,39 @@ def test_a_path_of_the_action_plot_bounds_the_energy_where_none_was_polished(est
     assert (energy.lower, energy.value, energy.upper) == pytest.approx(expected or (0.0, 1.0, 1.1))
     (polished,), _ = combined(ORBIT, (path(0.9),), estimates, shots=[shot])
     assert polished.value == 0.9
+
+
+def least(value, bound=Bound.ESTIMATE):
+    upper = value + ERROR if bound is Bound.EXACT else math.inf
+    return ActivationEnergy(0, 1, value, value - ERROR, upper, "detailed balance", bound, ERROR)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "estimate", "expected"),
+    [
+        (0.9999, math.nan, None, (0.9999, 0.9999)),  # no path costs less than 1: the error was not known
+        (1.05, 0.05, (0.5, 0.05), (1.0 - ERROR, 1.0)),
+        (1.05, math.nan, (0.5, 0.05), (1.0 - ERROR, 1.0)),
+        (1.3, 0.1, (1.2, 0.05), (1.15, 1.2)),
+    ],
+)
+def test_a_path_of_the_action_plot_costs_no_less_than_possible(value, error, estimate, expected):
+    path_ = ExitPath(*np.zeros((4, 2)), np.zeros(0, dtype=np.int64))
+    upper = value if math.isnan(error) else value + error
+    shot = ActivationEnergy(
+        0, 1, value, 0.0, upper, "action plot", Bound.UPPER, numerical_error=error, path=path_
+    )  # fmt: skip
+    estimates = () if estimate is None else (graph(*estimate),)
+    (energy,), _ = combined(ORBIT, (), estimates, least=[least(1.0)], shots=[shot])
+    assert energy.lower <= energy.value <= energy.upper
+    assert (energy.lower, energy.value) == pytest.approx(expected)
+
+
+def test_an_exact_energy_is_not_replaced_by_a_costlier_path():
+    (energy,), (finding,) = combined(ORBIT, (path(1.7),), (), least=[least(1.0, Bound.EXACT)])
+    assert (finding.code, energy.value, energy.bound) == (Code.BARRIER_ENERGY, 1.0, Bound.EXACT)
+    (energy,), (finding,) = combined(ORBIT, (path(1.0),), (), least=[least(1.0, Bound.EXACT)])
+    assert (finding.code, energy.value, energy.bound) == (Code.DETAILED_BALANCE, 1.0, Bound.CERTIFIED)
 
 
 @pytest.mark.parametrize("attractor", [ORBIT, CHAOS], ids=["orbit", "set"])

@@ -9,11 +9,14 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.agreement import combined
-from vibrokit.analyzers.paths.detailed_balance import least_actions
+from vibrokit.analyzers.paths.detailed_balance import least_actions, with_paths
+from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
+from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
 
 ZETA = 0.05
@@ -129,9 +132,8 @@ def test_a_path_that_cannot_be_polished():
     assert energy.saddle == 0
     assert energy.value == pytest.approx(-4 * ZETA * (0.9**4 / 4 - 0.9**2 / 2), rel=1e-3)  # depth neglected
     assert energy.upper - energy.lower < 1e-6 * energy.value
-    if energy.certificate is None:
-        assert result.found(Code.BARRIER_ENERGY)
-        assert energy.bound is Bound.EXACT
+    assert result.found(Code.BARRIER_ENERGY)
+    assert energy.bound is Bound.EXACT
     assert energy.path.action[-1] == pytest.approx(energy.value, rel=1e-2)
     climbed = energy.path.q[:, 1] ** 2 / 2 + energy.path.q[:, 0] ** 4 / 4 - energy.path.q[:, 0] ** 2 / 2
     free = np.abs(energy.path.q[:, 0]) < 0.9
@@ -156,6 +158,33 @@ def test_close_to_a_fold(distance):
     assert found == {0: pytest.approx(expected, rel=1e-5)}
     (energy,) = least_actions(ExitProblem(osc, structure, structure.attractors[1], vk.LeaveBasin()))
     assert abs(energy.value - expected) <= max(energy.numerical_error, 1e-12 * expected)
+
+
+@pytest.mark.parametrize("region", [None, ((-1.0, 1.75), (-1.0, 1.0))], ids=["default", "given"])
+def test_the_cheaper_of_two_saddles_of_one_target(region):
+    """Escape over −1.3 costs less than over 1.5, whether the region contains it or not."""
+    spring = vk.CustomSpring("x*(1.3 + x)*(1.5 - x)/1.95")
+    osc = scene(spring, barriers=(vk.Barrier(vk.Linear(0.01), 0.5, "right"),))
+    structure = vk.find_structure(osc, rng=0, manifolds=False, region=region)
+    result = vk.LeastAction(source=0).run(osc, structure)
+    (energy,) = result.energies
+    x = -1.3
+    depth = (1.95 * x**2 / 2 + 0.2 * x**3 / 3 - x**4 / 4) / 1.95
+    assert energy.target == ESCAPED
+    assert energy.value == pytest.approx(4 * ZETA * depth, rel=1e-6)
+
+
+def test_each_path_ends_at_its_own_saddle():
+    osc = scene(vk.CustomSpring("x - x**3"))
+    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    problem = ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
+    propagator = SegmentPropagator(osc, problem.single_stepper(Flow.STATE), 16)
+    (energy,) = with_paths(problem, least_actions(problem), reversed_relaxations(problem, propagator))
+    assert energy.bound is Bound.EXACT
+    saddle = structure.saddles[energy.saddle].points[0, 0]
+    assert abs(saddle) == pytest.approx(1.0)
+    assert energy.path.q[-1, 0] == pytest.approx(saddle, abs=1e-3)
+    assert energy.path.action[-1] == pytest.approx(ZETA, rel=1e-3)
 
 
 def test_a_structure_without_its_saddles():

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import sympy
 
 import vibrokit as vk
-from vibrokit.results.basins import ESCAPED, UNSETTLED
+from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.wells import wells
 
@@ -27,6 +28,24 @@ SCENES = {
 }
 
 
+class Pushing(vk.Spring):
+    """It pushes a mass the way that it goes; the derivative of that in v is 0."""
+
+    push: float = vk.parameter("m", "m s^-2")
+
+    def force(self, x, v):
+        return x - self.push * sympy.Piecewise((1, v > 0), (-1, True))
+
+
+class Uneven(vk.ContactLaw):
+    """Stiffer while the depth grows."""
+
+    stiffness: float = vk.parameter("k", "s^-2", minimum=0)
+
+    def force(self, depth, rate):
+        return self.stiffness * depth * sympy.Piecewise((1, rate > 0), (0.5, True))
+
+
 def scene(name, friction=0.0):
     spring, damping, stops = SCENES[name]
     return vk.Oscillator(
@@ -35,13 +54,14 @@ def scene(name, friction=0.0):
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("margin", [None, 2])
 @pytest.mark.parametrize("name", SCENES)
-def test_basins_are_those_of_motion_that_is_followed(name):
+def test_basins_are_those_of_motion_that_is_followed(name, margin):
     quick, plain = scene(name), scene(name, TINY)
     assert quick.model.relaxes
     assert not plain.model.relaxes
-    given = {"cells": (60, 60), "margin": None, "rng": 0, "manifolds": False}
-    found, expected = (vk.find_structure(osc, **given) for osc in (quick, plain))
+    given = {"cells": (60, 60), "rng": 0, "manifolds": False}
+    found, expected = vk.find_structure(quick, margin=margin, **given), vk.find_structure(plain, margin=None, **given)
     np.testing.assert_allclose(found.basins.region.bounds, expected.basins.region.bounds, rtol=1e-9)
     assert [a.points[0, 0] for a in found.attractors] == pytest.approx([a.points[0, 0] for a in expected.attractors])
     assert np.mean(found.basins.labels != expected.basins.labels) <= 1e-3  # cells on a boundary
@@ -66,6 +86,10 @@ def test_motion_that_gains_energy_has_no_wells():
     """Negative friction, forcing, friction that depends on x, and stops that dissipate."""
     region = Region((-2.0, 2.0), (-2.0, 2.0))
     for osc in (
+        vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=Pushing(0.3)),
+        vk.Oscillator(
+            natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(Uneven(5.0), 0.5, "right"),)
+        ),
         vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring("x - m*(1 - x**2)*v", m=0.3)),
         vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring("x - m*v", m=0.3)),
         vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.1, 0.7),)),
@@ -87,5 +111,7 @@ def test_a_singular_force_ends_the_well():
     (rest,) = (place for place, a in enumerate(structure.attractors) if a.points[0, 0] < 0.5)
     x = np.linspace(-1.0, 1.5, 101)
     assert np.any(cells.labels == rest)
-    assert np.all(cells.labels[x[1:] > 0.59] != rest)  # the barrier is at 0.587
-    assert ESCAPED not in cells.labels
+    assert np.all(cells.labels[x[1:] > 0.59] == UNSETTLED)  # the barrier is at 0.587
+    wide = wells(osc, structure.attractors, Region((-1.0, 30.0), (-1.0, 1.0)), (400, 100))
+    places = np.linspace(-1.0, 30.0, 401)
+    assert np.all(wide.labels[(places[1:] > 0.59) & (places[:-1] < 1.0)] == UNSETTLED)

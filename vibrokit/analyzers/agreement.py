@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from vibrokit.results.attractor import Attractor
@@ -74,12 +75,15 @@ class _Known:
 
 
 def _of_target(attractor: Attractor, known: _Known) -> tuple[ActivationEnergy, Finding]:
-    if known.path is None:
+    path, least = known.path, known.least
+    if path is None or (least is not None and least.bound is Bound.EXACT and not _reaches(path, least)):
         code, energy = _without_path(known)
+        energy = energy if least is None else _raised(energy, least)
     else:
-        code, energy = _with_path(attractor, known.path, known)
-    if known.least is not None:
-        energy = _raised(energy, known.least)
+        code, energy = _with_path(attractor, path, known)
+        if least is not None:
+            lower = min(least.lower, energy.value - energy.numerical_error)
+            energy = dataclasses.replace(energy, lower=max(energy.lower, lower))
     return energy, Finding(code, attractor.label, energy.target, known.values)
 
 
@@ -95,7 +99,7 @@ def _without_path(known: _Known) -> tuple[Code, ActivationEnergy]:
 
 def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[Code, ActivationEnergy]:
     graph, image, least = known.graph, known.image, known.least
-    if least is not None and path.value - least.lower <= _TIGHT * path.value:
+    if least is not None and _reaches(path, least):
         bound = path.bound if path.certificate is None else Bound.CERTIFIED
         return Code.DETAILED_BALANCE, dataclasses.replace(path, bound=bound)
     if image is not None and cost_the_same(path, image):
@@ -107,15 +111,23 @@ def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> t
     return _compared(path, graph)
 
 
+def _reaches(path: ActivationEnergy, least: ActivationEnergy) -> bool:
+    """Whether a path costs hardly more than what no path can cost less than."""
+    return path.value - least.lower <= _TIGHT * path.value
+
+
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
-    """An energy that is at least what no path can cost less than."""
-    if energy.path is not None:
-        lower = max(energy.lower, min(least.lower, energy.value - energy.numerical_error))
-        return dataclasses.replace(energy, lower=lower)
-    value = max(energy.value, least.value)
-    error = max(energy.numerical_error, value - energy.value)
-    upper, lower = max(energy.upper, value), max(energy.lower, least.lower)
-    return dataclasses.replace(energy, value=value, lower=lower, upper=upper, numerical_error=error)
+    """An energy without a polished path that is at least what no path can cost less than; a known path limits it."""
+    limit = math.inf if energy.path is None else energy.upper
+    value = max(energy.value, min(least.value, limit))
+    raised = value - energy.value
+    return dataclasses.replace(
+        energy,
+        value=value,
+        lower=min(max(energy.lower, least.lower), value),
+        upper=max(energy.upper, value),
+        numerical_error=max(raised, energy.numerical_error) if raised else energy.numerical_error,
+    )
 
 
 def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, ActivationEnergy]:

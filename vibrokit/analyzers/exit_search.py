@@ -229,15 +229,22 @@ class ExitSearch:
         self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
     ) -> tuple[ActivationEnergy, ...]:
         """The action plot's energies of exits without a polished path; their errors take time, which may be over."""
-        wanted = {label for end in self.problem.path_ends for label in end.targets} | {
-            each.target for each in estimates
-        }
+        wanted = {label for end in self.problem.path_ends for label in end.targets}
+        wanted |= {estimate.target for estimate in estimates}
         wanted -= {branch.target for branch in branches}
-        if self._shots is None or wanted.isdisjoint(candidate.target for candidate in self._shots.candidates):
+        wanted -= {each.target for each in self._least if each.bound is Bound.EXACT}
+        if self._shots is None:
             return ()
+        kept = tuple(branch for branch in self._shots.branches if branch.candidate.target in wanted)
         complete = self._shots.complete and not self.stopped
-        shots = dataclasses.replace(self._shots, complete=complete)
-        return tuple(each for each in shots.estimates if each.target in wanted)
+        shots, doing = dataclasses.replace(self._shots, branches=kept, complete=complete), "errors of the action plot"
+        try:
+            return shots.estimates
+        except KeyboardInterrupt as interrupt:  # the paths are known; only their errors are not
+            self.findings.append(Finding.stopped(doing, interrupt, self.problem.source))
+        except (StructureError, StepperError) as error:
+            self._failed(doing, error)
+        return dataclasses.replace(shots, complete=False).estimates
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
         """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""

@@ -361,7 +361,7 @@ class Code(StrEnum):
     )  # fmt: skip
     NOT_POLISHED = (
         "not-polished", WARNING,
-        "From {state} to {goal} the path of the action plot costs {shot:.4g}; it could not be polished.",
+        "From {state} to {goal} the path of the action plot costs {shot:.4g}; it was not polished.",
     )  # fmt: skip
     MIRROR_IMAGE = (
         "mirror-image", INFO,

@@ -27,6 +27,7 @@ from vibrokit.symbolic.flow_kind import Flow
 _PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
 _PLACES = 1024  # at which the force at rest is compared with 0
 _LEAST_FORCE = 1e-8  # of the distance between them: where a force is smallest, to rounding
+_ONE_PLACE = 1e-14  # of the range: distance of two results that are one
 _AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
 _SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
 _RECURRENCE = 1e-2  # of the extent of the motion: distance between turning points from which Newton's method starts
@@ -106,7 +107,8 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     for guess in sorted(guesses):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
             found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
-    return found
+    apart = _ONE_PLACE * (high - low)
+    return [one for at, one in enumerate(found) if not at or abs(one.point[0] - found[at - 1].point[0]) > apart]
 
 
 def _turns_back(force: Callable[[float], float], places: Array, forces: Array) -> list[float]:

@@ -62,7 +62,8 @@ def find_structure(
     starts : (int, int)
         Starts of the search in x and v.
     settling : float
-        Distance, as a fraction of the region's widths in x and v, at which an attractor counts as reached.
+        Distance, as a fraction of the region's widths in x and v, at which an attractor counts as reached. It is
+        reduced to a quarter of the distance between two equilibria that are closer.
     budget : int, optional
         Largest number of periods that a trajectory is followed; by default it depends on the damping, and on the
         lifetime of chaotic transients if there are some.

@@ -13,6 +13,8 @@ from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
 
+_ROUNDING = 1e-15  # of the friction
+
 
 class Model:
     """Drift, diffusion, Hamiltonian and derived quantities, as SymPy expressions.
@@ -202,8 +204,11 @@ class Model:
     @cached_property
     def _from_potential(self) -> bool:
         """Whether friction is constant and all other forces derive from a potential, at the parameters of the scene."""
-        plain = self.forcing == 0 and len(self.state) == 2 and self._conservative_stops
-        return plain and not self._friction.free_symbols & {*self.state}
+        if self.forcing != 0 or len(self.state) > 2 or not self._conservative_stops:
+            return False
+        force, v, friction = self.smooth_force.subs(self._numbers), self.state[1], self._friction
+        # A force that jumps where v changes its sign has the derivative 0, so that the force itself is asked.
+        return not friction.free_symbols & {*self.state} and not _rest(force, friction, v).has(v)
 
     @cached_property
     def _numbers(self) -> dict[sympy.Symbol, float]:
@@ -219,7 +224,7 @@ class Model:
     @cached_property
     def _conservative_stops(self) -> bool:
         """Whether no force of a stop depends on the rate, at the parameters of the scene."""
-        return all(sympy.diff(contact.law.subs(self._numbers), RATE) == 0 for contact in self.contacts)
+        return not any(sympy.expand(contact.law.subs(self._numbers)).has(RATE) for contact in self.contacts)
 
     @property
     def latex(self) -> str:
@@ -240,3 +245,10 @@ class Model:
         if self.momenta:
             lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
         return "\n".join(lines)
+
+
+def _rest(force: sympy.Expr, friction: sympy.Expr, v: sympy.Symbol) -> sympy.Expr:
+    """A force without its friction, and without what rounding leaves of that."""
+    rest = sympy.expand(force + friction * v)
+    small = _ROUNDING * abs(friction)
+    return rest.xreplace({each: sympy.Integer(0) for each in rest.atoms(sympy.Float) if abs(each) < small})

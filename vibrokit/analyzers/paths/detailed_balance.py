@@ -35,6 +35,7 @@ METHOD = "detailed balance"
 _RELATIVE = 1e-11  # error of the potential energy
 _PARTS = 200  # of an interval, at most
 _ROUNDING = 1e-15  # of a force of the size ω_n² x
+_BESIDE = 1e-3  # of the way to the attractor: so near to its end a relaxation begins
 _ALIKE = 0.01  # of an energy: its path, sampled and integrated by the trapezoidal rule, costs the same
 
 
@@ -61,7 +62,7 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
         along = [start, *sorted(between, key=lambda x: abs(x - start)), place]
         energy, error, last = _highest(problem.scene, along)
         value, error = float(balance) * energy, float(balance) * error
-        reached = last and isinstance(end, AtSaddle) and end.on_own_boundary
+        reached = last and isinstance(end, AtSaddle) and end.on_own_boundary and problem.structure.complete
         for target in end.targets:
             if target not in least or value < least[target].value:
                 least[target] = ActivationEnergy(
@@ -92,7 +93,13 @@ def with_paths(
 def _nearest(problem: ExitProblem, energy: ActivationEnergy, relaxations: Sequence[Candidate]) -> Candidate | None:
     """The relaxation from the end of an exact energy whose action is nearest to it; None if none has that action."""
     ends = [end for end in problem.path_ends if energy.target in end.targets and end.saddle == energy.saddle]
-    among = [one for one in relaxations if any(one.target == end.targets[0] for end in ends)]
+    start = float(problem.attractor.points[0, 0])
+    among = [
+        one
+        for one in relaxations
+        for end in ends
+        if abs(one.states[-1, 0] - _place(end, problem)) <= _BESIDE * abs(start - _place(end, problem))
+    ]
     found = min(among, key=lambda one: abs(one.action - energy.value), default=None)
     if found is None or not math.isfinite(energy.upper) or abs(found.action - energy.value) > _ALIKE * energy.value:
         return None

@@ -17,7 +17,7 @@ from vibrokit.analyzers.polishing.leg import samples_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.energy import ActivationEnergy, ExitPath
+from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
 
 FINDER = "mirror images"
 _ALIKE = 1e-2  # of the region's widths: largest distance between samples of an orbit and those of its mirror image
@@ -39,7 +39,8 @@ class Mirror:
     def candidates(self, own: Sequence[ActivationEnergy]) -> list[Candidate]:
         """Return the mirror images of known paths, and of the attractor's own, that leave the attractor and are new."""
         found = list[Candidate]()
-        for one in (*self._problem.known, *own):
+        polished = (one for one in self._problem.known if one.bound is not Bound.EXACT)
+        for one in (*polished, *own):
             target = self._image(one)
             alike = (each for each in own if each.target == target)
             if target is not None and not any(cost_the_same(one, each) for each in alike):

@@ -17,6 +17,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.results.energy import ExitPath
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -172,11 +173,10 @@ def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledC
 
 
 def _carried(propagator: SegmentPropagator, point: Array, start: float, duration: float) -> Array:
-    """Carry q or (q, p)."""
+    """Carry q or (q, p), which stays where the stepper cannot carry it."""
     if duration <= _ROUNDING * propagator.piece:
         return point
     osc, begin, size = propagator.osc, start % propagator.osc.section_interval, len(point)
     flow, full = (Flow.STATE, point) if size == propagator.size else (Flow.HAMILTONIAN, np.append(point, 0.0))
-    return run_ensemble(
-        osc, flow, propagator.stepper, full[None], start_time=begin, interval=duration
-    ).states[0, :size]  # fmt: skip
+    ended = run_ensemble(osc, flow, propagator.stepper, full[None], start_time=begin, interval=duration)
+    return ended.states[0, :size] if ended.status[0] == COMPLETED else point

@@ -39,17 +39,21 @@ def wells(
     stops = [barrier.position for barrier in osc.barriers if low < barrier.position < high]
     places = np.unique([*edges, *stops, *bounds])
     inside, work = _work(osc, places)
+    halved = _work(osc, np.sort([*places, *(0.5 * (places[:-1] + places[1:]))]))[1].reshape(-1, 2).sum(axis=1)
     potential = np.concatenate([[0.0], -np.cumsum(work)])
     highest = np.maximum.reduceat(potential, np.searchsorted(places, edges[:-1]))  # V in each column of cells
     highest = np.maximum(highest, potential[np.searchsorted(places, edges[1:])])
     kinetic, labels = 0.5 * np.maximum(speeds[:-1] ** 2, speeds[1:] ** 2), np.full(cells, UNSETTLED, dtype=np.int16)
     for left, x, right in zip(bounds, bounds[1:], bounds[2:], strict=False):
         label = _label(attractors, x, _SAME * (high - low))
-        falls = inside[(places[:-1] >= left) & (places[1:] <= x)], inside[(places[:-1] >= x) & (places[1:] <= right)]
-        if label is None or not (np.all(falls[0] > 0) and np.all(falls[1] < 0)):
+        first, middle, last = np.searchsorted(places, [left, x, right])
+        before, bottom, after = potential[[first, middle, last]]
+        depth = min(before, after) - bottom
+        falls = bool(np.all(inside[first:middle] > 0) and np.all(inside[middle:last] < 0))
+        error = float(np.abs(halved - work)[first:last].sum())  # large where a force is singular
+        if label is None or not falls or not error <= 0.1 * _BELOW * depth:
             continue
-        before, bottom, after = potential[np.searchsorted(places, [left, x, right])]
-        limit = bottom + (1 - _BELOW) * (min(before, after) - bottom)
+        limit = bottom + (1 - _BELOW) * depth
         between = (edges[:-1] >= left) & (edges[1:] <= right)
         labels[between[:, None] & (highest[:, None] + kinetic < limit)] = label
     return Basins(region, labels)

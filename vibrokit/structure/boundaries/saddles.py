@@ -119,8 +119,9 @@ class SaddleSearch:
         with stage("saddles", unit="motions"):
             if self.osc.autonomous:
                 self._add_equilibria()
-            # Where motion may gain energy, edge tracking may find other saddles where there is one at rest.
-            unexplained = pairs - self._explained if self.osc.model.relaxes else pairs
+            # Where motion only loses energy, all saddles are at rest; those over which it escapes may lie outside.
+            known = {pair for pair in self._explained if min(pair) >= 0} if self.osc.model.relaxes else set()
+            unexplained = pairs - known
             for shared in (True, False):
                 if unexplained:
                     classifier = self.classifier if shared else self.plain
