@@ -233,9 +233,10 @@ class ExitSearch:
         wanted |= {estimate.target for estimate in estimates}
         wanted -= {branch.target for branch in branches}
         wanted -= {each.target for each in self._least if each.bound is Bound.EXACT}
-        if self._shots is None:
+        shot = () if self._shots is None else self._shots.branches
+        kept = tuple(branch for branch in shot if branch.candidate.target in wanted)
+        if self._shots is None or not kept:
             return ()
-        kept = tuple(branch for branch in self._shots.branches if branch.candidate.target in wanted)
         complete = self._shots.complete and not self.stopped
         shots, doing = dataclasses.replace(self._shots, branches=kept, complete=complete), "errors of the action plot"
         try:

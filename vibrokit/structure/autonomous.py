@@ -24,7 +24,8 @@ from vibrokit.structure.orbits import CONVERGED, Orbit
 from vibrokit.structure.scales import size_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_PARTS_OF_A_TURN = 16  # of 2π/ω_n, over which the motion at an equilibrium is linearized
+PARTS_OF_A_TURN = 16
+"""Parts of 2π/ω_n: over one of them the motion at an equilibrium is linearized."""
 _PLACES = 1024  # at which the force at rest is compared with 0
 _LEAST_FORCE = 1e-8  # of the distance between them: where a force is smallest, to rounding
 _ONE_PLACE = 1e-14  # of the range: distance of two results that are one
@@ -54,7 +55,7 @@ class Equilibrium(Orbit):
 
 def equilibrium_equations(osc: Oscillator) -> Callable[[Array], Evaluation]:
     """Return the equations of an equilibrium, b τ = 0 with τ a sixteenth of 2π/ω_n; attached is the Jacobian of b τ."""
-    field, time = VectorField(osc), osc.section_interval / _PARTS_OF_A_TURN
+    field, time = VectorField(osc), osc.section_interval / PARTS_OF_A_TURN
 
     def evaluate(states: Array) -> Evaluation:
         jacobians = time * field.jacobian(states)

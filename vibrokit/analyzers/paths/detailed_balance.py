@@ -35,6 +35,7 @@ METHOD = "detailed balance"
 _RELATIVE = 1e-11  # error of the potential energy
 _PARTS = 200  # of an interval, at most
 _ROUNDING = 1e-15  # of a force of the size ω_n² x
+_AROUND = 0.01  # of the distance from the first place to the last
 _BESIDE = 1e-3  # of the way to the attractor: so near to its end a relaxation begins
 _ALIKE = 0.01  # of an energy: its path, sampled and integrated by the trapezoidal rule, costs the same
 
@@ -54,8 +55,10 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
     if balance is None or not balance > 0 or not all(math.isfinite(place) for place in places.values()):
         return ()
     start = float(attractor.points[0, 0])
-    reach = (min(start, *places.values()), max(start, *places.values())) if places else (start, start)
-    summits = [float(rest.point[0]) for rest in equilibria(problem.scene, *reach)]  # structure may have been stopped
+    low, high = min([start, *places.values()]), max([start, *places.values()])
+    around = _AROUND * (high - low)  # a saddle may be close to the start
+    rests = equilibria(problem.scene, low - around, high + around)  # the structure may have been stopped
+    summits = [float(rest.point[0]) for rest in rests]
     least: dict[int, ActivationEnergy] = {}
     for end, place in places.items():
         between = [x for x in summits if min(start, place) < x < max(start, place)]

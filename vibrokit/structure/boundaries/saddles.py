@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import itertools
+import math
 from collections import defaultdict
 
 import numpy as np
@@ -20,7 +21,7 @@ from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.autonomous import equilibria, refine_cycle
+from vibrokit.structure.autonomous import PARTS_OF_A_TURN, Equilibrium, equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
 from vibrokit.structure.boundaries.edges import (
@@ -41,6 +42,7 @@ _LONGEST_PERIOD = 16
 _CHECKED_EVERY = 4  # sections
 _FARTHEST = 1e-2  # of the region's widths: largest distance from a motion to the orbit that it converges to
 _NEAR = 1e-3  # of the region's widths: distance from a saddle within which a motion on the boundary converges to it
+_FOLDS, _LONGEST_LEAVING = 15, 20_000  # e-foldings, and sections, of motion that leaves an equilibrium
 _MOST_TRIES = 4
 _FEW_POINTS = 12  # last points of a motion that must all be within that distance
 _SAMPLES = 8192  # of a cycle
@@ -153,10 +155,16 @@ class SaddleSearch:
         """
         for orbit in equilibria(self.osc, *self.region.bounds[0]):
             if np.sum(np.abs(orbit.multipliers) > 1) == 1:
-                limits = branch_limits(self.plain, orbit)
+                limits = branch_limits(self._patient(orbit), orbit)
                 if len(set(limits)) > 1:
                     self._add(describe_unstable(self.osc, orbit, self.orbit_stepper, limits))
                     self._explained |= set(itertools.combinations(sorted(set(limits)), 2))
+
+    def _patient(self, rest: Equilibrium) -> BasinClassifier:
+        """The classifier with the sections that motion needs to leave an equilibrium in addition."""
+        leaving = math.log(float(np.abs(rest.multipliers).max())) * PARTS_OF_A_TURN
+        more = min(_LONGEST_LEAVING, math.ceil(_FOLDS / leaving))
+        return dataclasses.replace(self.plain, budget=self.plain.budget + more)
 
     def _follow(self, straddles: Straddles, tracked: int) -> None:
         """Follow motions until each has converged to a saddle, or for the largest number of sections."""
