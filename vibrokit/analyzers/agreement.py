@@ -100,7 +100,8 @@ def _without_path(known: _Known) -> tuple[Code, ActivationEnergy]:
 def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[Code, ActivationEnergy]:
     graph, image, least = known.graph, known.image, known.least
     if least is not None and _reaches(path, least):
-        bound = path.bound if path.certificate is None else Bound.CERTIFIED
+        without = Bound.EXACT if least.bound is Bound.EXACT else path.bound
+        bound = without if path.certificate is None else Bound.CERTIFIED
         return Code.DETAILED_BALANCE, dataclasses.replace(path, bound=bound)
     if image is not None and cost_the_same(path, image):
         return Code.MIRROR_IMAGE, dataclasses.replace(path, lower=image.lower, bound=image.bound)
