@@ -64,7 +64,11 @@ class Stop:
 
     def with_cells(self, bounds: Array, labels: Array, home: int = -1) -> Stop:
         """Return this test, also in the cells of a grid, outside of which a trajectory has left the region."""
-        return dataclasses.replace(self, region=bounds, area=bounds, labels=labels, home=home)
+        return dataclasses.replace(self.or_in_cells(bounds, labels), region=bounds, home=home)
+
+    def or_in_cells(self, bounds: Array, labels: Array) -> Stop:
+        """Return this test, also in the cells of a grid; outside of them motion goes on."""
+        return dataclasses.replace(self, area=bounds, labels=labels)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -101,9 +101,7 @@ class Search:
         """The test for having reached a known attractor, or a state from which motion cannot leave the well of one."""
         reached = arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.distances)
         trapped = wells(self.osc, self.attractors, self.region)
-        if trapped is None:
-            return reached
-        return dataclasses.replace(reached, area=trapped.region.bounds, labels=trapped.labels)
+        return reached if trapped is None else reached.or_in_cells(trapped.region.bounds, trapped.labels)
 
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit and those that diverged."""

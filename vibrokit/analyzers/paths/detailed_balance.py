@@ -29,7 +29,6 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
 from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.model import Model
 
 METHOD = "detailed balance"
 _RELATIVE = 1e-11  # error of the potential energy
@@ -51,7 +50,7 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
     if attractor.kind != "equilibrium" or not problem.scene.autonomous:
         return ()
     places = {end: _place(end, problem) for end in ends}
-    balance = Model(problem.scene).balance
+    balance = problem.scene.model.balance
     if balance is None or not balance > 0 or not all(math.isfinite(place) for place in places.values()):
         return ()
     start = float(attractor.points[0, 0])
@@ -95,18 +94,18 @@ def with_paths(
 
 def _nearest(problem: ExitProblem, energy: ActivationEnergy, relaxations: Sequence[Candidate]) -> Candidate | None:
     """The relaxation from the end of an exact energy whose action is nearest to it; None if none has that action."""
-    ends = [end for end in problem.path_ends if energy.target in end.targets and end.saddle == energy.saddle]
+    if energy.bound is not Bound.EXACT:
+        return None
     start = float(problem.attractor.points[0, 0])
-    among = [
+    ends = (end for end in problem.path_ends if energy.target in end.targets and end.saddle == energy.saddle)
+    places = [_place(end, problem) for end in ends]
+    among = (
         one
         for one in relaxations
-        for end in ends
-        if abs(one.states[-1, 0] - _place(end, problem)) <= _BESIDE * abs(start - _place(end, problem))
-    ]
+        if any(abs(one.states[-1, 0] - place) <= _BESIDE * abs(start - place) for place in places)
+    )
     found = min(among, key=lambda one: abs(one.action - energy.value), default=None)
-    if found is None or not math.isfinite(energy.upper) or abs(found.action - energy.value) > _ALIKE * energy.value:
-        return None
-    return found
+    return found if found is not None and abs(found.action - energy.value) <= _ALIKE * energy.value else None
 
 
 def _path(problem: ExitProblem, relaxation: Candidate) -> ExitPath:

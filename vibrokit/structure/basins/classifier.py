@@ -136,9 +136,7 @@ class BasinClassifier:
     def arriving(self) -> Stop:
         """The test for points and for cells of the core."""
         cells = self.core or wells(self.osc, self.attractors, self.region)
-        if cells is None:
-            return self.points
-        return dataclasses.replace(self.points, area=cells.region.bounds, labels=cells.labels)
+        return self.points if cells is None else self.points.or_in_cells(cells.region.bounds, cells.labels)
 
     @cached_property
     def mask(self) -> AttractorMask | None:
