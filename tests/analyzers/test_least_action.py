@@ -95,22 +95,33 @@ def test_attractors_that_are_reached_through_other_basins_are_known():
         assert ExitSearch(vk.LeastAction(), problem)._beyond == beyond
 
 
-@pytest.mark.parametrize(("finer", "useless"), [(0, {1, 2}), (1, {2}), (2, {2}), (3, set())])
-def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, useless):
-    """Each doubling of the nodes divides its error by 8 at best; half of a path's action is too coarse."""
+@pytest.mark.parametrize(
+    ("finer", "before", "useless"),
+    [
+        (0, None, {1, 2}), (1, None, {2}), (2, None, {2}), (3, None, set()),
+        (1, 64.0, {2}), (2, 64.0, {2}), (1, 6.0, {1, 2}), (1, 2.0, {1, 2}), (2, 6.0, {2}), (2, 1.0, {1, 2}),
+    ],
+)  # fmt: skip
+def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, before, useless):
+    """Each doubling of the nodes divides its error, of 2 here, as the last one did, by 8 at best; half of a path's
+    action is too coarse.
+    """
 
     def energy(target, value, error):
         return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
     problem = SimpleNamespace(attractor=SimpleNamespace(is_fixed=False))
-    work, paths = SimpleNamespace(problem=problem), (energy(1, 1.0, 0.0), energy(2, 0.01, 0.0))
+    rougher = None if before is None else SimpleNamespace(estimates=tuple(energy(each, 1.0, before) for each in (1, 2)))
+    work, paths = SimpleNamespace(problem=problem, _rougher=rougher), (energy(1, 1.0, 0.0), energy(2, 0.01, 0.0))
     work._estimates = lambda graph, branches: graph.estimates
     graph = SimpleNamespace(finer=finer, estimates=(energy(1, 1.0, 2.0), energy(2, 1.0, 2.0), energy(3, 1.0, 9.0)))
     assert ExitSearch._unresolvable(work, graph, paths) == useless
 
 
 def test_all_work_belongs_to_a_named_stage(structure):
-    seconds = dict(vk.LeastAction(source=0, **SMALL).run(OSC, structure).stats.seconds)
+    work = vk.LeastAction(source=0, **SMALL)
+    work.run(OSC, structure)  # imports what is imported at first use only
+    seconds = dict(work.run(OSC, structure).stats.seconds)
     rest = seconds.pop("LeastAction")
     assert set(seconds) - {"compiling"} == {
         "reversed relaxation", "exit targets", "graph", "starts of exit paths", "action plot", "closest approach",

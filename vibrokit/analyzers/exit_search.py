@@ -42,7 +42,7 @@ _AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NO
 """What more nodes do not change, however many there are."""
 _AFTERWARDS = 10.0  # s, for polishing what an action plot has found when it is stopped
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
-_GAIN = 8.0  # by which the error of the graph may fall when its nodes along a side are doubled: third order
+_GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
 
 
 class ExitSearch:
@@ -51,6 +51,7 @@ class ExitSearch:
     def __init__(self, analyzer: LeastAction, problem: ExitProblem) -> None:
         self.analyzer, self.problem = analyzer, problem
         self.graph: GraphSolution | None = None
+        self._rougher: GraphSolution | None = None  # the last one on half as many nodes along each side
         self._mirror = mirror.Mirror(problem)
         self._least = detailed_balance.least_actions(problem)
         self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
@@ -135,6 +136,8 @@ class ExitSearch:
         before = self.graph
         try:
             for found in self._solutions:
+                if before is not None and before.finer > found.finer:
+                    self._rougher = before
                 self.graph = found
                 if found.last:
                     break
@@ -248,13 +251,19 @@ class ExitSearch:
         return dataclasses.replace(shots, complete=False).estimates
 
     def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
-        """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse."""
-        least, gain = _least(branches), _GAIN**graph.finer
-        return {
-            each.target
-            for each in self._estimates(graph, branches)
-            if each.target in least and each.numerical_error / gain > VAGUE * least[each.target].value
-        }
+        """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse.
+
+        The error is expected to fall again as it fell with the last doubling of the nodes.
+        """
+        least, rougher = _least(branches), () if self._rougher is None else self._estimates(self._rougher, branches)
+        before = {each.target: each.numerical_error for each in rougher}
+        found = set()
+        for each in self._estimates(graph, branches):
+            error = each.numerical_error
+            gain = min(_GAIN, max(1.0, before.get(each.target, math.inf) / error)) if error else _GAIN
+            if each.target in least and error / gain**graph.finer > VAGUE * least[each.target].value:
+                found.add(each.target)
+        return found
 
     def _graph_error(self, graph: GraphSolution) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""

@@ -60,9 +60,13 @@ def _step_cost(s: float, t: float, centre: Array, root: Array) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _total_cost(before: Array, s: float, t: float, centre: Array, root: Array) -> float:
-    """Return the cost of a path that comes by a point of the grid before."""
-    return interpolate(before, s, t)[0] + _step_cost(s, t, centre, root)
+def _total_cost(before: Array, s: float, t: float, centre: Array, root: Array, most: float) -> float:
+    """Return the cost of a path that comes by a point of the grid before; infinite where the step alone costs `most`.
+
+    V is not negative, so that a step which costs as much as the cheapest path known needs no interpolation.
+    """
+    step = _step_cost(s, t, centre, root)
+    return math.inf if step >= most else interpolate(before, s, t)[0] + step
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -93,7 +97,7 @@ def descend(before: Array, s: float, t: float, centre: Array, root: Array) -> tu
         moved = False
         for _ in range(_HALVINGS):
             new_s, new_t = _clamped(s + step_s, before.shape[0]), _clamped(t + step_t, before.shape[1])
-            if _total_cost(before, new_s, new_t, centre, root) < found:
+            if _total_cost(before, new_s, new_t, centre, root, found) < found:
                 moved = True
                 break
             step_s *= 0.3
@@ -101,7 +105,7 @@ def descend(before: Array, s: float, t: float, centre: Array, root: Array) -> tu
         if not moved:
             return found, s, t
         s, t = new_s, new_t
-    return _total_cost(before, s, t, centre, root), s, t
+    return _total_cost(before, s, t, centre, root, math.inf), s, t
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -156,7 +160,7 @@ def sweep_rows(
                 continue
             ceiling = ceilings[i, j]
             centre, root = centres[i, j], roots[i, j]
-            found = _total_cost(before, s, t, centre, root)
+            found = _total_cost(before, s, t, centre, root, math.inf)
             for tried in range(4):
                 if tried == 0:
                     new_s, new_t = _clamped(centre[0], n), _clamped(centre[1], m)
@@ -167,7 +171,7 @@ def sweep_rows(
                     if not (first <= ni < last and 0 <= nj < m) or math.isnan(centres[ni, nj, 0]):
                         continue
                     new_s, new_t = predecessors[ni, nj, 0], predecessors[ni, nj, 1]
-                here = _total_cost(before, new_s, new_t, centre, root)
+                here = _total_cost(before, new_s, new_t, centre, root, found)
                 if here < found:
                     found, s, t = here, new_s, new_t
             if reach > 0:
@@ -210,7 +214,8 @@ def evaluate_rows(
             s, t = predecessors[i, j, 0], predecessors[i, j, 1]
             if not active[int(s + 0.5), int(t + 0.5)]:
                 continue
-            found = min(_total_cost(before, s, t, centres[i, j], roots[i, j]), ceilings[i, j])
+            ceiling = ceilings[i, j]
+            found = min(_total_cost(before, s, t, centres[i, j], roots[i, j], ceiling), ceiling)
             if abs(found - after[i, j]) > tolerance * after[i, j]:
                 changed[i, j] = 1
             after[i, j] = found
@@ -250,5 +255,5 @@ def descend_all(before: Array, starts: Array, centres: Array, roots: Array, step
             if found < least:
                 least = found
                 predecessors[k, 0], predecessors[k, 1] = s, t
-        costs[k] = _total_cost(before, predecessors[k, 0], predecessors[k, 1], centres[k], roots[k])
+        costs[k] = _total_cost(before, predecessors[k, 0], predecessors[k, 1], centres[k], roots[k], math.inf)
     return costs, predecessors

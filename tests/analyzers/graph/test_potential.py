@@ -1,5 +1,8 @@
 """Potential, seeds and traced paths of the linear oscillator without forcing."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -72,3 +75,44 @@ def test_the_path_is_the_relaxation_seen_backwards(solved, end):
         assert state == pytest.approx(back[0] * [1.0, -1.0], abs=0.05)
         back = model.images(back, 0.0, STEP)
     assert np.linalg.norm(states[0]) < 0.2
+
+
+def test_steps_are_needed_only_where_a_rougher_grid_is_below_its_ceiling(solved):
+    damping, model, attractor, whole = solved
+    level = 0.25 * whole.ceiling
+    rougher = ValueIteration(model, attractor, GRIDS.with_shape((31, 31))).up_to(level)
+    (near,) = rougher.reached(GRIDS, 1.2 * level)
+    exact = linear.potential(damping, 1.0, GRIDS.nodes(0))
+    assert near[exact < level].all()
+    assert not near[exact > 4 * level].any()
+    iteration = ValueIteration(model, attractor, GRIDS, [near])
+    assert np.array_equal(np.isfinite(iteration.roots[0]).all(axis=2), near)
+    part, every = iteration.up_to(level), ValueIteration(model, attractor, GRIDS).up_to(level)
+    np.testing.assert_allclose(part.values[0], every.values[0], rtol=1e-4)
+
+
+def test_all_nodes_count_as_reached_outside_a_grid_and_at_other_phases(solved):
+    _, model, attractor, _ = solved
+    inner = dataclasses.replace(GRIDS, boxes=0.5 * GRIDS.boxes)
+    small = ValueIteration(model, attractor, inner).up_to(1e-3)
+    (near,) = small.reached(GRIDS, 1.0)
+    assert near[0].all()
+    assert near[:, -1].all()
+    assert not near[16, 16]
+    other = dataclasses.replace(GRIDS, boxes=np.tile(GRIDS.boxes, (8, 1, 1)))
+    assert all(each.all() for each in small.reached(other, 1.0))
+
+
+def test_a_path_that_never_comes_closer_to_the_attractor_is_given_up(solved):
+    """In a hollow of V that interpolation makes; the weight of V against a step is raised 2¹⁴ times in vain."""
+    _, model, _, potential = solved
+    hollow = dataclasses.replace(
+        potential,
+        values=[np.full(GRIDS.shape, 1.0)],
+        seeded=np.zeros(GRIDS.shape, dtype=bool),
+        orbit=np.empty((0, 2)),
+    )
+    steps = []
+    counting = SimpleNamespace(into=lambda *given: steps.append(given) or model.into(*given))
+    assert backtrack(counting, hollow, np.array([0.6, 0.0])) is None
+    assert len(steps) <= 16 * GRIDS.steps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -38,6 +39,7 @@ _FEWEST_APART = 90
 # linearized steps made V ten times too small.
 _FEWEST_RELIABLE = 64
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Shape = tuple[int, int]  # nodes in x and in v
 
@@ -136,7 +138,7 @@ class HierarchySearch:
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
             known = SolvedGrid(self.problem, self.model, potential)
             grids, ceiling = self._around(known, (target,))
-            solved = self._solved(grids.with_shape(shape), ceiling, (target,))
+            solved = self._solved(grids.with_shape(shape), ceiling, (target,), known)
             return [path.candidate for path in solved.paths(target)]
 
     def _before(self, targets: frozenset[ExitTarget], shape: Shape) -> GridHierarchy | None:
@@ -170,13 +172,13 @@ class HierarchySearch:
                 break
             tried = self._coarser(count, targets, shape, coarse.intervals, 2 * whole.highest(targets))
             excess = tried[1].excess(targets)
-            if not np.isfinite(excess) or excess > max(coarse.excess(targets), _STEP_TOLERANCE):
-                break
-            whole, coarse = tried
-            rougher = whole
+            if np.isfinite(excess) and excess <= max(coarse.excess(targets), _STEP_TOLERANCE):
+                whole, coarse = tried
+                rougher = whole
         grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
-        fine = self._solved(grids.with_shape(_shared(shape, coarse.intervals)), ceiling, targets)
-        return GridHierarchy(fine, coarse, whole, lambda: self._solved(grids.with_double_step(), ceiling, targets))
+        fine = self._solved(grids.with_shape(_shared(shape, coarse.intervals)), ceiling, targets, coarse)
+        long = functools.partial(self._solved, grids.with_double_step(), ceiling, targets, coarse)
+        return GridHierarchy(fine, coarse, whole, long)
 
     def _intervals(self, before: GridHierarchy | None) -> tuple[int, ...]:
         """Numbers of section intervals to try: grids of their own for those of an attractor's period may cover less."""
@@ -212,16 +214,22 @@ class HierarchySearch:
         """Solve on as many nodes around what lies below the costliest exit, if that is at most a part of the area."""
         grids, ceiling = self._around(solved, targets)
         too_large = grids.area > most * solved.potential.grids.area
-        return solved if too_large else self._solved(grids, ceiling, targets)
+        return solved if too_large else self._solved(grids, ceiling, targets, solved)
 
     def _around(self, solved: SolvedGrid, targets: Sequence[ExitTarget]) -> tuple[Grids, float]:
         """Grids around what lies below the costliest exit, and a ceiling for V on them."""
         ceiling = _ROOM * solved.highest(targets)
         return solved.potential.grids.zoomed(self._before_exit(solved, ceiling, targets)), ceiling
 
-    def _solved(self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget]) -> SolvedGrid:
-        """Solve up to a ceiling of V, which is raised until the targets lie well below it."""
-        iteration = ValueIteration(self.model, self.problem.attractor, grids)
+    def _solved(
+        self, grids: Grids, ceiling: float, targets: Sequence[ExitTarget], rougher: SolvedGrid | None = None
+    ) -> SolvedGrid:
+        """Solve up to a ceiling of V, which is raised until the targets lie well below it.
+
+        Where a rougher grid shows that V is above the ceiling, no steps are computed.
+        """
+        wanted = None if rougher is None else rougher.potential.reached(grids, _ROOM * ceiling)
+        iteration = ValueIteration(self.model, self.problem.attractor, grids, wanted)
         for _ in range(_RAISES):
             solved = SolvedGrid(self.problem, self.model, iteration.up_to(ceiling))
             highest = solved.highest(targets)
@@ -233,6 +241,8 @@ class HierarchySearch:
             if highest < _NEAR_CEILING * ceiling:
                 return solved
             ceiling *= _RAISE
+            if wanted is not None:  # a path goes beyond what the rougher grid reaches
+                wanted, iteration = None, ValueIteration(self.model, self.problem.attractor, grids)
         raise StructureError(
             f"the graph reaches no exit of {self.problem.attractor.name}: the region or the number of nodes leaves no "
             "room for a path; widen the region or raise the number of nodes."
@@ -266,19 +276,19 @@ class HierarchySearch:
         if any(target.farther for target in targets):
             return below
         inside = self._not_out if self.problem.exit.by_position else self._in_basin
-        return [mask & inside(grids, phase) for phase, mask in enumerate(below)]
+        for phase, mask in enumerate(below):
+            mask[mask] = inside(grids.nodes(phase)[mask], grids, phase)
+        return below
 
-    def _not_out(self, grids: Grids, phase: int) -> Mask:
-        return ~self.problem.is_out(grids.nodes(phase))
+    def _not_out(self, states: Array, _grids: Grids, _phase: int) -> Mask:
+        return ~self.problem.is_out(states)
 
-    def _in_basin(self, grids: Grids, phase: int) -> Mask:
-        """Which nodes lead to the attractor, according to the cells of the section that they come to."""
-        states = grids.nodes(phase).reshape(-1, 2)
+    def _in_basin(self, states: Array, grids: Grids, phase: int) -> Mask:
+        """Which states of a phase lead to the attractor, according to the cells of the section that they come to."""
         if phase not in grids.sections:
             rest = (grids.steps - phase % grids.steps) * grids.step
             states = self.model.images(states, grids.time(phase), rest)
-        mask: Mask = self.problem.structure.basins.at(states) == self.problem.source
-        return mask.reshape(grids.shape)
+        return self.problem.structure.basins.at(states) == self.problem.source
 
 
 def _halved(shape: Shape) -> Shape:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,9 +37,11 @@ _WIDE_SEARCHES = 4  # each evaluates up to (2 · 8 + 1)² nodes for every node, 
 _CONVERGED = 2e-5  # relative change of the mean of √V over a cycle; 10 times less changes V by at most 0.1 %
 _MOST_PERIODS = 400
 _BLUR = 2  # nodes within which a grid does not resolve V
+_NEARBY = 2  # nodes: what lies farther from where V is low has no part in interpolation there
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -136,6 +138,13 @@ def _dense(curve: Array, grids: Grids) -> Array:
     return np.column_stack([np.interp(at, np.arange(len(curve)), curve[:, axis]) for axis in (0, 1)])
 
 
+def _on_nodes(rows: Array, kept: Mask) -> Array:
+    """Put rows at the nodes that were kept, NaN at the others."""
+    found = np.full((*kept.shape, *rows.shape[1:]), np.nan)
+    found[kept] = rows
+    return found
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Potential:
     """Least action V from an attractor to every node of every phase."""
@@ -146,6 +155,22 @@ class Potential:
     seeded: NDArray[np.bool_]  # (nx, nv): nodes of phase 0 whose V is known beforehand
     orbit: Array  # (count, 2): states of the attractor from phase to phase if it is an orbit; else empty
     ceiling: float  # V up to which paths are searched
+
+    def reached(self, grids: Grids, level: float) -> list[Mask]:
+        """Return which nodes of each phase of other grids lie near nodes where V is below a level and the ceiling.
+
+        Nodes outside of its own grids count as reached; where these have other phases, all do.
+        """
+        every, rest = divmod(self.grids.phases, grids.phases)
+        if rest or len(self.grids.sections) != len(grids.sections):
+            return [np.ones(grids.shape, dtype=bool)] * grids.phases
+        most, last, found = min(level, self.ceiling), np.array(self.grids.shape) - 1, []
+        for phase in range(grids.phases):
+            below = ndimage.maximum_filter(self.values[every * phase] < most, size=2 * _NEARBY + 1)
+            index = np.rint(self.grids.index(every * phase, grids.nodes(phase))).astype(int)
+            inside = np.clip(index, 0, last)
+            found.append(below[inside[..., 0], inside[..., 1]] | np.any(index != inside, axis=-1))
+        return found
 
     def at(self, phase: int, states: Array) -> Array:
         """Return V at states (count, ≥ 2); NaN outside the grid."""
@@ -181,9 +206,14 @@ class Potential:
 
 
 class ValueIteration:
-    """Value iteration on some grids; raises StructureError if the attractor is not hyperbolic."""
+    """Value iteration on some grids; raises StructureError if the attractor is not hyperbolic.
 
-    def __init__(self, model: StepModel, attractor: Attractor, grids: Grids) -> None:
+    V is computed at the nodes (nx, nv) of each phase that are wanted, by default at all; elsewhere it is the ceiling.
+    """
+
+    def __init__(
+        self, model: StepModel, attractor: Attractor, grids: Grids, wanted: Sequence[Mask] | None = None
+    ) -> None:
         self.grids = grids
         self.sweeps = max(grids.phases, grids.steps)  # over all phases, or a section interval
         known = seeds(model, attractor, grids)
@@ -194,14 +224,14 @@ class ValueIteration:
         last = np.array(grids.shape) - 2.0
         for phase in range(grids.phases):
             after = (phase + 1) % grids.phases
-            costs = model.into(grids.nodes(after).reshape(-1, 2), grids, phase)
+            kept = np.ones(grids.shape, dtype=bool) if wanted is None else wanted[after]
+            costs = model.into(grids.nodes(after)[kept], grids, phase)
             for visit in grids.index(phase, known.orbit[phase :: grids.phases]):
-                direct = costs.cost(visit).reshape(grids.shape)
-                np.fmin(self.bounds[after], direct, out=self.bounds[after])
-            self.centres.append(costs.centres.reshape(*grids.shape, 2))
-            self.roots.append(costs.roots.reshape(*grids.shape, 3))
+                np.fmin(self.bounds[after], _on_nodes(costs.cost(visit), kept), out=self.bounds[after])
+            self.centres.append(_on_nodes(costs.centres, kept))
+            self.roots.append(_on_nodes(costs.roots, kept))
             self.predecessors.append(np.clip(np.nan_to_num(self.centres[-1], nan=1.0), 1.0, last))
-            self.uphill.append(np.clip(costs.uphill.reshape(*grids.shape, 2), 1.0, last))
+            self.uphill.append(np.clip(_on_nodes(costs.uphill, kept), 1.0, last))
         self.known = known.values
 
     def up_to(self, ceiling: float) -> Potential:

@@ -28,7 +28,7 @@ _SAME = 1e-4  # relative difference of the actions of paths that count as one
 _LONGEST = 250  # section intervals
 _STEP_WEIGHT = 1 / 1.1  # of a step's cost against V: below 1, so that no path lingers near an unstable orbit
 _LIGHTER, _LEAST_WEIGHT = 0.5, 1e-4  # where V, interpolated, has a hollow that a path would never leave
-_LOSS = 1e-3  # of V, that a path has to lose in a section interval; else the weight is lowered
+_LOSS = 1e-3  # of the lowest V yet, that a path has to lose in a section interval; else the weight is lowered
 _CORNERS = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
 Array = NDArray[np.float64]
@@ -151,7 +151,7 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
     grids = potential.grids
     states = [end]
     per_interval = grids.steps
-    weight, level = _STEP_WEIGHT, np.inf
+    weight, lowest = _STEP_WEIGHT, np.inf
     for count in range(1, _LONGEST * per_interval):
         before = (phase - count) % grids.phases
         costs = model.into(states[-1][None], grids, before)
@@ -164,8 +164,11 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
         if not np.isfinite(costs.cost(index)[0]):
             return None
         if count % per_interval == 0:
-            weight = _STEP_WEIGHT if totals[0] < (1 - _LOSS) * level else max(weight * _LIGHTER, _LEAST_WEIGHT)
-            level = float(totals[0])
+            lower = totals[0] < (1 - _LOSS) * lowest
+            weight = _STEP_WEIGHT if lower else weight * _LIGHTER
+            lowest = min(lowest, float(totals[0]))
+            if weight < _LEAST_WEIGHT:
+                return None
         nearest = np.clip(np.rint(index[0]), 0, np.array(grids.shape) - 1).astype(int)
         if before == 0 and potential.seeded[tuple(nearest)]:
             return np.array(states[::-1]), float(potential.at(0, states[-1][None])[0])
