@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.exit_search import ExitSearch
+from vibrokit.analyzers.evidence import Evidence, reached_through_others
 from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
@@ -92,7 +92,7 @@ def test_attractors_that_are_reached_through_other_basins_are_known():
     osc, structure = three_wells()
     for label, beyond in ((0, {2}), (1, set()), (2, {0})):
         problem = ExitProblem(osc, structure, structure.attractor(label), vk.LeaveBasin())
-        assert ExitSearch(vk.LeastAction(), problem)._beyond == beyond
+        assert reached_through_others(problem) == beyond
 
 
 @pytest.mark.parametrize(
@@ -110,12 +110,10 @@ def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer,
     def energy(target, value, error):
         return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
-    problem = SimpleNamespace(attractor=SimpleNamespace(is_fixed=False))
+    attractor, paths = SimpleNamespace(repeats=False), (energy(2, 0.01, 0.0), energy(1, 1.0, 0.0))
     rougher = None if before is None else SimpleNamespace(estimates=tuple(energy(each, 1.0, before) for each in (1, 2)))
-    work, paths = SimpleNamespace(problem=problem, _rougher=rougher), (energy(1, 1.0, 0.0), energy(2, 0.01, 0.0))
-    work._estimates = lambda graph, branches: graph.estimates
     graph = SimpleNamespace(finer=finer, estimates=(energy(1, 1.0, 2.0), energy(2, 1.0, 2.0), energy(3, 1.0, 9.0)))
-    assert ExitSearch._unresolvable(work, graph, paths) == useless
+    assert Evidence(attractor, paths, graph, rougher).unresolvable == useless
 
 
 def test_all_work_belongs_to_a_named_stage(structure):

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import math
 from collections.abc import Sequence, Set
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import xarray
 
-from vibrokit.analyzers.agreement import VAGUE, combined
 from vibrokit.analyzers.analyzer import Analysis
+from vibrokit.analyzers.evidence import Evidence, reached_through_others
 from vibrokit.analyzers.graph.solution import GraphSolution
-from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -28,7 +26,6 @@ from vibrokit.progress import TRAJECTORIES, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
-from vibrokit.structure.boundaries.edges import meeting_cells
 from vibrokit.structure.orbits import Orbit
 from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
@@ -36,13 +33,8 @@ from vibrokit.symbolic.flow_kind import Flow
 if TYPE_CHECKING:
     from vibrokit.analyzers.least_action import LeastAction
 
-_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
-"""Energies with bounds that no graph gave."""
-_AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
-"""What more nodes do not change, however many there are."""
 _AFTERWARDS = 10.0  # s, for polishing what an action plot has found when it is stopped
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
-_GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
 
 
 class ExitSearch:
@@ -88,8 +80,8 @@ class ExitSearch:
     @property
     def _is_exact(self) -> bool:
         """Whether all exits cost what no path can cost less than, after reversed relaxations were polished."""
-        exact = self._agreed((), self._polished()[0], Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
-        return self._reversed and bool(self._least) and {each.target for each in self._least} <= exact
+        least = {each.target for each in self._least}
+        return self._reversed and bool(least) and least <= dataclasses.replace(self._evidence, graph=None).exact
 
     def mirror(self) -> None:
         """Polish mirror images of known paths; those that leave another attractor take the place of shooting."""
@@ -160,7 +152,7 @@ class ExitSearch:
     def refine_graph(self) -> None:
         """Search the graph again until its error is as small as wanted."""
         while not self._searched and not self.stopped:
-            if self.graph is not None and self._graph_error(self.graph) <= self.analyzer.accuracy:
+            if self.graph is not None and self._evidence.graph_error <= self.analyzer.accuracy:
                 break
             self.search_graph()
 
@@ -168,73 +160,29 @@ class ExitSearch:
         """Search other beginnings of the cheapest path to each attractor, and polish those."""
         if self.graph is None or self.analyzer.graph is None or not self.problem.attractor.repeats:
             return
-        branches = self._polished()[0]
-        least = _least(branches)
-        for target in sorted(least.keys() - self._unresolvable(self.graph, branches) - self._mirror.energies.keys()):
+        evidence = self._evidence
+        for target in sorted(evidence.cheapest.keys() - evidence.unresolvable - evidence.images.keys()):
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
-                self._polish(self.analyzer.graph.beginnings(self.problem, least[target], self.graph))
+                self._polish(self.analyzer.graph.beginnings(self.problem, evidence.cheapest[target], self.graph))
 
     @cached_property
     def _beyond(self) -> frozenset[int]:
-        """Labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
+        return reached_through_others(self.problem)
 
-        Paths to these pass other basins: they are no first exits.
-        """
-        unled = {label for end in self.problem.path_ends if isinstance(end, InBasin) for label in end.targets}
-        if not unled:
-            return frozenset()
-        touching = {
-            label
-            for pair in meeting_cells(self.problem.structure.basins)
-            if self.problem.source in pair
-            for label in pair
-        }
-        return frozenset(unled - touching)
+    @property
+    def _evidence(self) -> Evidence:
+        attractor, branches, images = self.problem.attractor, self._polished()[0], self._mirror.energies
+        beyond = frozenset[int]() if self.graph is None else self._beyond
+        return Evidence(attractor, branches, self.graph, self._rougher, images, tuple(self._least), beyond)
 
     def _settled(self) -> Set[int]:
-        """Labels of attractors on which an accurate graph and a path agree, or for which finer grids are of no use."""
-        branches = self._polished()[0]
-        if self.graph is None:
-            return set()
-        if not self.problem.attractor.repeats:
-            return self._beyond | self._unresolvable(self.graph, branches)
-        estimates = self._estimates(self.graph, branches)
-        accurate = {each.target for each in estimates if each.numerical_error <= self.analyzer.accuracy * each.value}
-        return accurate & self._agreed(estimates, branches) | self._useless(self.graph, branches)
+        return self._evidence.settled(self.analyzer.accuracy)
 
-    def _useless(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
-        """Labels of the attractors for which finer grids are of no use.
-
-        An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
-        Mirror images have their bounds, and so have paths that cost the least possible.
-        """
-        with_path, estimates = {branch.target for branch in branches}, self._estimates(graph, branches)
-        agreed, exact = self._agreed(estimates, branches), self._agreed(estimates, branches, *_EXACT)
-        beyond = {label for label in self._beyond if label in agreed or label not in with_path}
-        return self._unresolvable(graph, branches) | exact | beyond
-
-    def _agreed(
-        self, estimates: Sequence[ActivationEnergy], branches: Sequence[ActivationEnergy], *codes: Code
-    ) -> set[int]:
-        """Labels of the attractors for which estimates and paths compare as some codes say; by default they agree."""
-        wanted, (_, compared) = codes or (Code.AGREEMENT,), self._combined(branches, estimates)
-        return {finding.target for finding in compared if finding.code in wanted and finding.target is not None}
-
-    def _combined(
-        self,
-        branches: Sequence[ActivationEnergy],
-        estimates: Sequence[ActivationEnergy],
-        shots: Sequence[ActivationEnergy] = (),
-    ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
-        return combined(self.problem.attractor, branches, estimates, self._mirror.energies, self._least, shots)
-
-    def _unpolished(
-        self, branches: Sequence[ActivationEnergy], estimates: Sequence[ActivationEnergy]
-    ) -> tuple[ActivationEnergy, ...]:
+    def _unpolished(self, evidence: Evidence) -> tuple[ActivationEnergy, ...]:
         """The action plot's energies of exits without a polished path; their errors take time, which may be over."""
         wanted = {label for end in self.problem.path_ends for label in end.targets}
-        wanted |= {estimate.target for estimate in estimates}
-        wanted -= {branch.target for branch in branches}
+        wanted |= {estimate.target for estimate in evidence.estimates}
+        wanted -= evidence.cheapest.keys()
         wanted -= {each.target for each in self._least if each.bound is Bound.EXACT}
         shot = () if self._shots is None else self._shots.branches
         kept = tuple(branch for branch in shot if branch.candidate.target in wanted)
@@ -249,37 +197,6 @@ class ExitSearch:
         except (StructureError, StepperError) as error:
             self._failed(doing, error)
         return dataclasses.replace(shots, complete=False).estimates
-
-    def _unresolvable(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> set[int]:
-        """Labels of the attractors to which a path costs so little that even the finest graph would be too coarse.
-
-        The error is expected to fall again as it fell with the last doubling of the nodes.
-        """
-        least, rougher = _least(branches), () if self._rougher is None else self._estimates(self._rougher, branches)
-        before = {each.target: each.numerical_error for each in rougher}
-        found = set()
-        for each in self._estimates(graph, branches):
-            error = each.numerical_error
-            gain = min(_GAIN, max(1.0, before.get(each.target, math.inf) / error)) if error else _GAIN
-            if each.target in least and error / gain**graph.finer > VAGUE * least[each.target].value:
-                found.add(each.target)
-        return found
-
-    def _graph_error(self, graph: GraphSolution) -> float:
-        """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
-        branches = self._polished()[0]
-        useless = self._useless(graph, branches)
-        estimates = [each for each in self._estimates(graph, branches) if each.target not in useless]
-        _, compared = self._combined(branches, estimates)
-        if any(finding.code not in _AGREED for finding in compared):
-            return math.inf
-        return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
-
-    def _estimates(self, graph: GraphSolution, branches: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
-        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
-        if not self.problem.attractor.repeats:
-            return graph.estimates
-        return graph.calibrated([branch for branch in branches if branch.bound is not Bound.BRACKET])
 
     @cached_property
     def _polishings(self) -> list[Polishing]:
@@ -315,8 +232,8 @@ class ExitSearch:
     def analysis(self) -> Analysis:
         """Combine what was found."""
         branches, polished = self._polished()
-        estimates = () if self.graph is None else self._estimates(self.graph, branches)
-        energies, compared = self._combined(branches, estimates, self._unpolished(branches, estimates))
+        evidence = self._evidence
+        energies, compared = evidence.combined(self._unpolished(evidence))
         every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
         findings += compared
@@ -350,8 +267,3 @@ class ExitSearch:
             Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods)
         )  # fmt: skip
         return found
-
-
-def _least(branches: Sequence[ActivationEnergy]) -> dict[int, ActivationEnergy]:
-    """The cheapest branch to each target; the branches are sorted, the cheapest first."""
-    return {branch.target: branch for branch in reversed(branches)}

@@ -154,8 +154,8 @@ class HierarchySearch:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
 
         Each step adds an error of interpolation. So steps are not shortened where a rougher grid changes a cost by more
-        than linearization does, nor beyond where that takes V farther from the actions of its paths, or gives no path
-        to one of the exits.
+        than linearization does. Steps are passed over that take V farther from the actions of its paths, or give no
+        path to one of the exits: shorter ones may be right where a contact is much shorter than all of them.
         """
         if before is not None and before.fine.potential.grids.shape == _shared(shape, before.intervals):
             return before

@@ -1,0 +1,132 @@
+"""Evidence: the graph's estimates of the exits of one attractor, compared with its polished paths."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.path_ends import InBasin
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.attractor import Attractor
+from vibrokit.results.codes import Code
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Finding
+from vibrokit.structure.boundaries.edges import meeting_cells
+
+_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
+"""Energies with bounds that no graph gave."""
+_AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
+"""What more nodes do not change, however many there are."""
+_GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known of the exits of an attractor, and for which of them a finer graph is of use.
+
+    Exits are named by the labels of the attractors they lead to.
+    """
+
+    attractor: Attractor
+    branches: tuple[ActivationEnergy, ...]  # polished, the cheapest first
+    graph: GraphSolution | None = None
+    rougher: GraphSolution | None = None  # the last graph on half as many nodes along each side
+    images: Mapping[int, ActivationEnergy] = dataclasses.field(default_factory=dict)
+    """By label: the known energies of which those of the attractor are mirror images."""
+    least_possible: tuple[ActivationEnergy, ...] = ()
+    """What no path can cost less than, where that is known."""
+    beyond: frozenset[int] = frozenset()
+    """Labels of the attractors that only paths through other basins reach."""
+
+    @cached_property
+    def cheapest(self) -> dict[int, ActivationEnergy]:
+        """By label: the cheapest polished path."""
+        return {branch.target: branch for branch in reversed(self.branches)}
+
+    @cached_property
+    def estimates(self) -> tuple[ActivationEnergy, ...]:
+        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
+        return self._estimates_of(self.graph)
+
+    def combined(
+        self, shots: Sequence[ActivationEnergy] = ()
+    ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+        """Return an energy and a finding for each exit; `shots` are the action plot's energies."""
+        return combined(self.attractor, self.branches, self.estimates, self.images, self.least_possible, shots)
+
+    @property
+    def exact(self) -> set[int]:
+        """Exits that cost what no path can cost less than."""
+        return self._found(Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
+
+    def settled(self, accuracy: float) -> set[int]:
+        """Return the exits on which an accurate graph and a path agree, or for which finer grids are of no use."""
+        if self.graph is None:
+            return set()
+        if not self.attractor.repeats:
+            return self.unresolvable | self.beyond
+        accurate = {each.target for each in self.estimates if each.numerical_error <= accuracy * each.value}
+        return accurate & self._found(Code.AGREEMENT) | self._useless
+
+    @cached_property
+    def unresolvable(self) -> set[int]:
+        """Exits with a path that costs so little that even the finest graph would be too coarse.
+
+        The error is expected to fall again as it fell with the last doubling of the nodes.
+        """
+        before = {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
+        found, finer = set[int](), 0 if self.graph is None else self.graph.finer
+        for each in self.estimates:
+            error, path = each.numerical_error, self.cheapest.get(each.target)
+            gain = min(_GAIN, max(1.0, before.get(each.target, math.inf) / error)) if error else _GAIN
+            if path is not None and error / gain**finer > VAGUE * path.value:
+                found.add(each.target)
+        return found
+
+    @property
+    def graph_error(self) -> float:
+        """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
+        estimates = tuple(each for each in self.estimates if each.target not in self._useless)
+        _, compared = combined(self.attractor, self.branches, estimates, self.images, self.least_possible)
+        if any(finding.code not in _AGREED for finding in compared):
+            return math.inf
+        return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
+
+    @cached_property
+    def _useless(self) -> set[int]:
+        """Exits for which finer grids are of no use.
+
+        An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
+        Mirror images have their bounds, and so have paths that cost the least possible.
+        """
+        agreed, exact = self._found(Code.AGREEMENT), self._found(*_EXACT)
+        beyond = {label for label in self.beyond if label in agreed or label not in self.cheapest}
+        return self.unresolvable | exact | beyond
+
+    def _found(self, *codes: Code) -> set[int]:
+        _, findings = self.combined()
+        return {finding.target for finding in findings if finding.code in codes and finding.target is not None}
+
+    def _estimates_of(self, graph: GraphSolution | None) -> tuple[ActivationEnergy, ...]:
+        if graph is None:
+            return ()
+        if not self.attractor.repeats:
+            return graph.estimates
+        return graph.calibrated([branch for branch in self.branches if branch.bound is not Bound.BRACKET])
+
+
+def reached_through_others(problem: ExitProblem) -> frozenset[int]:
+    """Return the labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
+
+    Paths to these pass other basins: they are no first exits.
+    """
+    unled = {label for end in problem.path_ends if isinstance(end, InBasin) for label in end.targets}
+    if not unled:
+        return frozenset()
+    pairs = meeting_cells(problem.structure.basins)
+    touching = {label for pair in pairs if problem.source in pair for label in pair}
+    return frozenset(unled - touching)
