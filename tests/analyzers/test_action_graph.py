@@ -15,6 +15,7 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 
@@ -407,3 +408,38 @@ def test_a_cheap_exit_is_solved_as_well_as_a_costly_one():
         assert abs(best(last, target).value - value) <= best(last, target).numerical_error
     assert best(last, right.label).numerical_error < best(first, right.label).numerical_error
     assert [energy.target for energy in last.energies] == [right.label, left.label]  # the cheapest first
+
+
+def test_a_saddle_at_the_tip_of_a_basin_is_reached():
+    """Escape of a softening oscillator, over a saddle where its basin is thinner than a cell.
+
+    Polished paths cost 0.1273162369 and 0.1306644174.
+    """
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.03, spring=vk.CubicSpring(1.0, -0.05),
+        excitations=(vk.Harmonic(0.15, 0.9),), noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, cells=(60, 60), manifolds=False, rng=0)
+    large, small = structure.attractors
+    assert (large.name, small.name) == ("large-oscillation", "small-oscillation")
+    found = vk.ActionGraph(nodes=(90, 90)).run(osc, structure)
+    for attractor, value in ((large, 0.1273162369), (small, 0.1306644174)):
+        (escape,) = (each for each in found.energies if (each.source, each.target) == (attractor.label, ESCAPED))
+        assert abs(escape.value - value) <= escape.numerical_error < 0.5 * value
+
+
+@pytest.mark.slow
+def test_steps_become_shorter_than_a_stiff_contact():
+    """Hertz stops of k = 1e4: 8 steps in a period give a quarter of the energy.
+
+    The polished path costs 1.428600353e-3.
+    """
+    stops = (vk.Barrier(vk.Hertz(1e4), 0.4, "right"), vk.Barrier(vk.Hertz(1e4), -0.4, "left"))
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.03, barriers=stops, excitations=(vk.Harmonic(0.3, 0.8),),
+        noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, manifolds=False, rng=0)
+    found = vk.ActionGraph(nodes=(180, 180), source=0).run(osc, structure)
+    (energy,) = found.energies
+    assert abs(energy.value - 1.428600353e-3) <= energy.numerical_error < 0.5 * energy.value

@@ -78,6 +78,7 @@ forced("one stop, hard", 1.3, 0.2, damping=0.03, stops=(vk.Barrier(vk.Hertz(100.
 forced("two tones", 0.6, 0.2, damping=0.03, stops=both(vk.Hertz(30.0), 0.6), more=(vk.Harmonic(0.05, 1.2),))
 forced("zero gap", 2.0, 0.3, damping=0.03, stops=(vk.Barrier(vk.Linear(3.0), 0.0, "right"),))
 forced("stiff linear stop", 2.6, 0.4, damping=0.03, stops=(vk.Barrier(vk.Linear(1000.0), 0.2, "right"),))
+forced("stiff Hertz stops", 0.8, 0.3, damping=0.03, stops=both(vk.Hertz(1e4), 0.4))
 forced("backlash", 0.75, 0.2, natural=0.1, damping=0.4, push=0.3, stops=both(vk.Linear(1.0), 1.0))
 forced("preloaded contact", 1.05, 0.25, natural=0.05, damping=0.3, push=1.0,
        stops=(vk.Barrier(vk.Hertz(1.0), 0.0, "right"),))  # fmt: skip

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.potential import Potential, ValueIteration
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.graph.targets import ExitTarget
+from vibrokit.analyzers.graph.targets import ExitTarget, TraceStart
 from vibrokit.analyzers.graph.tracing import SolvedGrid, distinct
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
@@ -270,7 +270,10 @@ class HierarchySearch:
         return Grids(np.array(boxes), shape, step, steps)
 
     def _before_exit(self, solved: SolvedGrid, ceiling: float, targets: Sequence[ExitTarget]) -> list[Mask]:
-        """By phase: which nodes may lie on a path to one of the targets, with V below a ceiling."""
+        """By phase: which nodes may lie on a path to one of the targets, with V below a ceiling.
+
+        The targets' own places are among them: near a saddle, the basin may be thinner than a cell.
+        """
         grids, values = solved.potential.grids, solved.potential.values
         below = [values[phase] < ceiling for phase in range(grids.phases)]
         if any(target.farther for target in targets):
@@ -278,7 +281,21 @@ class HierarchySearch:
         inside = self._not_out if self.problem.exit.by_position else self._in_basin
         for phase, mask in enumerate(below):
             mask[mask] = inside(grids.nodes(phase)[mask], grids, phase)
+        for target in targets:
+            place = solved.arrival(target).place
+            if place is not None:
+                self._include(below, grids, place)
         return below
+
+    def _include(self, masks: list[Mask], grids: Grids, place: TraceStart) -> None:
+        """Include the nodes next to the motion from a state until the next section."""
+        phase, state = place.phase, place.state
+        for _ in range(min(grids.steps, grids.phases)):
+            if not grids.inside(phase, state):
+                break
+            masks[phase][tuple(np.rint(grids.index(phase, state)).astype(int))] = True
+            state = self.model.images(state[None], grids.time(phase), grids.step)[0]
+            phase = (phase + 1) % grids.phases
 
     def _not_out(self, states: Array, _grids: Grids, _phase: int) -> Mask:
         return ~self.problem.is_out(states)

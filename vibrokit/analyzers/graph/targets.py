@@ -39,6 +39,7 @@ class Arrival:
     value: float  # least V of the target; infinite if the grid does not reach it
     error: float = 0.0  # what the place of the target alone contributes to the error of the value
     starts: tuple[TraceStart, ...] = ()
+    place: TraceStart | None = None  # where V is least, if the target is a set of states on the section
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -88,7 +89,8 @@ class StateTarget(ExitTarget):
             error += max(0.0, potential.fall(phase, cheapest, self.depth))
         if self.direction is not None and np.isfinite(values[:, 0]).any():  # the saddle's point of that direction
             phase = potential.grids.sections[int(np.nanargmin(values[:, 0]))]
-        return Arrival(float(values[section, best]), error, self._starts(potential, phase, cheapest))
+        starts, place = self._starts(potential, phase, cheapest), TraceStart(cheapest, phase)
+        return Arrival(float(values[section, best]), error, starts, place)
 
     def _starts(self, potential: Potential, phase: int, cheapest: Array) -> tuple[TraceStart, ...]:
         """The cheapest state, or some just beyond a saddle, on the side that a path from the source comes to last."""
