@@ -153,9 +153,10 @@ class HierarchySearch:
     def _hierarchy(self, targets: Sequence[ExitTarget], shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
 
-        Each step adds an error of interpolation. So steps are not shortened where a rougher grid changes a cost by more
-        than linearization does. Steps are passed over that take V farther from the actions of its paths, or give no
-        path to one of the exits: shorter ones may be right where a contact is much shorter than all of them.
+        Each step adds an error of interpolation, which raises V. So steps are not shortened where a rougher grid
+        changes a cost by more than linearization does, nor beyond where that takes V farther above the actions of its
+        paths. Steps are passed over that take V farther below these, or give no path to one of the exits: shorter ones
+        may be right where a contact is much shorter than all of them.
         """
         if before is not None and before.fine.potential.grids.shape == _shared(shape, before.intervals):
             return before
@@ -175,6 +176,8 @@ class HierarchySearch:
             if np.isfinite(excess) and excess <= max(coarse.excess(targets), _STEP_TOLERANCE):
                 whole, coarse = tried
                 rougher = whole
+            elif tried[1].lies_above(targets, _STEP_TOLERANCE):
+                break
         grids, ceiling = coarse.potential.grids, _ROOM * coarse.highest(targets)
         fine = self._solved(grids.with_shape(_shared(shape, coarse.intervals)), ceiling, targets, coarse)
         long = functools.partial(self._solved, grids.with_double_step(), ceiling, targets, coarse)

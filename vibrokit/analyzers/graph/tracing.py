@@ -95,9 +95,17 @@ class SolvedGrid:
 
         Infinite if no path to one of them could be traced.
         """
+        return max((abs(ratio - 1) for ratio in self._ratios(targets)), default=0.0)
+
+    def lies_above(self, targets: Iterable[ExitTarget], tolerance: float) -> bool:
+        """Return whether V at a reached exit is larger than the action of the path to it, as by interpolation."""
+        return any(1 + tolerance < ratio < np.inf for ratio in self._ratios(targets))
+
+    def _ratios(self, targets: Iterable[ExitTarget]) -> list[float]:
+        """V at each reached exit in units of the action of the path to it; infinite where no path could be traced."""
         found = [(self.arrival(target).value, target) for target in targets]
         traced = [(value, self.paths(target)) for value, target in found if np.isfinite(value)]
-        return max((abs(v / paths[0].candidate.action - 1) if paths else np.inf for v, paths in traced), default=0.0)
+        return [value / paths[0].candidate.action if paths else np.inf for value, paths in traced]
 
     def paths(self, target: ExitTarget) -> list[TracedPath]:
         """Return the distinct paths to a target, the cheapest first."""
