@@ -90,10 +90,9 @@ class Evidence:
     @property
     def graph_error(self) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
-        estimates = tuple(each for each in self.estimates if each.target not in self._useless)
-        _, compared = combined(self.attractor, self.branches, estimates, self.images, self.least_possible)
-        if any(finding.code not in _AGREED for finding in compared):
+        if any(code not in _AGREED for target, code in self._codes.items() if target not in self._useless):
             return math.inf
+        estimates = [each for each in self.estimates if each.target not in self._useless]
         return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
 
     @cached_property
@@ -107,9 +106,14 @@ class Evidence:
         beyond = {label for label in self.beyond if label in agreed or label not in self.cheapest}
         return self.unresolvable | exact | beyond
 
-    def _found(self, *codes: Code) -> set[int]:
+    @cached_property
+    def _codes(self) -> dict[int, Code]:
+        """By label: how graph and path compare."""
         _, findings = self.combined()
-        return {finding.target for finding in findings if finding.code in codes and finding.target is not None}
+        return {finding.target: finding.code for finding in findings if finding.target is not None}
+
+    def _found(self, *codes: Code) -> set[int]:
+        return {target for target, code in self._codes.items() if code in codes}
 
     def _estimates_of(self, graph: GraphSolution | None) -> tuple[ActivationEnergy, ...]:
         if graph is None:

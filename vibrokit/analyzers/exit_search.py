@@ -81,7 +81,7 @@ class ExitSearch:
     def _is_exact(self) -> bool:
         """Whether all exits cost what no path can cost less than, after reversed relaxations were polished."""
         least = {each.target for each in self._least}
-        return self._reversed and bool(least) and least <= dataclasses.replace(self._evidence, graph=None).exact
+        return self._reversed and bool(least) and least <= self._evidence.exact
 
     def mirror(self) -> None:
         """Polish mirror images of known paths; those that leave another attractor take the place of shooting."""

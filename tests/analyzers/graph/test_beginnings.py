@@ -7,7 +7,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.graph.beginnings import beginnings
-from vibrokit.analyzers.graph.hierarchy import HierarchySearch
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.problem import ExitProblem
 

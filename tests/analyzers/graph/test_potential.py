@@ -8,9 +8,10 @@ import pytest
 
 from tests.analyzers.graph import linear
 from vibrokit.analyzers.graph.grids import Grids
-from vibrokit.analyzers.graph.potential import ValueIteration, seeds
+from vibrokit.analyzers.graph.seeds import seeds
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.tracing import backtrack
+from vibrokit.analyzers.graph.value_iteration import ValueIteration
 from vibrokit.kernels.rk4 import RK4
 
 STEP = np.pi / 4

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from vibrokit.analyzers.graph.hierarchy import HierarchySearch
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.paths.candidate import Candidate

@@ -63,6 +63,10 @@ class Grids:
         index: Array = (states[..., :2] - self.boxes[phase, :, 0]) / self.spacing(phase)
         return index
 
+    def nearest(self, phase: int, states: Array) -> NDArray[np.int64]:
+        """Return the indices of the nearest nodes to states (…, ≥ 2), as if there were nodes everywhere, (…, 2)."""
+        return np.rint(self.index(phase, states)).astype(np.int64)
+
     def states(self, phase: int, index: Array) -> Array:
         """Return the states at fractional indices (…, 2)."""
         states: Array = self.boxes[phase, :, 0] + index * self.spacing(phase)

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 import numpy as np
 
 from vibrokit.analyzers.graph.beginnings import beginnings
-from vibrokit.analyzers.graph.hierarchy import HierarchySearch, TargetEstimate
+from vibrokit.analyzers.graph.hierarchy import TargetEstimate
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.solution import GraphSolution
