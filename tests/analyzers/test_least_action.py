@@ -122,9 +122,8 @@ def test_all_work_belongs_to_a_named_stage(structure):
     seconds = dict(work.run(OSC, structure).stats.seconds)
     rest = seconds.pop("LeastAction")
     assert set(seconds) - {"compiling"} == {
-        "reversed relaxation", "exit targets", "graph", "starts of exit paths", "action plot", "closest approach",
-            "ends of exit paths",
-        "polishing", "certifying",
+        "reversed relaxation", "exit targets", "graph", "starts of exit paths", "cells of the basins", "action plot",
+        "closest approach", "ends of exit paths", "polishing", "certifying",
     }  # fmt: skip
     assert rest < 0.05 * sum(seconds.values())
 

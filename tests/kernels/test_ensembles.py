@@ -1,9 +1,6 @@
 """Ensembles: paused and continued, at parts of the period, sections kept, and the tests that end a trajectory."""
 
-import concurrent.futures
 import functools
-import multiprocessing
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -11,7 +8,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.kernels import ensemble
-from vibrokit.kernels.ensemble import Stop, carry, run_ensemble
+from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, LEFT_REGION, REACHED
 from vibrokit.kernels.streams import streams_of
 from vibrokit.kernels.template import fitting
@@ -357,50 +354,3 @@ def test_states_of_another_flow_are_refused(flow):
     """A kernel would read and write beyond them."""
     with pytest.raises(ValueError, match=r"shape \(count, \d+\), got \(3, 5\)"):
         run_ensemble(impacting(), flow, RK, np.zeros((3, 5)))
-
-
-def _nested(number):
-    return sum(carry(abs, [(-number,), (-1,)]))
-
-
-def test_tasks_of_tasks_do_not_wait_for_themselves():
-    """More tasks than threads, each of which has tasks of its own."""
-    assert list(carry(_nested, [(number,) for number in range(50)])) == [number + 1 for number in range(50)]
-
-
-class _Losing(ThreadPoolExecutor):
-    """Threads whose results are lost with one of several errors, the first times a task is submitted."""
-
-    def __init__(self, losses):
-        super().__init__(2)
-        self.losses, self.submitted = losses, {}
-
-    def submit(self, work, *task):
-        number = self.submitted[task] = self.submitted.get(task, 0) + 1
-        if number > self.losses:
-            return super().submit(work, *task)
-        lost = concurrent.futures.Future()
-        if len(self.submitted) % 2:
-            lost.cancel()
-            lost.set_running_or_notify_cancel()
-        else:
-            lost.set_exception(ValueError("lost on the way"))
-        return lost
-
-
-def test_a_lost_task_is_submitted_a_second_time():
-    tasks = [(number,) for number in range(-5, 0)]
-    with _Losing(1) as executor:
-        assert list(carry(abs, tasks, executor)) == [5, 4, 3, 2, 1]
-        assert set(executor.submitted.values()) == {2}
-    with _Losing(2) as executor, pytest.raises((concurrent.futures.CancelledError, ValueError)):
-        list(carry(abs, tasks, executor))
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no fork here")
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_forked_process_has_threads_of_its_own():
-    tasks = [(-1,), (-2,)]
-    assert list(carry(abs, tasks)) == [1, 2]  # starts the threads
-    with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
-        assert pool.submit(_nested, 3).result(timeout=60) == 4

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import concurrent.futures as futures
 import contextlib
-import contextvars
 import dataclasses
-import functools
-import os
-import sys
-import threading
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,8 +14,9 @@ from numpy.typing import NDArray
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.tasks import carry, processors
 from vibrokit.parts.scene import Scene
-from vibrokit.progress import TRAJECTORIES, Work, advance, count, opened
+from vibrokit.progress import TRAJECTORIES, advance, count
 from vibrokit.symbolic.flow_kind import Flow
 
 _BLOCK = 2048
@@ -193,8 +189,7 @@ def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    workers = os.cpu_count() or 1
-    size = min(_BLOCK, max(_SMALLEST_BLOCK, -(-count // (4 * workers))))
+    size = min(_BLOCK, max(_SMALLEST_BLOCK, -(-count // (4 * processors()))))
     size = -(-size // _SMALLEST_BLOCK) * _SMALLEST_BLOCK
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
@@ -238,64 +233,3 @@ def advance_block(
 def _plain(array: Array, kind: type) -> Array:
     """The same numbers, contiguous and writable: Numba would compile again for other arrays."""
     return np.require(array, kind, ("C", "W"))
-
-
-def carry(
-    work: Callable[..., Any], tasks: list[tuple[Any, ...]], executor: futures.Executor | None = None
-) -> Generator[Any, None, None]:
-    """Yield ``work(*task)`` for each task, in order. Closing the generator starts no more tasks.
-
-    Without an executor the threads of this process do the tasks. A single task, and those of a task that a thread
-    already does, are done by the caller: handing over costs more than most of them, and a thread that waited for others
-    could wait for itself. A task that fails in an executor is submitted a second time: workers can be lost, also while
-    they return a result.
-    """
-    if executor is None and (len(tasks) == 1 or _inside.thread):
-        for task in tasks:
-            yield work(*task)
-        return
-    workers = executor or _threads()
-    pending = [workers.submit(_counted_apart, work, task) for task in tasks]
-    try:
-        for number, future in enumerate(pending):
-            if executor is not None:
-                futures.wait((future,))
-                if future.cancelled() or future.exception():
-                    pending[number] = future = workers.submit(_counted_apart, work, tasks[number])
-            result, counts = future.result()
-            count(**counts)
-            yield result
-    finally:
-        for future in pending:
-            future.cancel()
-        if executor is None:
-            futures.wait(pending)
-
-
-class _Inside(threading.local):
-    """Whether this thread is one of those that do tasks."""
-
-    thread = False
-
-
-_inside = _Inside()
-
-
-@functools.cache
-def _threads() -> futures.ThreadPoolExecutor:
-    """Return the threads of this process, which are kept: starting them would take longer than most ensembles."""
-    return futures.ThreadPoolExecutor(os.cpu_count(), initializer=lambda: setattr(_inside, "thread", True))
-
-
-if sys.platform != "win32":
-    os.register_at_fork(after_in_child=_threads.cache_clear)  # a child has none of its parent's threads
-
-
-def _counted_apart(work: Callable[..., Any], task: tuple[Any, ...]) -> tuple[Any, Mapping[str, int]]:
-    """Do a task, in whatever thread or process; return its result and what it counted."""
-
-    def counted() -> tuple[Any, Mapping[str, int]]:
-        with opened(Work()) as own:
-            return work(*task), dict(own.counts)
-
-    return contextvars.Context().run(counted)  # an executor may run it in the calling thread

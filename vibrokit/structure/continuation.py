@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
 from vibrokit.progress import Progress, Work, advance, stage, working

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import LOCATED, ensemble_stepper, single_stepper
-from vibrokit.kernels.ensemble import carry, compiled_kernel, run_ensemble
+from vibrokit.kernels.ensemble import compiled_kernel, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.tasks import carry
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance

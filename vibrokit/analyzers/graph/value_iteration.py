@@ -13,8 +13,8 @@ from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.seeds import seeds
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.sweeps import evaluate_rows, sweep_rows
+from vibrokit.kernels.tasks import carry
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
 

@@ -24,7 +24,9 @@ LONG_ENOUGH = 1e-6
 """Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
-_FROM_MOMENTA = 60  # evaluations for a candidate with momenta: paths that converge need no more
+_FROM_NEAR = (
+    60  # evaluations for a candidate with momenta, or a longer one of a known path: those that converge need no more
+)
 _FROM_EXACT = 12  # for one that is a path but for its ends: those that converge need 3 to 6
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
@@ -99,7 +101,7 @@ class PathSolver:
         It stays at the candidate, while descent may end at a cheaper path; between stiff stops descent often fails.
         Raises StructureError if no way converges.
         """
-        return self._at_once(cuts, _FROM_MOMENTA)
+        return self._at_once(cuts, _FROM_NEAR)
 
     def solve_exact(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish, as `solve_at_once` does, a candidate that is a path but for its ends: in few evaluations or not."""
@@ -139,13 +141,19 @@ class PathSolver:
             return fallback(error, found.action)
 
     def _descended(
-        self, source: LinearizedOrbit, first: int, cut: Cut, points: Array, iterations: int = MANY_ITERATIONS
+        self,
+        source: LinearizedOrbit,
+        first: int,
+        cut: Cut,
+        points: Array,
+        iterations: int = MANY_ITERATIONS,
+        evaluations: int = MOST_EVALUATIONS,
     ) -> ExtremalPath:
         points, _ = descend_action(
             self.propagator, first, points,
             last=cut.last, free=cut.ending.free, closing=cut.ending.closing, iterations=iterations,
         )  # fmt: skip
-        return self._shot(source, first, points, cut)
+        return self._shot(source, first, points, cut, evaluations)
 
     def _shot(
         self,
@@ -172,7 +180,8 @@ class PathSolver:
             states = np.concatenate([source.along(first - added, added), points[:, : propagator.size]])
             try:
                 longer, _ = gauss_newton(propagator, first - added, states, cut.last, cut.ending.free)
-                found = self._descended(source, first - added, cut, longer)
+                evaluations = MOST_EVALUATIONS if best is None else _FROM_NEAR
+                found = self._descended(source, first - added, cut, longer, evaluations=evaluations)
                 found = _within(propagator, found, _RADIUS * found.extent)
                 solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)
             except StructureError:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
@@ -27,6 +28,7 @@ _COMPETING = 0.01  # of the least action: at ΔU/D = 100 such a path still carri
 _FLAT = 1e-3  # sine of the angle between the manifolds
 _ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
 _ORBITS = 2  # inside an attractor from which paths are polished to ends that no candidate led to
+_UNRESOLVED = 0.01  # of a candidate's action: where its path costs less, the action was an error of the search
 _EQUAL = 1e-5  # relative difference of the actions of paths that differ only in where inside a set they start
 
 
@@ -43,12 +45,26 @@ class Shared:
     """What the paths from several orbits inside one attractor share.
 
     A candidate is polished from two orbits, and from another one as long as it leads to something new: motion inside
-    the attractor is free, so that most paths differ in their beginnings only.
+    the attractor is free, so that most paths differ in their beginnings only. Where a path costs next to nothing, so do
+    those from other orbits, which can take long to converge; no other one is tried.
     """
 
     orbits: int = 0
     solved: list[SolvedPath] = dataclasses.field(default_factory=list)  # those kept
     fruitless: set[tuple[int, bytes]] = dataclasses.field(default_factory=set)  # candidates
+    free: set[int] = dataclasses.field(default_factory=set)  # labels of attractors that paths cost next to nothing to
+
+    def note(self, candidate: Candidate, found: Sequence[SolvedPath], number: int) -> None:
+        """Note what a candidate has led to from the orbit of a number, 0 for the first."""
+        unresolved = [one for one in found if one.action < _UNRESOLVED * candidate.action]
+        for one in unresolved:
+            self.free |= set(one.targets)
+        if unresolved or (number and not any(map(self.is_new, found))):
+            self.fruitless.add(_key(candidate))
+
+    def wants(self, end: PathEnd, number: int) -> bool:
+        """Whether to look for a path to an end that no candidate led to, from the orbit of a number."""
+        return number < _ORBITS and not (number and self.free >= set(end.targets))
 
     def is_new(self, one: SolvedPath) -> bool:
         """Whether no orbit has led to the same path, as far as its beginning does not matter."""
@@ -103,14 +119,14 @@ class Polishing:
                     if _key(candidate) not in self._shared.fruitless:
                         before = len(self._polisher.solved)
                         self._polisher.polish(candidate, quick=quick)
-                        if self._number and not any(map(self._shared.is_new, self._polisher.solved[before:])):
-                            self._shared.fruitless.add(_key(candidate))
+                        self._shared.note(candidate, self._polisher.solved[before:], self._number)
                     advance()
                 self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
                 if not quick:
                     self._polisher.polish_the_rest()
-                    for end in self._ends if self._number < _ORBITS else ():
-                        self._polisher.reach(end, self._waiting)
+                    for end in self._ends:
+                        if self._shared.wants(end, self._number):
+                            self._polisher.reach(end, self._waiting)
                     self._waiting = []
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))

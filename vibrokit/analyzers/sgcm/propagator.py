@@ -18,8 +18,8 @@ from vibrokit.analyzers.sgcm.density_flow import ABSORBED, DensityFlow, Leg
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.errors import SceneError
-from vibrokit.kernels.ensemble import carry
 from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
+from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.noise.noise_model import NoiseModel
 

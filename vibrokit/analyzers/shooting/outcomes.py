@@ -13,6 +13,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION
+from vibrokit.progress import stage
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.symbolic.flow_kind import Flow
@@ -23,6 +24,7 @@ _BATCH = 256
 _PARTS = 8
 _PATIENCE = 4.0  # times the time in which linear growth takes a path to the exit
 _LEAST_BUDGET = 100
+_MARGIN = 2  # cells of the basins that must agree to confirm an exit, as by default where the basins are found
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -130,7 +132,9 @@ class Shooter:
 
     @cached_property
     def _classifier(self) -> BasinClassifier:
-        return BasinClassifier.of(self.problem.osc, self.problem.structure, self.stepper)
+        known = self.problem.structure
+        with stage("cells of the basins"):
+            return BasinClassifier.of(self.problem.osc, known, self.stepper).sharing(known.basins, _MARGIN)
 
     @cached_property
     def _stop(self) -> Stop:

@@ -1,0 +1,130 @@
+"""Carries out tasks, by the calling thread together with others of this process, or by any executor."""
+
+from __future__ import annotations
+
+import collections
+import concurrent.futures as futures
+import contextlib
+import contextvars
+import functools
+import os
+import sys
+import threading
+from collections.abc import Callable, Generator, Mapping
+from typing import Any
+
+from vibrokit.progress import Work, count, opened
+
+Task = tuple[Any, ...]
+
+
+def carry(
+    work: Callable[..., Any], tasks: list[Task], executor: futures.Executor | None = None
+) -> Generator[Any, None, None]:
+    """Yield ``work(*task)`` for each task, in order. Closing the generator starts no more tasks.
+
+    Without an executor the caller does the tasks together with threads of this process. It does a single task, and
+    those of a task of its own, alone: handing over costs more than most of them. A task that fails in an executor is
+    submitted a second time: workers can be lost, also while they return a result.
+    """
+    if executor is not None:
+        found = _submitted(work, tasks, executor)
+    elif len(tasks) == 1 or _inside.task:
+        found = ((work(*task), {}) for task in tasks)
+    else:
+        found = _together(work, tasks)
+    with contextlib.closing(found):
+        for result, counts in found:
+            count(**counts)
+            yield result
+
+
+def _submitted(
+    work: Callable[..., Any], tasks: list[Task], executor: futures.Executor
+) -> Generator[tuple[Any, Mapping[str, int]], None, None]:
+    """The results and counts of tasks that an executor does."""
+    pending = [executor.submit(_counted_apart, work, task) for task in tasks]
+    try:
+        for number, future in enumerate(pending):
+            futures.wait((future,))
+            if future.cancelled() or future.exception():
+                pending[number] = future = executor.submit(_counted_apart, work, tasks[number])
+            yield future.result()
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+def _together(work: Callable[..., Any], tasks: list[Task]) -> Generator[tuple[Any, Mapping[str, int]], None, None]:
+    """The results and counts of tasks that the caller and other threads do, each the next one when it is free.
+
+    The caller would else be woken for each result, which takes as long as many a task.
+    """
+    waiting = collections.deque(range(len(tasks)))
+    results = [futures.Future[Any]() for _ in tasks]
+
+    def do_next() -> bool:
+        try:
+            number = waiting.popleft()
+        except IndexError:
+            return False
+        outer, _inside.task = _inside.task, True
+        try:
+            results[number].set_result(_counted_apart(work, tasks[number]))
+        except BaseException as error:
+            results[number].set_exception(error)
+            if not isinstance(error, Exception):  # an interrupt does not wait for its turn
+                raise
+        finally:
+            _inside.task = outer
+        return True
+
+    def help_out() -> None:
+        while do_next():
+            pass
+
+    helpers = [_threads().submit(help_out) for _ in range(min(processors(), len(tasks)) - 1)]
+    try:
+        for result in results:
+            while not result.done() and do_next():
+                pass
+            yield result.result()
+    finally:
+        waiting.clear()
+        if not all(result.done() for result in results):
+            futures.wait([helper for helper in helpers if not helper.cancel()])
+
+
+class _Inside(threading.local):
+    """Whether this thread is doing a task."""
+
+    task = False
+
+
+_inside = _Inside()
+
+
+@functools.cache
+def processors() -> int:
+    """Return the number of processors, which the system is asked for once: each time takes as long as a short task."""
+    return os.cpu_count() or 1
+
+
+@functools.cache
+def _threads() -> futures.ThreadPoolExecutor:
+    """Return the threads of this process, which are kept: starting them would take longer than most ensembles."""
+    return futures.ThreadPoolExecutor(processors())
+
+
+if sys.platform != "win32":
+    os.register_at_fork(after_in_child=_threads.cache_clear)  # a child has none of its parent's threads
+
+
+def _counted_apart(work: Callable[..., Any], task: Task) -> tuple[Any, Mapping[str, int]]:
+    """Do a task, in whatever thread or process; return its result and what it counted."""
+
+    def counted() -> tuple[Any, Mapping[str, int]]:
+        with opened(Work()) as own:
+            return work(*task), dict(own.counts)
+
+    return contextvars.Context().run(counted)  # it may run in the calling thread
