@@ -20,7 +20,7 @@ from vibrokit.progress import TRAJECTORIES, advance, count
 from vibrokit.symbolic.flow_kind import Flow
 
 _BLOCK = 2048
-_SMALLEST_BLOCK = 64
+_SMALLEST_BLOCK, _MANY_INTERVALS = 64, 16  # half as many for that many intervals, each worth more than handing over
 
 Array = NDArray[Any]
 
@@ -162,7 +162,7 @@ def run_ensemble(
     test = stop or Stop()
     tasks = [
         (kernel, starts[block], budgets[block], common, known[block], begun[block], test, visits, keep)
-        for block in _blocks(len(starts))
+        for block in _blocks(len(starts), int(np.max(budgets, initial=0)))
     ]
     steps, parts = stepper.steps_in(scene, span), []
     with contextlib.closing(carry(advance_block, tasks, executor)) as blocks:
@@ -188,9 +188,10 @@ def compiled_kernel(scene: Scene, flow: Flow, stepper: Stepper) -> Kernel:
     return kernel
 
 
-def _blocks(count: int) -> Iterator[slice]:
-    size = min(_BLOCK, max(_SMALLEST_BLOCK, -(-count // (4 * processors()))))
-    size = -(-size // _SMALLEST_BLOCK) * _SMALLEST_BLOCK
+def _blocks(count: int, intervals: int) -> Iterator[slice]:
+    smallest = _SMALLEST_BLOCK // (2 if intervals >= _MANY_INTERVALS else 1)
+    size = min(_BLOCK, max(smallest, -(-count // (4 * processors()))))
+    size = -(-size // smallest) * smallest
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
 

@@ -124,6 +124,12 @@ class Code(StrEnum):
         "No orbit was found on the boundary between {state} and {goal}: edge tracking lost the boundary.",
         "Refine the basin grid.",
     )  # fmt: skip
+    EDGE_BUDGET = (
+        "edge-budget", WARNING,
+        "{count} basin boundaries were not followed to a saddle: classifying states next to them takes more than "
+        "{budget:.1e} section-map iterations.",
+        "Set edge_budget, an argument of find_structure, to more, or search on a smaller region.",
+    )  # fmt: skip
     LARGE_RESIDUAL = (
         "large-residual", WARNING, "The largest residual of an unstable orbit is {residual:.1e}, above {accepted:g}.",
         _FINER_STEPPER,

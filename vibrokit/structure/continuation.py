@@ -116,7 +116,7 @@ def continuation(
     chosen = stepper_of(stepper)
     check_means(osc, chosen, executor)
     entry, numbers = followed_parameter("continuation", osc, parameter), ordered_values("continuation", values)
-    request = Request(region, cells, 0, None, starts, 0.5, None, False, False, chosen, seed_of(rng))
+    request = Request(region, cells, 0, None, starts, 0.5, None, None, False, False, chosen, seed_of(rng))
     with working(progress, time_limit) as work:
         run = _Run(osc, entry, numbers.tolist(), request, executor)
         run.run()

@@ -25,6 +25,7 @@ def find_structure(
     starts: tuple[int, int] = (24, 24),
     settling: float = 1e-3,
     budget: int | None = None,
+    edge_budget: int | None = None,
     saddles: bool = True,
     manifolds: bool = True,
     stepper: Stepper | str | None = None,
@@ -67,6 +68,10 @@ def find_structure(
     budget : int, optional
         Largest number of periods that a trajectory is followed; by default it depends on the damping, and on the
         lifetime of chaotic transients if there are some.
+    edge_budget : int, optional
+        Largest number of iterations of the section map that classify states next to basin boundaries, to follow these
+        to their saddles; once with the help of the basin grid, and once without where that finds none. By default 10⁷,
+        or fewer where a section takes more than 500 steps: 10 to 20 s on two processors.
     saddles, manifolds : bool
         Whether to search for them. Manifolds need saddles.
     stepper : Stepper or str, optional
@@ -95,7 +100,7 @@ def find_structure(
     chosen = stepper_of(stepper)
     check_means(osc, chosen, executor)
     request = Request(
-        region, cells, refine, margin, starts, settling, budget, saddles, manifolds, chosen, seed_of(rng)
+        region, cells, refine, margin, starts, settling, budget, edge_budget, saddles, manifolds, chosen, seed_of(rng)
     )  # fmt: skip
     with working(progress, time_limit) as work:
         finder = Finder(osc, request, executor)

@@ -41,6 +41,7 @@ _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
 _EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a motion on a boundary converges to its saddle
+_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS, _STEPS_LOCATED = 10**7, 5 * 10**9, 1000  # of edge tracking: 10 to 20 s
 _SEARCH_SETTLING = 1e-3
 _CLEAR = 0.25  # of the distance between two equilibria
 _MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
@@ -163,9 +164,15 @@ class Finder:
         basins = self.grid.basins
         sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
         self.saddle_search = SaddleSearch(
-            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or 2
-        )
+            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or 2,
+            budget=self.request.edge_budget or self._edge_budget(),
+        )  # fmt: skip
         self.saddle_search.run(self.rng)
+
+    def _edge_budget(self) -> int:
+        """Sections for edge tracking; a section takes as long as its steps, and by located contacts as long as 10³."""
+        steps = self.stepper.steps_in(self.osc, self.osc.section_interval) or _STEPS_LOCATED
+        return min(_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS // steps)
 
     def _grow_manifolds(self) -> None:
         """Grow the manifolds of each saddle that is an orbit."""

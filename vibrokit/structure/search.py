@@ -48,6 +48,7 @@ _SAMPLE = 4096  # points of a set that never repeats
 _FAILURES = 8  # states without a limit cycle after which the search for cycles ends
 _REFINEMENTS = 4  # of a stepper, until every attractor persists with it
 _LONG_PERIODS, _FEW_PERIODS, _MANY_TURNS = 512, 8, 8192  # for which that must; units of 2π/ω_n
+_LASTING = 2000  # periods for which other attractors must
 _LONGEST_CYCLE = 50  # units of 2π/ω_n
 
 Array = NDArray[np.float64]
@@ -247,22 +248,29 @@ def _is_on(orbit: Array, point: Array) -> bool:
 def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> Stepper:
     """Return a stepper, refined until every attractor persists with it within some distances, at most four times."""
     for _ in range(_REFINEMENTS):
-        if all(_persists(osc, attractor, stepper, distances) for attractor in attractors):
+        if _persist(osc, attractors, stepper, distances):
             break
         stepper = stepper.refined()
     return stepper
 
 
-def _persists(osc: Oscillator, attractor: Attractor, stepper: Stepper, distances: Array) -> bool:
-    """Whether motion that starts on an attractor is on it after a long time."""
-    states, periods = attractor.points[:1], 2000
-    if attractor.kind == "limit cycle":
-        (end,) = run_ensemble(osc, Flow.STATE, stepper, states, periods).states
-        return _is_on(attractor.orbit, end)
-    if attractor.repeats:
-        known, periods = attractor.points, _lasting(osc) * attractor.period
-    else:
-        known, states = attractor.points, attractor.points[:: max(1, len(attractor.points) // _WATCHED)]
-    ends = run_ensemble(osc, Flow.STATE, stepper, states, periods).states[:, :2]
-    distance = np.linalg.norm((ends[:, None] - known[None, :, :2]) / distances, axis=2).min(axis=1)
-    return bool(np.mean(distance <= 2.0) > 0.9)
+def _persist(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> bool:
+    """Whether motions that start on attractors, all followed together, are on them after a long time."""
+    starts = [known.points[: 1 if known.repeats else None : _every(known)] for known in attractors]
+    periods = [_lasting(osc) * known.period if known.is_fixed else _LASTING for known in attractors]
+    counts = [len(states) for states in starts]
+    ends = run_ensemble(osc, Flow.STATE, stepper, np.concatenate(starts), np.repeat(periods, counts)).states
+    each = zip(attractors, np.split(ends, np.cumsum(counts)[:-1]), strict=True)
+    return all(_is_still_on(known, end, distances) for known, end in each)
+
+
+def _every(known: Attractor) -> int:
+    return max(1, len(known.points) // _WATCHED)
+
+
+def _is_still_on(known: Attractor, ends: Array, distances: Array) -> bool:
+    """Whether motions (count, n) that started on an attractor are on it."""
+    if known.kind == "limit cycle":
+        return _is_on(known.orbit, ends[0])
+    apart = np.linalg.norm((ends[:, None, :2] - known.points[None, :, :2]) / distances, axis=2).min(axis=1)
+    return bool(np.mean(apart <= 2.0) > 0.9)

@@ -9,6 +9,7 @@ of label nearest to one end finds sets that are accessible from that basin (Greb
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Container
 
 import numpy as np
@@ -78,7 +79,8 @@ class Straddles:
     They start between neighbouring cells of different labels, distributed over the cells where the labels meet, at most
     `trackers` pairs for each pair of labels. `only` are the pairs of labels to start between, the lower first; by
     default all that meet. Pairs without a change of label between them are dropped. Between two sections they are
-    brought together `parts` times.
+    brought together `parts` times. None are brought together any more once classifying states has taken `budget`
+    sections, or with the first cut so many that more are to be expected.
     """
 
     def __init__(
@@ -89,8 +91,9 @@ class Straddles:
         rng: np.random.Generator,
         only: Container[tuple[int, int]] | None = None,
         parts: int = 1,
+        budget: float = math.inf,
     ) -> None:
-        self.classifier, self.rng = classifier, rng
+        self.classifier, self.rng, self.budget = classifier, rng, budget
         self.parts = _PARTS_OF_A_TURN if classifier.osc.autonomous else parts
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
@@ -103,6 +106,7 @@ class Straddles:
         self.end_labels = np.zeros(self.ends.shape[:2], dtype=np.int64)
         self.numbers = np.arange(len(self.ends))  # of each pair among the initial ones
         self.sections = 0  # that classifications took
+        self._too_long = False
         self.strips: list[Strip] = []  # that hide the boundary
         self._points: list[Array] = []  # at each section, of all pairs
         self._stretches: list[Array] = []
@@ -110,6 +114,11 @@ class Straddles:
 
     def __len__(self) -> int:
         return len(self.ends)
+
+    @property
+    def spent(self) -> bool:
+        """Whether the budget is spent, or is expected to be before the ends are together for the first time."""
+        return self.sections >= self.budget or self._too_long
 
     @property
     def interval(self) -> float:
@@ -169,19 +178,25 @@ class Straddles:
         """Bring the ends of some pairs together, drop pairs that lost the boundary, and record all points."""
         straddling = np.ones(len(self), dtype=bool)
         for _ in range(_MOST_CUTS):
-            if not wide.size:
+            if not wide.size or self.spent:
                 break
+            first, cuts = self.sections == 0, self._cuts(wide)
             shrunk = self._cut(wide)
+            self._too_long |= first and self.sections * cuts > self.budget
             straddling[wide[~shrunk]] = False
             wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * _WIDTH)]
         straddling[wide] = False
         self.keep(straddling)
         self._points.append(self.ends.mean(axis=1))
 
+    def _cuts(self, wide: NDArray[np.intp]) -> float:
+        """Cuts until the ends of some pairs are together."""
+        return math.log(max(1.0, self._widths()[wide].max() / (_TOGETHER * _WIDTH))) / math.log(_pieces(len(wide)))
+
     def _cut(self, wide: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Cut lines into pieces and keep of each a piece whose ends differ; return which lines have one."""
         low, high = self.ends[wide, 0], self.ends[wide, 1]
-        pieces = int(np.clip(_AT_ONCE // len(wide) - 1, _FEWEST_PIECES, _MOST_PIECES))
+        pieces = _pieces(len(wide))
         corners = low[:, None] + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (high - low)[:, None]
         corners[:, -1] = high
         labels = self._labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
@@ -207,6 +222,11 @@ class Straddles:
 
     def _widths(self) -> Array:
         return self.classifier.region.apart(self.ends[:, 1], self.ends[:, 0])
+
+
+def _pieces(lines: int) -> int:
+    """Pieces of each of so many lines between two ends."""
+    return int(np.clip(_AT_ONCE // lines - 1, _FEWEST_PIECES, _MOST_PIECES))
 
 
 def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:

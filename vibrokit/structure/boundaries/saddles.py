@@ -69,7 +69,8 @@ class SaddleSearch:
     `margin` cells inside a basin help it; a boundary on which no saddle is found is followed again without them. There
     are at most `trackers` motions for each pair of basins that meet, six after 32 sections, and two when classifying
     states has taken 10⁶ sections: near a chaotic edge state it takes long. A motion counts as one that does not repeat
-    after `sections`, or earlier if classifying states has taken 10⁶ more since the 128th.
+    after `sections`, or earlier if classifying states has taken 10⁶ more since the 128th. No more than `budget`
+    sections are taken to classify states, with the grid and without; boundaries without a saddle are not followed then.
     """
 
     plain: BasinClassifier
@@ -78,6 +79,7 @@ class SaddleSearch:
     trackers: int = 9
     sections: int = _SOON
     margin: int = 2
+    budget: float = math.inf
 
     def __post_init__(self) -> None:
         self.osc = self.plain.osc
@@ -117,7 +119,7 @@ class SaddleSearch:
         if len(meetings) > len(pairs):
             skipped = len(meetings) - len(pairs)
             self._findings.append(Finding.of(Code.BOUNDARIES_SKIPPED, skipped=skipped, total=len(meetings)))
-        tracked = 0
+        tracked, spent = 0, False
         with stage("saddles", unit="motions"):
             if self.osc.autonomous:
                 self._add_equilibria()
@@ -125,15 +127,19 @@ class SaddleSearch:
             known = {pair for pair in self._explained if min(pair) >= 0} if self.osc.model.relaxes else set()
             unexplained = pairs - known
             for shared in (True, False):
-                if unexplained:
+                if unexplained and not spent:
                     classifier = self.classifier if shared else self.plain
                     each = max(2, min(self.trackers, most // len(unexplained)))
                     straddles = self._straddles(classifier, each, rng, unexplained)
                     self._follow(straddles, tracked)
                     self._look_into_strips(straddles)
                     tracked += len(straddles.origins)
+                    spent = straddles.spent
                 unexplained = pairs - self._explained
-        self._lost = tuple(sorted(unexplained))
+        if unexplained and spent:
+            self._findings.append(Finding.of(Code.EDGE_BUDGET, count=len(unexplained), budget=self.budget))
+        else:
+            self._lost = tuple(sorted(unexplained))
 
     def _straddles(
         self, classifier: BasinClassifier, each: int, rng: np.random.Generator, only: set[Pair]
@@ -141,10 +147,10 @@ class SaddleSearch:
         """Start motions, and bring their sides together as often between two sections as they separate fast."""
         parts = 1
         while True:
-            straddles = Straddles(classifier, self.basins, each, rng, only=only, parts=parts)
+            straddles = Straddles(classifier, self.basins, each, rng, only=only, parts=parts, budget=self.budget)
             for _ in range(straddles.parts):
                 straddles.advance()
-            if not straddles.too_fast:
+            if straddles.spent or not straddles.too_fast:
                 return straddles
             parts *= 2
 
@@ -172,7 +178,7 @@ class SaddleSearch:
         tries = np.zeros(motions, dtype=np.int64)
         parts, most_sections = straddles.parts, np.inf
         for step in range(1, self.sections * parts + 1):
-            if not len(straddles) or straddles.sections > most_sections:
+            if not len(straddles) or straddles.spent or straddles.sections > most_sections:
                 break
             if step > parts:  # the first section was for finding how many parts are needed
                 straddles.advance()
@@ -186,7 +192,8 @@ class SaddleSearch:
                 most = _FEW if straddles.sections < _MANY_SECTIONS else _FEWEST
                 straddles.keep(_first_few(straddles.end_labels, most))
             report(tracked + motions - len(straddles))
-        self._describe_wandering(straddles)
+        if not straddles.spent:
+            self._describe_wandering(straddles)
         report(tracked + motions)
 
     def _look_into_strips(self, straddles: Straddles) -> None:

@@ -113,9 +113,10 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     direction *= np.copysign(1.0, direction[np.flatnonzero(direction)[0]])
     growth = np.clip(np.abs(orbit.multipliers).max(), 2.0, _LARGEST_DEPARTURE / away)
     distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
-    sides = [classifier.labels(orbit.point + side * distances[:, None] * direction) for side in (-1, 1)]
-    first, second = _label_of_each(*sides)
-    reached = np.unique(np.concatenate(sides))
+    along = np.concatenate([-distances, distances])
+    labels = classifier.labels(orbit.point + along[:, None] * direction)  # together, which takes as long as one side
+    first, second = _label_of_each(labels[:_ON_A_BRANCH], labels[_ON_A_BRANCH:])
+    reached = np.unique(labels)
     others = [int(label) for label in reached[settled(reached)] if label not in (first, second)]
     return (first, second, *others)
 
