@@ -130,6 +130,20 @@ def test_a_candidate_is_polished_from_two_of_several_orbits_that_lead_to_the_sam
     assert [len(one.polished().branches) for one in several] == [paths, 0, 0, 0]
 
 
+def test_where_a_path_costs_next_to_nothing_no_other_orbit_is_tried(problem):
+    """The candidate has a thousand times the action of its path: it showed no more than the error of its grid."""
+    (well,), shared = equilibria(problem.scene, -1.5, -0.5), Shared()
+    several, iterations = [Polishing(problem, well, shared) for _ in range(3)], []
+    (path,) = polish(problem, (guess(straight()),)).branches
+    for one in several:
+        with working() as work:
+            one.add((guess(straight(), 1000 * path.value),))
+        iterations.append(work.stats.newton_iterations)
+    assert iterations[0] > 0
+    assert iterations[1:] == [0, 0]
+    assert [len(one.polished().branches) for one in several] == [1, 0, 0]
+
+
 NOWHERE = {
     "never away": np.tile([-1.0, 0.0], (9, 1)),
     "one state": [[-1.0, 0.0]],

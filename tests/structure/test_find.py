@@ -11,6 +11,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.grid import cell_findings
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.search import persistent_stepper
 
 
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
@@ -33,6 +34,21 @@ def test_the_clear_state_is_the_linear_response(paper):
     orbit = refine_orbit(osc, structure.attractors[0].points[0], 1, vk.RK4(8192))
     np.testing.assert_allclose(orbit.point, exact, atol=1e-12)
     np.testing.assert_allclose(structure.attractors[0].points[0], exact, atol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::vibrokit.kernels.choice.CoarseStepsWarning", "ignore:overflow:RuntimeWarning")
+@pytest.mark.parametrize("which", [slice(None), slice(1, None)], ids=["both", "hammering"])
+def test_steps_are_refined_until_all_attractors_persist(paper, which):
+    """With 16 steps, motion that starts on the hammering state diverges; the clear state persists."""
+    osc, structure = paper
+    kept, distances = structure.attractors[which], 1e-3 * structure.basins.region.widths
+    clear = structure.attractors[:1]
+    assert persistent_stepper(osc, clear, vk.RK4(16), distances) == vk.RK4(16)
+    found = persistent_stepper(osc, kept, vk.RK4(16), distances)
+    assert 16 < found.steps <= 256
+    for attractor in kept:
+        (end,) = osc.section_map(attractor.points[:1], 512, stepper=found)
+        assert np.linalg.norm((end - attractor.points[0]) / distances) <= 2
 
 
 def test_labels_are_where_the_flow_leads(paper):
@@ -104,6 +120,7 @@ def test_a_budget_too_small_is_said():
     [
         {"cells": 200}, {"cells": (0, 2)}, {"cells": (2.5, 3)}, {"cells": (10**6, 10**6)}, {"starts": None},
         {"starts": (0, 0)}, {"settling": 0}, {"settling": -1.0}, {"settling": "a"}, {"budget": 10**30},
+        {"edge_budget": 0}, {"edge_budget": 1.5}, {"edge_budget": "a"}, {"edge_budget": True},
     ],
     ids=str,
 )  # fmt: skip

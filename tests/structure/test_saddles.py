@@ -365,3 +365,34 @@ def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_stri
     np.testing.assert_allclose(still, saddle.points[0], atol=1e-10)
     slopes = np.column_stack([(moved[0] - moved[1]), (moved[2] - moved[3])]) / (2 * step)
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(slopes)), np.sort(saddle.multipliers.real), rtol=1e-5)
+
+
+class TestEdgeBudget:
+    OSC = vk.load_scene("hertz-0.570")
+
+    def straddles(self, budget):
+        attractors = orbits(self.OSC, (0.3, 0.0), (0.53, -0.04))
+        classifier, basins = settled(self.OSC, attractors, ((-1.2, 1.2), (-1.2, 1.2)))
+        return Straddles(classifier, basins, 9, np.random.default_rng(0), budget=budget)
+
+    def test_boundaries_that_it_is_too_small_for_are_named(self):
+        structure = vk.find_structure(self.OSC, edge_budget=10_000, manifolds=False)
+        assert not structure.saddles
+        (finding,) = structure.found(Code.EDGE_BUDGET)
+        assert finding.values == {"count": 1, "budget": 10_000}
+        others = (Code.BOUNDARY_LOST, Code.CHAOTIC_EDGE, Code.EDGE_NOT_CONVERGED)
+        assert not any(structure.found(code) for code in others)
+        assert structure.settings["edge_budget"] == 10_000
+
+    def test_it_is_not_spent_where_the_first_cut_shows_that_it_is_too_small(self):
+        whole = self.straddles(np.inf)
+        assert not whole.spent
+        assert len(whole)
+        part = self.straddles(whole.sections // 2)
+        assert part.spent
+        assert part.sections < whole.sections / 3
+        assert not len(part)
+
+    def test_one_that_is_large_enough_changes_nothing(self):
+        few, many = (self.straddles(budget) for budget in (1e7, np.inf))
+        assert few.ends.tobytes() == many.ends.tobytes()
