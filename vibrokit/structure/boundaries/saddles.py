@@ -24,15 +24,8 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import PARTS_OF_A_TURN, Equilibrium, equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
-from vibrokit.structure.boundaries.edges import (
-    EdgeTrack,
-    Straddles,
-    almost_repeats,
-    closing,
-    meeting_cells,
-    recurrence,
-    same_place,
-)
+from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, meeting_cells
+from vibrokit.structure.boundaries.returns import almost_repeats, closing, recurrence, same_place
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
 from vibrokit.structure.orbits import EQUAL
 from vibrokit.structure.orbits_inside import orbits_inside
