@@ -28,6 +28,7 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
+from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
 from vibrokit.structure.regions import frame_of, lies_in, search_region, with_barrier_tops, without_copies
@@ -164,7 +165,7 @@ class Finder:
         basins = self.grid.basins
         sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
         self.saddle_search = SaddleSearch(
-            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or 2,
+            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or MARGIN,
             budget=self.request.edge_budget or self._edge_budget(),
         )  # fmt: skip
         self.saddle_search.run(self.rng)

@@ -256,7 +256,7 @@ def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper
 
 def _persist(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> bool:
     """Whether motions that start on attractors, all followed together, are on them after a long time."""
-    starts = [known.points[: 1 if known.repeats else None : _every(known)] for known in attractors]
+    starts = [_starts_on(known) for known in attractors]
     periods = [_lasting(osc) * known.period if known.is_fixed else _LASTING for known in attractors]
     counts = [len(states) for states in starts]
     ends = run_ensemble(osc, Flow.STATE, stepper, np.concatenate(starts), np.repeat(periods, counts)).states
@@ -264,8 +264,9 @@ def _persist(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper,
     return all(_is_still_on(known, end, distances) for known, end in each)
 
 
-def _every(known: Attractor) -> int:
-    return max(1, len(known.points) // _WATCHED)
+def _starts_on(known: Attractor) -> Array:
+    """Return points of an attractor from which to see whether it persists: one if it repeats."""
+    return known.points[:1] if known.repeats else known.points[:: max(1, len(known.points) // _WATCHED)]
 
 
 def _is_still_on(known: Attractor, ends: Array, distances: Array) -> bool:

@@ -85,7 +85,7 @@ def shape_stability(
     searches = {"velocity_kick": (np.array([0.5, 1.5]) * np.pi, 0.0), "any_kick": (angles, 2 * np.pi / directions)}
     found = []
     with working(progress, time_limit), stage("kicks", unit="searches", total=2 * len(structure.attractors)):
-        classifier = classifier.sharing(structure.basins, 2)
+        classifier = classifier.sharing(structure.basins)
         for attractor in structure.attractors:
             kicks: dict[str, Shock | None] = {}
             for name, (tried, width) in searches.items():

@@ -24,9 +24,7 @@ LONG_ENOUGH = 1e-6
 """Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
 FEW_EVALUATIONS = 24
 """Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
-_FROM_NEAR = (
-    60  # evaluations for a candidate with momenta, or a longer one of a known path: those that converge need no more
-)
+_FROM_NEAR = 60  # evaluations for a candidate with momenta, or a longer path; those that converge need no more
 _FROM_EXACT = 12  # for one that is a path but for its ends: those that converge need 3 to 6
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried

@@ -24,7 +24,6 @@ _BATCH = 256
 _PARTS = 8
 _PATIENCE = 4.0  # times the time in which linear growth takes a path to the exit
 _LEAST_BUDGET = 100
-_MARGIN = 2  # cells of the basins that must agree to confirm an exit, as by default where the basins are found
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -134,7 +133,7 @@ class Shooter:
     def _classifier(self) -> BasinClassifier:
         known = self.problem.structure
         with stage("cells of the basins"):
-            return BasinClassifier.of(self.problem.osc, known, self.stepper).sharing(known.basins, _MARGIN)
+            return BasinClassifier.of(self.problem.osc, known, self.stepper).sharing(known.basins)
 
     @cached_property
     def _stop(self) -> Stop:

@@ -20,7 +20,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
-from vibrokit.structure.basins.stop_cells import AttractorMask, core_of, is_extended, mask_of
+from vibrokit.structure.basins.stop_cells import MARGIN, AttractorMask, core_of, is_extended, mask_of
 from vibrokit.structure.basins.wells import wells
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
@@ -118,7 +118,7 @@ class BasinClassifier:
             advance(known - before, CELLS)
         return trajectories.sections
 
-    def sharing(self, basins: Basins, margin: int) -> BasinClassifier:
+    def sharing(self, basins: Basins, margin: int = MARGIN) -> BasinClassifier:
         """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.stop_cells`."""
         core = core_of(self.osc, self.stepper, basins, margin, self.executor)
         trapped = wells(self.osc, self.attractors, self.region, basins.labels.shape)

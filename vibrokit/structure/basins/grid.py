@@ -19,7 +19,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
-from vibrokit.structure.basins.stop_cells import agreeing, centres
+from vibrokit.structure.basins.stop_cells import MARGIN, agreeing, centres
 from vibrokit.structure.search import persistent_stepper
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
@@ -39,7 +39,7 @@ Labels = NDArray[np.int16]
 
 
 def classify_grid(
-    classifier: BasinClassifier, cells: tuple[int, int], *, margin: int | None = 2, refine: int = 0
+    classifier: BasinClassifier, cells: tuple[int, int], *, margin: int | None = MARGIN, refine: int = 0
 ) -> Basins:
     """Label the cells of the classifier's region; parameters as for `BasinGrid`."""
     grid = BasinGrid(classifier, cells, margin=margin, refine=refine)
@@ -58,7 +58,12 @@ class BasinGrid:
     """
 
     def __init__(
-        self, classifier: BasinClassifier, cells: tuple[int, int] | None, *, margin: int | None = 2, refine: int = 0
+        self,
+        classifier: BasinClassifier,
+        cells: tuple[int, int] | None,
+        *,
+        margin: int | None = MARGIN,
+        refine: int = 0,
     ) -> None:
         self._classifier, self._margin, self._refine = classifier, margin, refine
         self._most_sections = math.inf if cells is not None else _MOST_SECTIONS

@@ -20,6 +20,8 @@ from vibrokit.results.region import Region
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
+MARGIN = 2
+"""Cells on every side that must lead to the same attractor for a cell to classify trajectories, by default."""
 _AHEAD = 2  # sections over which a classifying cell must be mapped to classifying cells
 _FINEST = 2048  # cells along one side of the grid
 _COVERED = 0.97  # fraction of one half of a sample that the other half, widened, must contain

@@ -176,9 +176,9 @@ class Straddles:
         for _ in range(_MOST_CUTS):
             if not wide.size or self.spent:
                 break
-            first, cuts = self.sections == 0, self._cuts(wide)
+            cuts = 0.0 if self.sections else self._cuts(wide)
             shrunk = self._cut(wide)
-            self._too_long |= first and self.sections * cuts > self.budget
+            self._too_long |= self.sections * cuts > self.budget
             straddling[wide[~shrunk]] = False
             wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * _WIDTH)]
         straddling[wide] = False

@@ -23,6 +23,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import PARTS_OF_A_TURN, Equilibrium, equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
 from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, meeting_cells
 from vibrokit.structure.boundaries.returns import almost_repeats, closing, recurrence, same_place
@@ -71,7 +72,7 @@ class SaddleSearch:
     orbit_stepper: Stepper
     trackers: int = 9
     sections: int = _SOON
-    margin: int = 2
+    margin: int = MARGIN
     budget: float = math.inf
 
     def __post_init__(self) -> None:
