@@ -95,6 +95,17 @@ def test_attractors_that_are_reached_through_other_basins_are_known():
         assert reached_through_others(problem) == beyond
 
 
+def estimate(target, value, error):
+    return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
+
+
+def graph_of(estimates, finer=0, side=180.0):
+    return SimpleNamespace(estimates=estimates, finer=finer, sides={each.target: side for each in estimates})
+
+
+NEVER_REPEATS = SimpleNamespace(repeats=False)  # its estimates are not calibrated by paths
+
+
 @pytest.mark.parametrize(
     ("finer", "before", "useless"),
     [
@@ -106,14 +117,23 @@ def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer,
     """Each doubling of the nodes divides its error, of 2 here, as the last one did, by 8 at best; half of a path's
     action is too coarse.
     """
+    paths = (estimate(2, 0.01, 0.0), estimate(1, 1.0, 0.0))
+    rougher = None if before is None else graph_of([estimate(each, 1.0, before) for each in (1, 2)], side=90.0)
+    graph = graph_of([estimate(1, 1.0, 2.0), estimate(2, 0.01, 2.0), estimate(3, 1.0, 9.0)], finer)
+    assert Evidence(NEVER_REPEATS, paths, graph, rougher).unresolvable == useless
 
-    def energy(target, value, error):
-        return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
-    attractor, paths = SimpleNamespace(repeats=False), (energy(2, 0.01, 0.0), energy(1, 1.0, 0.0))
-    rougher = None if before is None else SimpleNamespace(estimates=tuple(energy(each, 1.0, before) for each in (1, 2)))
-    graph = SimpleNamespace(finer=finer, estimates=(energy(1, 1.0, 2.0), energy(2, 1.0, 2.0), energy(3, 1.0, 9.0)))
-    assert Evidence(attractor, paths, graph, rougher).unresolvable == useless
+@pytest.mark.parametrize(("side", "useless"), [(45.0, {1}), (90.0, {1}), (160.0, set()), (180.0, set())])
+def test_the_gain_of_a_finer_graph_is_that_of_twice_the_nodes(side, useless):
+    """An error that fell from 12 to 8 falls by (3/2)^(1/doublings) with the next; half of the action is too coarse."""
+    rougher, graph = graph_of([estimate(1, 1.0, 12.0)], side=side), graph_of([estimate(1, 1.0, 8.0)], finer=2)
+    assert Evidence(NEVER_REPEATS, (estimate(1, 1.0, 0.0),), graph, rougher).unresolvable == useless
+
+
+@pytest.mark.parametrize(("finer", "useless"), [(0, {1}), (1, set())])
+def test_a_first_graph_on_grids_far_too_large_for_a_path_tells_nothing_of_finer_ones(finer, useless):
+    graph = graph_of([estimate(1, 1.0, 2.0)], finer)
+    assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph).unresolvable == useless
 
 
 def test_all_work_belongs_to_a_named_stage(structure):

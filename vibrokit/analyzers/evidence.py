@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.graph.hierarchy_search import LOOSE
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.problem import ExitProblem
@@ -76,16 +77,25 @@ class Evidence:
     def unresolvable(self) -> set[int]:
         """Exits with a path that costs so little that even the finest graph would be too coarse.
 
-        The error is expected to fall again as it fell with the last doubling of the nodes.
+        The error is expected to fall again as it fell with the nodes along a side since the last graph.
         """
-        before = {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
         found, finer = set[int](), 0 if self.graph is None else self.graph.finer
         for each in self.estimates:
-            error, path = each.numerical_error, self.cheapest.get(each.target)
-            gain = min(_GAIN, max(1.0, before.get(each.target, math.inf) / error)) if error else _GAIN
-            if path is not None and error / gain**finer > VAGUE * path.value:
+            path = self.cheapest.get(each.target)
+            if path is None or (finer and self.rougher is None and each.value > LOOSE * path.value):
+                continue  # the next grids, around the path, are far smaller
+            if each.numerical_error / self._gain(each) ** finer > VAGUE * path.value:
                 found.add(each.target)
         return found
+
+    def _gain(self, estimate: ActivationEnergy) -> float:
+        """By which the error of an estimate of the graph is expected to fall when the nodes along a side double."""
+        before = {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
+        if self.graph is None or self.rougher is None or estimate.target not in before or not estimate.numerical_error:
+            return _GAIN
+        doublings = math.log2(self.graph.sides[estimate.target] / self.rougher.sides[estimate.target])
+        fell = before[estimate.target] / estimate.numerical_error
+        return min(_GAIN, max(1.0, fell) ** (1 / doublings)) if doublings > 0 else _GAIN
 
     @property
     def graph_error(self) -> float:

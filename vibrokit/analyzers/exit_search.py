@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ import xarray
 
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.evidence import Evidence, reached_through_others
+from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
@@ -46,7 +47,7 @@ class ExitSearch:
         self._rougher: GraphSolution | None = None  # the last one on half as many nodes along each side
         self._mirror = mirror.Mirror(problem)
         self._least = detailed_balance.least_actions(problem)
-        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._settled)
+        self._solutions = iter(()) if analyzer.graph is None else analyzer.graph.solutions(problem, self._known)
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
         self._shots: Search | None = None
         self._searched = self._reversed = False  # whether there are no more solutions, and no more relaxations
@@ -175,8 +176,8 @@ class ExitSearch:
         beyond = frozenset[int]() if self.graph is None else self._beyond
         return Evidence(attractor, branches, self.graph, self._rougher, images, tuple(self._least), beyond)
 
-    def _settled(self) -> Set[int]:
-        return self._evidence.settled(self.analyzer.accuracy)
+    def _known(self) -> KnownPaths:
+        return KnownPaths(self._polished()[0], self._evidence.settled(self.analyzer.accuracy))
 
     def _unpolished(self, evidence: Evidence) -> tuple[ActivationEnergy, ...]:
         """The action plot's energies of exits without a polished path; their errors take time, which may be over."""

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 _MARGIN = 0.1  # of the width of the nodes that a closer grid has to cover, added on each side
 _MARGIN_IN_NODES = 3
 _WIDER = 0.3  # of the width: how much a grid grows at a side
+_FEWEST_NODES = 16  # along a side of the coarse grids
 _EDGE = 3  # nodes at a side that make it grow
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Shape = tuple[int, int]
+"""Nodes in x and in v."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,7 +28,7 @@ class Grids:
     """
 
     boxes: Array  # (phases, 2, 2): bounds of x and of v; the outermost nodes lie on them
-    shape: tuple[int, int]  # nodes in x and in v
+    shape: Shape  # nodes in x and in v
     step: float  # time from phase to phase (s)
     steps: int  # in a section interval
 
@@ -77,7 +80,7 @@ class Grids:
         index = self.index(phase, states)
         return np.all((index >= 1) & (index <= np.array(self.shape) - 2), axis=-1)
 
-    def with_shape(self, shape: tuple[int, int]) -> Grids:
+    def with_shape(self, shape: Shape) -> Grids:
         """Return grids on the same boxes with another number of nodes."""
         return dataclasses.replace(self, shape=shape)
 
@@ -99,14 +102,19 @@ class Grids:
                 boxes[phase, axis, 1] += more[axis] * bool(edge[-_EDGE:].any())
         return self if np.array_equal(boxes, self.boxes) else dataclasses.replace(self, boxes=boxes)
 
-    def zoomed(self, needed: list[Mask]) -> Grids:
-        """Return grids that cover the needed nodes of each phase, with a margin."""
+    def zoomed(self, needed: list[Mask], *, beyond: bool = False) -> Grids:
+        """Return grids that cover the needed nodes of each phase, with a margin, which may lie beyond the edge."""
         boxes = self.boxes.copy()
         for phase, mask in enumerate(needed):
             if mask.any():
                 states = self.nodes(phase)[mask]
                 low, high = states.min(axis=0), states.max(axis=0)
                 margin = _MARGIN * (high - low) + _MARGIN_IN_NODES * self.spacing(phase)
-                boxes[phase, :, 0] = np.maximum(low - margin, boxes[phase, :, 0])
-                boxes[phase, :, 1] = np.minimum(high + margin, boxes[phase, :, 1])
+                closer = np.stack([low - margin, high + margin], axis=1)
+                boxes[phase] = closer if beyond else np.clip(closer, *boxes[phase].T[..., None])
         return dataclasses.replace(self, boxes=boxes)
+
+
+def halved(shape: Shape) -> Shape:
+    """Return half as many nodes along each side, but not very few."""
+    return max(_FEWEST_NODES, shape[0] // 2), max(_FEWEST_NODES, shape[1] // 2)

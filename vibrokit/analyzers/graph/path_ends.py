@@ -44,13 +44,15 @@ def targets_at(end: PathEnd, problem: ExitProblem, model: StepModel) -> list[Exi
 
 @targets_at.register
 def _(end: AtSaddle, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
-    labels = tuple(label for label in end.targets if label >= 0 or label == ESCAPED)
-    if end.embedded or not (end.on_own_boundary and labels):
-        return []
+    return [] if end.embedded or not (end.on_own_boundary and _labels(end)) else [at_saddle(end, problem, model)]
+
+
+def at_saddle(end: AtSaddle, problem: ExitProblem, model: StepModel) -> StateTarget:
+    """Return the exit target that stands for a saddle."""
     saddle = problem.structure.saddles[end.number]
     states = saddle.points[:, :2]
     scale = _straight(problem, model, states)
-    return [StateTarget(labels, end.number, scale, states, direction=_unstable_direction(model, saddle))]
+    return StateTarget(_labels(end), end.number, scale, states, direction=_unstable_direction(model, saddle))
 
 
 @targets_at.register
@@ -74,6 +76,10 @@ def _(end: AtFace, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     distance = (end.level - float(problem.attractor.points[0, end.axis])) * (frequency if end.axis == 0 else 1.0)
     scale = _GENEROUS * distance**2 / (2 * max(1 / frequency, problem.scene.section_interval))
     return [FaceTarget(end.targets[:1], -1, scale, model, end.axis, end.level)]
+
+
+def _labels(end: AtSaddle) -> tuple[int, ...]:
+    return tuple(label for label in end.targets if label >= 0 or label == ESCAPED)
 
 
 def _straight(problem: ExitProblem, model: StepModel, states: Array) -> float:

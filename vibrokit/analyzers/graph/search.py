@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from vibrokit.analyzers.graph.beginnings import beginnings
+from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import TargetEstimate
 from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
+from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.solution import GraphSolution
@@ -100,12 +102,12 @@ class GraphSearch:
         *_, best = self.solutions(problem)
         return best
 
-    def solutions(self, problem: ExitProblem, settled: Callable[[], Set[int]] = frozenset) -> Iterator[GraphSolution]:
+    def solutions(self, problem: ExitProblem, known: Callable[[], KnownPaths] = KnownPaths) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
-        exit has few nodes for one that costs far less. So those that do are solved again without the others. `settled`
-        is called before each number of nodes, and returns labels whose energies need no more.
+        exit has few nodes for one that costs far less. So those that do are solved again without the others. `known` is
+        called before each number of nodes.
         """
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
@@ -122,18 +124,18 @@ class GraphSearch:
         with stage("exit targets", subject=attractor.name):
             search = self._hierarchies(problem)
             targets = exit_targets(problem, search.model)
-        known, refinements = _Known(), list(self._refinements())
+        found, refinements = _Found(), list(self._refinements())
         for number, nodes in enumerate(refinements, start=1):
-            known.finer, done = len(refinements) - number, settled()
-            unsettled = [target for target in targets if not done >= set(target.labels)]
+            found.finer, paths = len(refinements) - number, known()
+            unsettled = [target for target in targets if not paths.settled >= set(target.labels)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for group in both if group]
             for group in groups:
                 try:
-                    yield from _solutions(problem, search, group, nodes, known, last=group is groups[-1])
+                    yield from _solutions(problem, search, group, nodes, paths, found, last=group is groups[-1])
                 except StructureError:  # on few nodes, no exit may be reached
-                    if nodes == self.nodes and not known.estimates:
+                    if nodes == self.nodes and not found.estimates:
                         raise
 
     def beginnings(
@@ -148,7 +150,7 @@ class GraphSearch:
         model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
         return HierarchySearch(problem, model, steps, self.nodes)
 
-    def _refinements(self) -> Iterator[tuple[int, int]]:
+    def _refinements(self) -> Iterator[Shape]:
         """Numbers of nodes from few to those that are set, each twice the one before."""
         nx, nv = self.nodes
         for part in _PARTS:
@@ -179,7 +181,7 @@ class GraphSearch:
 
 
 @dataclasses.dataclass(eq=False)
-class _Known:
+class _Found:
     """What was found so far."""
 
     estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
@@ -191,30 +193,35 @@ def _solutions(
     problem: ExitProblem,
     search: HierarchySearch,
     targets: Sequence[ExitTarget],
-    nodes: tuple[int, int],
-    known: _Known,
+    nodes: Shape,
+    known: KnownPaths,
+    found: _Found,
     *,
     last: bool,
 ) -> Iterator[GraphSolution]:
     """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
-    estimates = known.estimates
-    found, potential = search.estimates(targets, nodes)
-    estimates |= found
-    if known.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
-        known.potential = potential
+    estimates = found.estimates
+    solved, potential = search.estimates(targets, nodes, known)
+    estimates |= solved
+    if found.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
+        found.potential = potential
     for _ in range(_CLOSER):
-        highest = _highest(targets, estimates)
-        targets = [target for target in targets if 0 < estimates[target].value < _FAR_LESS * highest]
+        costs = {target: min(estimates[target].value, known.cost(target)) for target in targets}
+        highest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
+        targets = [target for target in targets if 0 < costs[target] < _FAR_LESS * highest]
         if not targets:
             break
-        yield _solution(problem, search, known, nodes, last=False)
+        yield _solution(problem, search, found, nodes, last=False)
         try:
-            closer, _ = search.estimates(targets, nodes)
+            closer, _ = search.estimates(targets, nodes, known)
         except StructureError:  # too close to the attractor for any grid
             break
-        targets = [target for target in targets if closer[target].error < estimates[target].error]
-        estimates |= {target: closer[target] for target in targets}
-    yield _solution(problem, search, known, nodes, last=last)
+        better = [
+            target for target in closer if target not in estimates or closer[target].error < estimates[target].error
+        ]
+        targets = [target for target in targets if target in better]
+        estimates |= {target: closer[target] for target in better}
+    yield _solution(problem, search, found, nodes, last=last)
 
 
 def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:
@@ -225,18 +232,18 @@ def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, Targe
 def _solution(
     problem: ExitProblem,
     search: HierarchySearch,
-    known: _Known,
-    nodes: tuple[int, int],
+    found: _Found,
+    nodes: Shape,
     *,
     last: bool,
 ) -> GraphSolution:
     """What is known of the targets, put together."""
     reached = [
         (target, estimate)
-        for target, estimate in sorted(known.estimates.items(), key=lambda entry: entry[1].value)
+        for target, estimate in sorted(found.estimates.items(), key=lambda entry: entry[1].value)
         if np.isfinite(estimate.value)
     ]
-    potential, (nx, nv) = known.potential, nodes
+    potential, (nx, nv) = found.potential, nodes
     assert potential is not None
     steps = potential.grids.steps
     used = Finding.of(
@@ -268,8 +275,9 @@ def _solution(
         potential,
         (used, *lost),
         {label: estimate.by_nodes for target, estimate in reversed(reached) for label in target.labels},
+        {label: estimate.side for target, estimate in reversed(reached) for label in target.labels},
         last,
-        known.finer,
+        found.finer,
     )
 
 

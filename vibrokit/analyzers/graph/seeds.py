@@ -52,7 +52,7 @@ def seeds(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Visit:
+class Visit:
     """One point of the orbit: its phase, Σ there, and the derivative M of the step from there."""
 
     phase: int
@@ -62,7 +62,7 @@ class _Visit:
 
 
 def _around_orbit(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
-    visits = _visits(model, attractor, grids)
+    visits = orbit_visits(model, attractor, grids)
     level = max(
         0.5 * float(np.max(np.diag(np.linalg.inv(visit.covariance)) * (_SEED_REACH * grids.spacing(visit.phase)) ** 2))
         for visit in visits
@@ -77,7 +77,8 @@ def _around_orbit(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds
     return Seeds(values, np.array([visit.point for visit in visits]))
 
 
-def _visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[_Visit]:
+def orbit_visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[Visit]:
+    """Return the points of an orbit from phase to phase; raises StructureError if it is not hyperbolic."""
     orbit = refine_orbit(model.scene, attractor.points[0], attractor.period, model.stepper)
     covariance, point = local_potential(model.scene, orbit, model.stepper).covariance, orbit.point
     visits = []
@@ -85,12 +86,12 @@ def _visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[_Visit
         phase = number % grids.phases
         step = model.linear(point[None], grids.time(phase), grids.step)
         slopes = step.derivatives[0]
-        visits.append(_Visit(phase, point, covariance, slopes))
+        visits.append(Visit(phase, point, covariance, slopes))
         point, covariance = step.images[0], slopes @ covariance @ slopes.T + step.covariances[0]
     return visits
 
 
-def _linear_level(model: StepModel, grids: Grids, visits: list[_Visit], level: float) -> float:
+def _linear_level(model: StepModel, grids: Grids, visits: list[Visit], level: float) -> float:
     """Lower a level until the motion on its ellipses is linear in every step; 0 if it never is."""
     levels = level * _LOWER ** np.arange(_LOWERINGS)
     angles = np.linspace(0, 2 * np.pi, _ANGLES, endpoint=False)

@@ -24,6 +24,7 @@ class GraphSolution:
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
     by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
+    sides: Mapping[int, float]  # nodes along a side of the grid that gave it, the geometric mean
     last: bool  # with so many nodes
     finer: int  # how many times the nodes along a side may still be doubled
 

@@ -30,6 +30,9 @@ _IMPROVING = 3
 _WIDE_SEARCHES = 4  # each evaluates up to (2 · 8 + 1)² nodes for every node, many times what following costs
 _CONVERGED = 2e-5  # relative change of the mean of √V over a cycle; 10 times less changes V by at most 0.1 %
 _MOST_PERIODS = 400
+# Cycles whose mean is compared with that of as many before, and how many times the drift between the two their range
+# must be: at most once, where V converges from one side. In a stiff contact V may go round by 1e-4 to 1e-3 for ever.
+_ROUND, _DRIFT = 5, 4.0
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
@@ -80,7 +83,7 @@ class ValueIteration:
     def _improve(self) -> None:
         """Sweep, period by period, until V stays the same even after every node was evaluated once more."""
         active, risen = self._all(), False
-        before, at_rest = self._level(), np.inf
+        levels, at_rest = [self._level()], np.inf
         for period in range(_MOST_PERIODS):
             # V falls, except where it changes between predecessors that cost almost the same: then all must improve.
             improving = risen or period < _CYCLE * _IMPROVING or period % _CYCLE == 0
@@ -88,11 +91,14 @@ class ValueIteration:
             advance(self.sweeps)
             if period % _CYCLE == _CYCLE - 1:
                 level = self._level()
-                if changes == 0 or abs(before - level) <= _CONVERGED * level:
+                if changes == 0 or abs(levels[-1] - level) <= _CONVERGED * level:
                     if abs(at_rest - level) <= _CONVERGED * level:
                         break
                     at_rest, active = level, self._all()
-                risen, before = risen or level > before, level
+                risen = risen or level > levels[-1]
+                levels.append(level)
+                if _goes_round(levels):
+                    break
 
     def _all(self) -> list[Flags]:
         return [np.ones(self.grids.shape, dtype=np.uint8) for _ in range(self.grids.phases)]
@@ -152,6 +158,14 @@ class ValueIteration:
     def _level(self) -> float:
         """Mean of √V on the section, which weights small values: a number that shows whether V has converged."""
         return float(np.mean(np.sqrt(self.values[0])))
+
+
+def _goes_round(levels: Sequence[float]) -> bool:
+    """Whether V changes up and down between predecessors that cost almost the same, and drifts far less than that."""
+    if len(levels) <= 2 * _ROUND:
+        return False
+    earlier, later = levels[-2 * _ROUND : -_ROUND], levels[-_ROUND:]
+    return float(np.ptp(later)) > _DRIFT * abs(float(np.mean(later) - np.mean(earlier)))
 
 
 def _on_nodes(rows: Array, kept: Mask) -> Array:

@@ -1,0 +1,121 @@
+"""Grids around known paths: they hold what costs less, and give the closed form of a tilted double well."""
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.graph.around_paths import AroundPaths
+from vibrokit.analyzers.graph.known_paths import KnownPaths
+from vibrokit.analyzers.graph.path_ends import exit_targets
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
+from vibrokit.structure.scales import doublings_of
+
+TILT, DAMPING, NODES = 0.36, 0.05, (60, 60)
+STEPS = 8
+
+
+def potential(x):
+    return x**4 / 4 - x**2 / 2 - TILT * x
+
+
+LEFT, TOP, _ = np.sort(np.roots([1, 0, -1, -TILT]).real)
+EXACT = 4 * DAMPING * (potential(TOP) - potential(LEFT))  # ΔU = 4 ζ ω_n ΔE, the paper's equation for detailed balance
+
+
+@functools.cache
+def problem():
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=DAMPING, spring=vk.CubicSpring(-1.0, 1.0),
+        excitations=(vk.Constant(TILT),), noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    label = int(np.argmin([attractor.points[0, 0] for attractor in structure.attractors]))
+    return ExitProblem(osc, structure, structure.attractors[label], vk.LeaveBasin())
+
+
+@functools.cache
+def branches():
+    return vk.LeastAction(source=problem().source).run(problem().osc, problem().structure).branches
+
+
+@functools.cache
+def coverage(scale=1.0):
+    """Around the paths that are known, or one of another action."""
+    model = StepModel(problem().scene, vk.RK4(256))
+    known = [dataclasses.replace(branch, value=scale * branch.value) for branch in branches()]
+    return AroundPaths(problem(), model, tuple(exit_targets(problem(), model)), known)
+
+
+def steps():
+    return STEPS * 2 ** doublings_of(problem().scene)
+
+
+def test_the_first_grids_hold_the_path_and_hardly_more():
+    grids = coverage().first(steps(), NODES, 1)
+    (path,) = {id(branch.path): branch.path for branch in branches()}.values()
+    low, high = grids.boxes[0].T
+    assert ((path.q[:, :2] > low) & (path.q[:, :2] < high)).all()
+    assert grids.area < 0.1 * coverage().region(steps(), NODES, 1).area
+
+
+def test_v_at_the_saddle_is_the_closed_form():
+    whole, coarse = coverage().coarser(steps(), NODES, 1, 2 * EXACT)
+    assert coverage().highest(coarse) == pytest.approx(EXACT, rel=0.02)
+    assert coverage().highest(whole) > coverage().highest(coarse)  # half as many nodes: interpolation raises V
+    assert coverage().steps_suffice(coarse, whole)
+
+
+def test_grids_grow_until_they_hold_what_costs_less():
+    """Begun around a straight line of no velocity, they grow to where V is as large as the action."""
+    (branch,) = {branch.target: branch for branch in branches()}.values()
+    ends = branch.path.q[[0, -1]] * [1.0, 0.0]
+    straight = ExitPath(branch.path.t[[0, -1]], ends, 0 * ends, np.array([0.0, branch.value]), np.array([0]))
+    around = dataclasses.replace(coverage(), branches=[dataclasses.replace(branch, path=straight)])
+    begun = around.first(steps(), NODES, 1)
+    _, coarse = around.coarser(steps(), NODES, 1, 2 * EXACT)
+    assert coarse.potential.grids.area > begun.area
+    assert around.highest(coarse) == pytest.approx(EXACT, rel=0.02)
+    edge = np.ones(coarse.potential.grids.shape, dtype=bool)
+    edge[3:-3, 3:-3] = False
+    for needed in around.needed(coarse, around.scale):
+        assert not (needed & edge).any()
+
+
+def test_v_below_a_known_action_asks_for_shorter_steps():
+    _, coarse = coverage(1.2).coarser(steps(), NODES, 1, 2 * EXACT)
+    assert not coverage(1.2).steps_suffice(coarse, coarse)
+    assert not coverage(1.2).lies_above(coarse)
+    assert coverage(1.2).excess(coarse) == pytest.approx(1 - 1 / 1.2, abs=0.02)
+
+
+def test_what_is_known_is_the_cheapest_path_to_each_attractor():
+    path = ExitPath(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 2)), np.array([0.0, 1.0]), np.array([0]))
+
+    def branch(target, value, path=path):
+        return ActivationEnergy(0, target, value, value, value, "", Bound.UPPER, path=path)
+
+    (one, *_), label = exit_targets(problem(), coverage().model), problem().targets[0].label
+    known = KnownPaths([branch(label, 2.0), branch(label, 1.0), branch(7, 0.1), branch(label, 0.5, None)])
+    assert [found.value for found in known.to([one])] == [1.0]
+    assert known.cost(one) == 1.0
+    assert KnownPaths().cost(one) == np.inf
+
+
+@pytest.mark.slow
+def test_small_islands_in_a_wide_region_are_resolved():
+    """An orbit of period 2 in a forced double well is left for 9.129e-5, and other exits cost 30 times as much."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.03, spring=vk.CubicSpring(-1.0, 1.0),
+        excitations=(vk.Harmonic(0.3, 2.4),), noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, rng=0)
+    (source,) = (each.label for each in structure.attractors if each.name == "right-oscillation-period-2")
+    result = vk.LeastAction(source=source).run(osc, structure)
+    first = min(result.energies, key=lambda energy: energy.value)
+    assert first.value == pytest.approx(9.129105167e-5, rel=1e-6)
+    assert first.lower > 0.8 * first.value

@@ -1,0 +1,141 @@
+"""AroundPaths: coverage for exits that paths are known to, from the attractor outward."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.graph.coverage import ROOM, STEP_TOLERANCE, Coverage
+from vibrokit.analyzers.graph.grids import Grids, Shape, halved
+from vibrokit.analyzers.graph.seeds import orbit_visits
+from vibrokit.analyzers.graph.tracing import SolvedGrid
+from vibrokit.results.energy import ActivationEnergy
+
+_EXTENSIONS = 3  # of grids that turn out too small on more nodes
+_MARGIN = 0.1  # of the width of what is known, added on each side
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AroundPaths(Coverage):
+    """All that lies below the actions of known paths, found on grids around these and around the attractor.
+
+    Along a path that costs less than a known one, V is below that one's action. So grids grow only until no such node
+    lies at their edge, and stay as fine as that allows. From outside, on grids too coarse for V, what lies below it
+    would seem to fill them.
+    """
+
+    branches: Sequence[ActivationEnergy]  # known paths to the targets, one for each label that any is known for
+
+    @property
+    def scale(self) -> float:
+        """The action of the costliest known path."""
+        return max(branch.value for branch in self.branches)
+
+    def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
+        """Grids around the known paths and the ellipses where the linear V is below their actions."""
+        whole = self.region(steps, shape, intervals)
+        low, high = np.full((2, whole.phases, 2), [[[np.inf]], [[-np.inf]]])
+        for visit in orbit_visits(self.model, self.problem.attractor, whole):
+            reach = np.sqrt(2 * self.scale * np.diag(visit.covariance))
+            low[visit.phase] = np.minimum(low[visit.phase], visit.point - reach)
+            high[visit.phase] = np.maximum(high[visit.phase], visit.point + reach)
+        for phases, states in self._paths(whole):
+            np.minimum.at(low, phases, states)
+            np.maximum.at(high, phases, states)
+        margin = _MARGIN * (high - low)
+        low = np.maximum(low - margin, whole.boxes[..., 0])
+        high = np.minimum(high + margin, whole.boxes[..., 1])
+        return dataclasses.replace(whole, boxes=np.stack([low, high], axis=-1))
+
+    def highest(self, solved: SolvedGrid) -> float:
+        """The cost of the costliest attractor that a path is known to."""
+        return max(ratio * branch.value for ratio, branch in zip(self._ratios(solved), self.branches, strict=True))
+
+    def level(self, solved: SolvedGrid) -> float:
+        """The action of the costliest known path."""
+        return self.scale
+
+    def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
+        """Let the grids grow on half as many nodes along each side, which is enough to find what has to be covered."""
+        whole, rough = super().coarser(steps, halved(shape), intervals, ceiling)
+        return whole, self._on(shape, rough)
+
+    def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:
+        """Return grids around what the fine one shows."""
+        return self._on(shape, fine)
+
+    def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
+        """If V is not below the actions of known paths, where only linearization or a cheaper path takes it."""
+        return min(self._ratios(coarse)) >= 1 - STEP_TOLERANCE
+
+    def rank(self, solved: SolvedGrid) -> float:
+        """By how far V is from the action of the costliest known path, above or below."""
+        return abs(self.highest(solved) / self.scale - 1)
+
+    def excess(self, solved: SolvedGrid) -> float:
+        """Of the known paths."""
+        return max(abs(ratio - 1) for ratio in self._ratios(solved))
+
+    def lies_above(self, solved: SolvedGrid) -> bool:
+        """Than that of a known path."""
+        return max(self._ratios(solved)) > 1 + STEP_TOLERANCE
+
+    def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
+        """Solve again in any case if nodes that have to be covered lie at the edge."""
+        return super().closer(solved, most if self._holds_all(solved) else np.inf)
+
+    def around(self, solved: SolvedGrid) -> Grids:
+        """Return grids that may reach beyond the edge."""
+        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.scale), beyond=True)
+
+    def needed(self, solved: SolvedGrid, level: float) -> list[Mask]:
+        """Return also the nodes along the known paths."""
+        masks, grids = super().needed(solved, level), solved.potential.grids
+        last = np.array(grids.shape) - 1
+        for phases, states in self._paths(grids):
+            for phase, state in zip(phases, states, strict=True):
+                masks[phase][tuple(np.clip(grids.nearest(phase, state), 0, last))] = True
+        return masks
+
+    def _holds_all(self, solved: SolvedGrid) -> bool:
+        grids = solved.potential.grids
+        return grids.widened(self.needed(solved, self.scale)) is grids
+
+    def _on(self, shape: Shape, known: SolvedGrid) -> SolvedGrid:
+        """Solve on grids of some shape around what others show, and extend those that turn out too small."""
+        grids = self.around(known).with_shape(shape)
+        solved = self.solved(grids, ROOM * self.highest(known), known)
+        for _ in range(_EXTENSIONS):
+            if self._holds_all(solved):
+                break
+            solved = self.closer(solved, np.inf)
+        return solved
+
+    def _ratios(self, solved: SolvedGrid) -> list[float]:
+        """For each attractor that a path is known to, the least V where it is reached from, in units of the action."""
+        found = []
+        for branch in self.branches:
+            values = [solved.arrival(target).value for target in self.targets if branch.target in target.labels]
+            found.append(min(values) / branch.value)
+        return found
+
+    def _paths(self, grids: Grids) -> list[tuple[NDArray[np.int64], Array]]:
+        """For each known path, the phases that it passes, and its states there."""
+        points = self.problem.attractor.points[:, :2]
+        found = []
+        for branch in self.branches:
+            path = branch.path
+            assert path is not None
+            start = int(path.section[0])
+            begins = int(np.argmin(np.linalg.norm(points - path.q[start, :2], axis=1))) % len(grids.sections)
+            steps = np.arange(int((path.t[-1] - path.t[start]) / grids.step + 1e-6) + 1)
+            times = path.t[start] + steps * grids.step
+            states = np.column_stack([np.interp(times, path.t, path.q[:, axis]) for axis in (0, 1)])
+            found.append(((begins * grids.steps + steps) % grids.phases, states))
+        return found

@@ -1,0 +1,238 @@
+"""Coverage: what grids have to cover for some exit targets, and potentials on grids that cover no more."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.analyzers.graph.grids import Grids, Shape
+from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.graph.targets import ExitTarget, TraceStart
+from vibrokit.analyzers.graph.tracing import SolvedGrid
+from vibrokit.analyzers.graph.value_iteration import ValueIteration
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+
+ROOM = 1.2  # ceiling of V in units of the costliest exit
+_NEAR_CEILING = 0.95  # of the ceiling: a value above it may be that of the ceiling
+_RAISE, _RAISES = 3.0, 6  # factor and number of trials for a higher ceiling
+_WIDENINGS = 6  # of the first grid, each by 30 % at a side: 5 times its size
+_ZOOMS, WORTHWHILE = 4, 0.8  # closer grids, and the ratio of areas above which another one does not pay
+STEP_TOLERANCE = 0.01  # relative change of a cost by linearization over a step that is accepted
+# Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
+# linearized steps made V ten times too small.
+_FEWEST_RELIABLE = 64
+_SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
+_MARGIN = 0.04  # of the width, on each side of them
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Coverage(ABC):
+    """What grids have to cover for some exit targets. Abstract."""
+
+    problem: ExitProblem
+    model: StepModel
+    targets: Sequence[ExitTarget]
+
+    @abstractmethod
+    def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
+        """Return the grids that the search begins with."""
+
+    @property
+    @abstractmethod
+    def scale(self) -> float:
+        """A cost from which the search for the ceiling of V starts."""
+
+    @abstractmethod
+    def highest(self, solved: SolvedGrid) -> float:
+        """Return the cost of the costliest exit that has to be reached; infinite if one that has to is not reached."""
+
+    @abstractmethod
+    def level(self, solved: SolvedGrid) -> float:
+        """Return the V below which nodes may lie on a path that is searched."""
+
+    @abstractmethod
+    def rank(self, solved: SolvedGrid) -> float:
+        """Return a number that is smaller for better ones of several grids with as many nodes."""
+
+    @abstractmethod
+    def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:
+        """Return a grid of some shape that covers what a finer and a coarse one before show; None if they do not."""
+
+    @abstractmethod
+    def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
+        """Return whether shorter steps would change costs by less than the error of the nodes."""
+
+    @abstractmethod
+    def excess(self, solved: SolvedGrid) -> float:
+        """Return the largest relative difference between V at an exit and the action of the path to it."""
+
+    @abstractmethod
+    def lies_above(self, solved: SolvedGrid) -> bool:
+        """Return whether V at an exit is larger than the action of the path to it, as by interpolation."""
+
+    def reached(self, solved: SolvedGrid) -> list[ExitTarget]:
+        """Return the targets whose V lies well below the ceiling."""
+        highest = _NEAR_CEILING * solved.potential.ceiling
+        return [target for target in self.targets if solved.arrival(target).value < highest]
+
+    def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
+        """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess."""
+        grids = self.first(steps, shape, intervals)
+        whole = self.solved(grids, ceiling)
+        for _ in range(_WIDENINGS):
+            wider = grids.widened(self.needed(whole, self.level(whole)))
+            if wider is grids:
+                break
+            grids = wider
+            whole = self.solved(grids, 2 * self.highest(whole))
+        coarse = self.closer(whole, np.inf)
+        for _ in range(_ZOOMS - 1):
+            closer = self.closer(coarse, WORTHWHILE)
+            if closer is coarse:
+                break
+            coarse = closer
+        return whole, coarse
+
+    def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
+        """Solve on as many nodes around what has to be covered, if that is at most a part of the area."""
+        grids = self.around(solved)
+        too_large = grids.area > most * solved.potential.grids.area
+        return solved if too_large else self.solved(grids, ROOM * self.highest(solved), solved)
+
+    def around(self, solved: SolvedGrid) -> Grids:
+        """Return grids around what has to be covered."""
+        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.level(solved)))
+
+    def solved(self, grids: Grids, ceiling: float, rougher: SolvedGrid | None = None) -> SolvedGrid:
+        """Solve up to a ceiling of V, which is raised until the targets lie well below it.
+
+        Where a rougher grid shows that V is above the ceiling, no steps are computed. Raises StructureError if no
+        target is reached.
+        """
+        wanted = None if rougher is None else rougher.potential.reached(grids, ROOM * ceiling)
+        iteration = ValueIteration(self.model, self.problem.attractor, grids, wanted)
+        for _ in range(_RAISES):
+            solved = SolvedGrid(self.problem, self.model, iteration.up_to(ceiling))
+            highest = self.highest(solved)
+            if not highest:
+                raise StructureError(
+                    f"the exits of {self.problem.attractor.name} are within a node of it, so the graph cannot tell "
+                    "what they cost; raise the number of nodes."
+                )
+            if highest < _NEAR_CEILING * ceiling:
+                return solved
+            ceiling *= _RAISE
+            if wanted is not None:  # a path goes beyond what the rougher grid reaches
+                wanted, iteration = None, ValueIteration(self.model, self.problem.attractor, grids)
+        raise StructureError(
+            f"the graph reaches no exit of {self.problem.attractor.name}: the region or the number of nodes leaves no "
+            "room for a path; widen the region or raise the number of nodes."
+        )
+
+    def needed(self, solved: SolvedGrid, level: float) -> list[Mask]:
+        """By phase: which nodes may lie on a path to one of the targets, with V below a level.
+
+        The targets' own places are among them: near a saddle, the basin may be thinner than a cell.
+        """
+        grids, values = solved.potential.grids, solved.potential.values
+        below = [values[phase] < level for phase in range(grids.phases)]
+        if any(target.farther for target in self.targets):
+            return below
+        for phase, mask in enumerate(below):
+            mask[mask] = self._inside(grids.nodes(phase)[mask], grids, phase)
+        for target in self.targets:
+            place = solved.arrival(target).place
+            if place is not None:
+                self._include(below, grids, place)
+        return below
+
+    def region(self, steps: int, shape: Shape, intervals: int) -> Grids:
+        """Grids that cover the region of the section, and in the other phases also the image of its basins.
+
+        What is in no basin is left out: such motion may grow without bound.
+        """
+        scene, region = self.problem.scene, self.problem.structure.basins.region
+        step = scene.section_interval / steps
+        states = region.cell_centres((_SAMPLES, _SAMPLES))
+        basins, after = self.problem.structure.basins, self.model.images(states, 0.0, scene.section_interval)
+        settled = (basins.at(states) >= 0) & (basins.at(after) >= 0)
+        states = states[settled] if settled.any() else states
+        boxes = []
+        for phase in range(1 if scene.autonomous else steps):
+            low = np.minimum(states.min(axis=0), region.bounds[:, 0])
+            high = np.maximum(states.max(axis=0), region.bounds[:, 1])
+            margin = _MARGIN * (high - low)
+            boxes.append(np.stack([low - margin, high + margin], axis=1))
+            images = self.model.images(states, phase * step, step)
+            states = images[np.isfinite(images).all(axis=1)]
+        return Grids(np.array(boxes), shape, step, steps).unfolded(intervals)
+
+    def _include(self, masks: list[Mask], grids: Grids, place: TraceStart) -> None:
+        """Include the nodes next to the motion from a state until the next section."""
+        phase, state = place.phase, place.state
+        for _ in range(min(grids.steps, grids.phases)):
+            if not grids.inside(phase, state):
+                break
+            masks[phase][tuple(grids.nearest(phase, state))] = True
+            state = self.model.images(state[None], grids.time(phase), grids.step)[0]
+            phase = (phase + 1) % grids.phases
+
+    def _inside(self, states: Array, grids: Grids, phase: int) -> Mask:
+        """Which states of a phase have not left: by their positions, or by the cells of the section they come to."""
+        if self.problem.exit.by_position:
+            return ~self.problem.is_out(states)
+        if phase not in grids.sections:
+            rest = (grids.steps - phase % grids.steps) * grids.step
+            states = self.model.images(states, grids.time(phase), rest)
+        return self.problem.structure.basins.at(states) == self.problem.source
+
+
+class WholeRegion(Coverage):
+    """All that lies below the costliest exit, found on grids that cover the region."""
+
+    def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
+        """Grids that cover the region."""
+        return self.region(steps, shape, intervals)
+
+    @property
+    def scale(self) -> float:
+        """That of a straight path."""
+        return max(target.scale for target in self.targets)
+
+    def highest(self, solved: SolvedGrid) -> float:
+        """The cost of the costliest target that is reached; infinite if none is."""
+        return solved.highest(self.targets)
+
+    def level(self, solved: SolvedGrid) -> float:
+        """The same."""
+        return self.highest(solved)
+
+    def rank(self, solved: SolvedGrid) -> float:
+        """By V, which interpolation raises."""
+        return self.highest(solved)
+
+    def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:
+        """The fine one, or a closer one, if the coarse one had enough nodes to say what to cover."""
+        reliable = min(coarse.potential.grids.shape) >= _FEWEST_RELIABLE
+        return self.closer(fine, WORTHWHILE) if fine.potential.grids.shape == shape and reliable else None
+
+    def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
+        """As the paths on the grid show."""
+        targets = self.reached(coarse)
+        return coarse.linearization_error(targets) <= max(STEP_TOLERANCE, coarse.change(rougher, targets))
+
+    def excess(self, solved: SolvedGrid) -> float:
+        """Of the paths on the grid; infinite if no path to one of the targets could be traced."""
+        return solved.excess(self.reached(solved))
+
+    def lies_above(self, solved: SolvedGrid) -> bool:
+        """Than that of the path on the grid."""
+        return solved.lies_above(self.reached(solved), STEP_TOLERANCE)
