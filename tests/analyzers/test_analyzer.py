@@ -87,3 +87,30 @@ def test_what_is_no_analysis(structure, found):
 def test_what_is_no_energy(structure):
     with pytest.raises(TypeError, match=r"Given\.analyze must return an ActivationEnergy for each exit, got 0\.05\."):
         Given(source=0, found=vk.Analysis((0.05,))).run(OSC, structure)
+
+
+class Later(vk.Analyzer):
+    """Knows better when the other attractor was analyzed."""
+
+    again: object = None
+
+    def analyze(self, problem):
+        energy = dataclasses.replace(SOUND, source=problem.source, target=1 - problem.source)
+
+        def revisit(known):
+            assert [each.source for each in known] == [1 - problem.source]
+            return self.again
+
+        return vk.Analysis((energy,), revisit=revisit)
+
+
+def test_an_analysis_may_change_with_what_is_found_later(structure):
+    better = vk.Analysis((dataclasses.replace(SOUND, value=0.045),))
+    assert [energy.value for energy in Later(again=better).run(OSC, structure).energies] == [0.045, 0.05]
+    assert [energy.value for energy in Later().run(OSC, structure).energies] == [0.05, 0.05]
+    assert [energy.value for energy in Later(again=better, source=0).run(OSC, structure).energies] == [0.05]
+
+
+def test_what_it_changes_to_is_checked(structure):
+    with pytest.raises(ValueError, match=r"Later\.analyze returned the target 7"):
+        Later(again=vk.Analysis((dataclasses.replace(SOUND, target=7),))).run(OSC, structure)

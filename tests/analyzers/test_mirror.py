@@ -1,11 +1,13 @@
 """Mirror images of exit paths: energies are those of a search of its own, and only symmetric scenes have them."""
 
+import dataclasses
 import functools
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
@@ -87,3 +89,15 @@ def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
     (image,) = Mirror(problem).candidates((one,))
     assert {image.target, one.target} == {0, 2}
     assert Mirror(problem).candidates(found.branches) == []
+
+
+def test_what_is_found_later_of_the_mirror_image_is_polished_too():
+    osc, structure = wells("forced")
+    first, second = both("forced").energies
+    search = ExitSearch(LEAST, ExitProblem(osc, structure, structure.attractor(first.source), vk.LeaveBasin()))
+    (found,) = search.revisit((second,)).estimates
+    assert (found.source, found.target, found.bound) == (first.source, first.target, second.bound)
+    assert found.value == pytest.approx(first.value, rel=1e-9)
+    assert search.revisit((second,)) is None
+    costlier = dataclasses.replace(second, value=1.1 * second.value)
+    assert search.revisit((costlier,)) is None

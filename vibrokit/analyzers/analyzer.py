@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, ClassVar, dataclass_transform
@@ -50,6 +51,9 @@ class Analysis:
         All exit paths that were found, also those that are not the best; the cheapest first.
     complete : bool
         False if the work was stopped before its end.
+    revisit : callable, optional
+        Called when all attractors were analyzed, with what was found of the others, energies and branches: what an
+        earlier one could not know. Returns the analysis anew, or None if that changes nothing.
     """
 
     estimates: tuple[ActivationEnergy, ...] = ()
@@ -57,6 +61,7 @@ class Analysis:
     findings: tuple[Finding, ...] = ()
     branches: tuple[ActivationEnergy, ...] = ()
     complete: bool = True
+    revisit: Callable[[tuple[ActivationEnergy, ...]], Analysis | None] | None = None
 
     def __post_init__(self) -> None:
         check_findings(self.findings)
@@ -162,16 +167,22 @@ class Analyzer(ABC):
         sources = self._checked(osc, structure, executor)
         kept = self._checkpoint(osc, structure, checkpoint)
         analyses: dict[int, Analysis] = {}
+        problems: dict[int, ExitProblem] = {}
         findings: list[Finding] = []
         with working(progress, time_limit) as work:
             try:
                 for attractor in sources:
-                    known = tuple(exit_ for one in analyses.values() for exit_ in (*one.estimates, *one.branches))
+                    known = _known(analyses, attractor.label)
                     problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept, known)
+                    problems[attractor.label] = problem
                     with stage(type(self).__name__, subject=attractor.name):
                         analyses[attractor.label] = self._analyzed(problem)
                     if not analyses[attractor.label].complete:
                         break
+                else:
+                    for attractor in sources[:-1]:  # the last one knew the others
+                        with stage(type(self).__name__, subject=attractor.name):
+                            analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
             except KeyboardInterrupt as stopped:
                 findings.append(Finding.stopped(type(self).__name__, stopped, attractor.label))
             finally:
@@ -240,6 +251,19 @@ class Analyzer(ABC):
         self._check_returned(found, problem)
         return found
 
+    def _revisited(self, problem: ExitProblem, analyses: Mapping[int, Analysis]) -> Analysis:
+        """The analysis of one attractor, anew if what was found of the others changes it; kept if that fails."""
+        before = analyses[problem.source]
+        if before.revisit is None:
+            return before
+        try:
+            found = before.revisit(_known(analyses, problem.source))
+        except (StructureError, StepperError):
+            return before
+        if found is not None:
+            self._check_returned(found, problem)
+        return found or before
+
     def _check_returned(self, found: Any, problem: ExitProblem) -> None:
         """Refuse what no method may return, here where the class that returned it is known."""
         method, attractors = f"{type(self).__name__}.analyze", problem.structure.attractors
@@ -265,6 +289,12 @@ class Analyzer(ABC):
                     f"{method} returned the bounds {shown(energy.lower)} to {shown(energy.upper)}, which do not "
                     f"contain the energy {shown(energy.value)}; where nothing is known they are 0 and inf."
                 )
+
+
+def _known(analyses: Mapping[int, Analysis], label: int) -> tuple[ActivationEnergy, ...]:
+    """What was found of all other attractors."""
+    others = (one for other, one in analyses.items() if other != label)
+    return tuple(exit_ for one in others for exit_ in (*one.estimates, *one.branches))
 
 
 def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:

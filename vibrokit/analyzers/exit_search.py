@@ -91,6 +91,16 @@ class ExitSearch:
             self._polish(images, quick=self.analyzer.graph is not None)
             self._shots_follow &= not self._polished()[0]
 
+    def revisit(self, known: tuple[ActivationEnergy, ...]) -> Analysis | None:
+        """Polish mirror images of paths that were found later, where they cost less than the own ones."""
+        self.problem = dataclasses.replace(self.problem, known=known)
+        self._mirror = mirror.Mirror(self.problem)
+        images = self._mirror.candidates(self._polished()[0], cheaper=True)
+        if not images:
+            return None
+        self._polish(images, quick=True)
+        return self.analysis()
+
     def reverse(self) -> None:
         """Run relaxations backwards, to an equilibrium or under slow forcing, and polish these."""
         stepper = self.problem.single_stepper(Flow.STATE)
@@ -246,6 +256,7 @@ class ExitSearch:
             tuple(finding for number, finding in enumerate(findings) if finding not in findings[:number]),
             branches,
             complete=not self.stopped,
+            revisit=self.revisit,
         )
 
     def _failed(self, method: str, error: VibrokitError, *, only: bool = False) -> None:

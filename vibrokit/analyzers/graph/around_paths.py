@@ -99,8 +99,9 @@ class AroundPaths(Coverage):
         masks, grids = super().needed(solved, level), solved.potential.grids
         last = np.array(grids.shape) - 1
         for phases, states in self._paths(grids):
-            for phase, state in zip(phases, states, strict=True):
-                masks[phase][tuple(np.clip(grids.nearest(phase, state), 0, last))] = True
+            for phase in np.unique(phases):
+                nearest = np.clip(grids.nearest(phase, states[phases == phase]), 0, last)
+                masks[phase][tuple(nearest.T)] = True
         return masks
 
     def _holds_all(self, solved: SolvedGrid) -> bool:

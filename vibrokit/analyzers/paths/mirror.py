@@ -5,6 +5,7 @@ Such a scene has the symmetry (x, v) → (−x, −v), with forcing after half o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 
@@ -36,14 +37,19 @@ class Mirror:
         self._spacing = scene.section_interval / samples_of(scene)
         self._half = 0 if scene.autonomous else samples_of(scene) // 2  # samples after which the scene is mirrored
 
-    def candidates(self, own: Sequence[ActivationEnergy]) -> list[Candidate]:
-        """Return the mirror images of known paths, and of the attractor's own, that leave the attractor and are new."""
+    def candidates(self, own: Sequence[ActivationEnergy], *, cheaper: bool = False) -> list[Candidate]:
+        """Return the mirror images of known paths, and of the attractor's own, that leave the attractor and are new.
+
+        On request, only those that cost less than the attractor's own paths to the same target.
+        """
         found = list[Candidate]()
         polished = (one for one in self._problem.known if one.bound is not Bound.EXACT)
         for one in (*polished, *own):
             target = self._image(one)
-            alike = (each for each in own if each.target == target)
-            if target is not None and not any(cost_the_same(one, each) for each in alike):
+            alike = [each for each in own if each.target == target]
+            new = not any(cost_the_same(one, each) for each in alike)
+            least = min((each.value for each in alike), default=math.inf)
+            if target is not None and new and (one.value < least or not cheaper):
                 assert one.path is not None
                 found.append(self._mirrored(target, one.path, one.value))
         return found
