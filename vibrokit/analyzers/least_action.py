@@ -38,8 +38,8 @@ class LeastAction(Analyzer):
     in between, they are returned with the bounds that are known.
 
     In a scene with odd forces, an attractor may be the mirror image of one that was analyzed before. The mirror images
-    of its paths take the place of shooting and of the finer graphs. Where the later one has a cheaper path, the image of
-    that is polished for the earlier one in the end.
+    of its paths take the place of shooting and of the finer graphs. If the later one has a cheaper path, its image is
+    polished for the earlier one in the end.
 
     A path that passes saddles and other attractors on its way is polished in legs, from each of these orbits to the
     next.

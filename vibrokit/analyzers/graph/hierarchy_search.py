@@ -25,6 +25,7 @@ from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 
 LOOSE = 1.5  # V on a grid in units of a known path's action, above which that grid is too large for the path
+_FAR_SMALLER = 0.5  # of the area: grids around known paths, which grow, that are worth beginning anew
 # Along a side where several section intervals have grids: half as many found the islands around an orbit of period 3 of
 # a weakly damped Duffing oscillator, and 26 did not.
 _FEWEST_APART = 90
@@ -76,13 +77,19 @@ class HierarchySearch:
             return [path.candidate for path in solved.paths(target)]
 
     def _coverage(self, targets: Sequence[ExitTarget], before: GridHierarchy | None, known: KnownPaths) -> Coverage:
-        """Around known paths if V was far above their actions before; if it never was, from the whole region."""
+        """Around known paths, if grids there are far smaller than those before and V on these was too high."""
+        whole = WholeRegion(self.problem, self.model, targets)
         paths = known.to(targets)
-        if before is not None and paths and self.problem.attractor.is_fixed:
-            around = AroundPaths(self.problem, self.model, (*targets, *self._ends(paths, targets)), paths)
-            if isinstance(before.coverage, AroundPaths) or before.coverage.highest(before.fine) > LOOSE * around.scale:
-                return around
-        return WholeRegion(self.problem, self.model, targets)
+        if before is None or not paths or not self.problem.attractor.is_fixed:
+            return whole
+        around = AroundPaths(self.problem, self.model, (*targets, *self._ends(paths, targets)), paths)
+        if isinstance(before.coverage, AroundPaths):
+            return around
+        if before.coverage.highest(before.fine) <= LOOSE * around.scale:
+            return whole
+        grids = before.fine.potential.grids
+        closer = around.first(grids.steps, grids.shape, before.intervals)
+        return around if closer.area < _FAR_SMALLER * grids.area else whole
 
     def _ends(self, paths: Sequence[ActivationEnergy], targets: Sequence[ExitTarget]) -> list[ExitTarget]:
         """Targets at the saddles that known paths end at, where these are not among the others."""
