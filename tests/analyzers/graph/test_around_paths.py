@@ -12,6 +12,7 @@ from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
 from vibrokit.structure.scales import doublings_of
 
@@ -91,6 +92,11 @@ def test_v_below_a_known_action_asks_for_shorter_steps():
     assert not coverage(1.2).steps_suffice(coarse, coarse)
     assert not coverage(1.2).lies_above(coarse)
     assert coverage(1.2).excess(coarse) == pytest.approx(1 - 1 / 1.2, abs=0.02)
+
+
+def test_grids_that_would_be_too_coarse_on_all_nodes_are_given_up_early():
+    with pytest.raises(StructureError, match="raise the number of nodes"):
+        coverage(0.01).coarser(steps(), NODES, 1, 2 * EXACT)
 
 
 def test_what_is_known_is_the_cheapest_path_to_each_attractor():

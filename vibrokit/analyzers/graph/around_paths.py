@@ -12,9 +12,13 @@ from vibrokit.analyzers.graph.coverage import ROOM, STEP_TOLERANCE, Coverage
 from vibrokit.analyzers.graph.grids import Grids, Shape, halved
 from vibrokit.analyzers.graph.seeds import orbit_visits
 from vibrokit.analyzers.graph.tracing import SolvedGrid
+from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy
 
 _EXTENSIONS = 3  # of grids that turn out too small on more nodes
+# V on a quarter of the nodes along each side, in units of the action: twice as many divided it by 1.7 to 3.5 on scenes
+# where the graph was of use.
+_HOPELESS = 16.0
 _MARGIN = 0.1  # of the width of what is known, added on each side
 
 Array = NDArray[np.float64]
@@ -62,8 +66,16 @@ class AroundPaths(Coverage):
         return self.scale
 
     def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
-        """Let the grids grow on half as many nodes along each side, which is enough to find what has to be covered."""
+        """Let the grids grow on half as many nodes along each side, which is enough to find what has to be covered.
+
+        Raises StructureError where V on these is so high that it would be too high on all nodes as well.
+        """
         whole, rough = super().coarser(steps, halved(shape), intervals, ceiling)
+        if self.highest(rough) > _HOPELESS * self.scale:
+            raise StructureError(
+                f"on {rough.potential.grids.shape} nodes around the known paths V is {self.highest(rough):.3g}, and "
+                f"they cost {self.scale:.3g}; raise the number of nodes."
+            )
         return whole, self._on(shape, rough)
 
     def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:

@@ -21,6 +21,7 @@ from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.analyzers.path_ends import AtSaddle
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
 from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 
@@ -145,7 +146,14 @@ class HierarchySearch:
                 return before.whole, before.coarse, coarse
         ceiling = coverage.scale if before is None else coverage.highest(before.whole)
         intervals = self._intervals() if before is None else (before.intervals,)
-        solved = [self._coarser(coverage, steps, shape, each, 2 * ceiling) for each in intervals]
+        solved, failures = list[tuple[SolvedGrid, SolvedGrid]](), list[StructureError]()
+        for each in intervals:
+            try:
+                solved.append(self._coarser(coverage, steps, shape, each, 2 * ceiling))
+            except StructureError as failure:
+                failures.append(failure)
+        if not solved:
+            raise failures[0]
         whole, coarse = min(solved, key=lambda both: coverage.rank(both[1]))
         return whole, whole, coarse
 
