@@ -52,8 +52,8 @@ class Analysis:
     complete : bool
         False if the work was stopped before its end.
     revisit : callable, optional
-        Called when all attractors were analyzed, with what was found of the others, energies and branches: what an
-        earlier one could not know. Returns the analysis anew, or None if that changes nothing.
+        Called after all attractors have been analyzed, with the energies and branches of the others. Returns a new
+        analysis, or None to keep this one.
     """
 
     estimates: tuple[ActivationEnergy, ...] = ()

@@ -90,12 +90,16 @@ class Evidence:
 
     def _gain(self, estimate: ActivationEnergy) -> float:
         """By which the error of an estimate of the graph is expected to fall when the nodes along a side double."""
-        before = {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
-        if self.graph is None or self.rougher is None or estimate.target not in before or not estimate.numerical_error:
+        target, error = estimate.target, estimate.numerical_error
+        if self.graph is None or self.rougher is None or target not in self._errors_before or not error:
             return _GAIN
-        doublings = math.log2(self.graph.sides[estimate.target] / self.rougher.sides[estimate.target])
-        fell = before[estimate.target] / estimate.numerical_error
-        return min(_GAIN, max(1.0, fell) ** (1 / doublings)) if doublings > 0 else _GAIN
+        doublings = math.log2(self.graph.sides[target] / self.rougher.sides[target])
+        return min(_GAIN, max(1.0, self._errors_before[target] / error) ** (1 / doublings)) if doublings > 0 else _GAIN
+
+    @cached_property
+    def _errors_before(self) -> dict[int, float]:
+        """By label: errors of the rougher graph."""
+        return {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
 
     @property
     def graph_error(self) -> float:

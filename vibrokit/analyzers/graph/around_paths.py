@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ class AroundPaths(Coverage):
     would seem to fill them.
     """
 
+    beyond: ClassVar[bool] = True
     branches: Sequence[ActivationEnergy]  # known paths to the targets, one for each label that any is known for
 
     @property
@@ -102,10 +104,6 @@ class AroundPaths(Coverage):
         """Solve again in any case if nodes that have to be covered lie at the edge."""
         return super().closer(solved, most if self._holds_all(solved) else np.inf)
 
-    def around(self, solved: SolvedGrid) -> Grids:
-        """Return grids that may reach beyond the edge."""
-        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.scale), beyond=True)
-
     def needed(self, solved: SolvedGrid, level: float) -> list[Mask]:
         """Return also the nodes along the known paths."""
         masks, grids = super().needed(solved, level), solved.potential.grids
@@ -127,7 +125,7 @@ class AroundPaths(Coverage):
         for _ in range(_EXTENSIONS):
             if self._holds_all(solved):
                 break
-            solved = self.closer(solved, np.inf)
+            solved = super().closer(solved, np.inf)
         return solved
 
     def _ratios(self, solved: SolvedGrid) -> list[float]:

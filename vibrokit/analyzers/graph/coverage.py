@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,9 @@ Mask = NDArray[np.bool_]
 @dataclasses.dataclass(frozen=True, eq=False)
 class Coverage(ABC):
     """What grids have to cover for some exit targets. Abstract."""
+
+    beyond: ClassVar[bool] = False
+    """Whether closer grids may reach beyond the edge of those before."""
 
     problem: ExitProblem
     model: StepModel
@@ -109,7 +113,7 @@ class Coverage(ABC):
 
     def around(self, solved: SolvedGrid) -> Grids:
         """Return grids around what has to be covered."""
-        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.level(solved)))
+        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.level(solved)), beyond=self.beyond)
 
     def solved(self, grids: Grids, ceiling: float, rougher: SolvedGrid | None = None) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it.
