@@ -103,6 +103,18 @@ def graph_of(estimates, finer=0, side=180.0):
     return SimpleNamespace(estimates=estimates, finer=finer, sides={each.target: side for each in estimates})
 
 
+def test_the_last_doubling_of_the_nodes_is_for_exits_with_a_path_that_the_graph_is_too_coarse_for():
+    """Errors of a hundredth, a third and nine tenths of the paths' actions, and an exit without a path."""
+    paths = tuple(estimate(target, 1.0, 0.0) for target in (1, 2, 3))
+    errors = {1: 0.01, 2: 0.3, 3: 0.9, 4: 0.9}
+    graph = graph_of([estimate(target, 1.0, error) for target, error in errors.items()], finer=1)
+    graph.last_for_all, graph.calibrated = True, lambda polished: graph.estimates
+    attractor = SimpleNamespace(repeats=True, label=0)
+    assert Evidence(attractor, paths, graph).settled(0.01) == {1, 2, 4}
+    graph.last_for_all = False
+    assert Evidence(attractor, paths, graph).settled(0.01) == {1}
+
+
 NEVER_REPEATS = SimpleNamespace(repeats=False)  # its estimates are not calibrated by paths
 
 
@@ -110,13 +122,11 @@ NEVER_REPEATS = SimpleNamespace(repeats=False)  # its estimates are not calibrat
     ("finer", "before", "useless"),
     [
         (0, None, {1, 2}), (1, None, {2}), (2, None, {2}), (3, None, set()),
-        (1, 64.0, {2}), (2, 64.0, {2}), (1, 6.0, {1, 2}), (1, 2.0, {1, 2}), (2, 6.0, {2}), (2, 1.0, {1, 2}),
+        (1, 64.0, {2}), (2, 64.0, {2}), (1, 6.0, {2}), (1, 3.0, {1, 2}), (2, 3.0, {2}), (2, 1.0, {1, 2}),
     ],
 )  # fmt: skip
 def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, before, useless):
-    """Each doubling of the nodes divides its error, of 2 here, as the last one did, by 8 at best; half of a path's
-    action is too coarse.
-    """
+    """Each doubling of the nodes divides its error, of 2 here, as the last one did, by 8 at best."""
     paths = (estimate(2, 0.01, 0.0), estimate(1, 1.0, 0.0))
     rougher = None if before is None else graph_of([estimate(each, 1.0, before) for each in (1, 2)], side=90.0)
     graph = graph_of([estimate(1, 1.0, 2.0), estimate(2, 0.01, 2.0), estimate(3, 1.0, 9.0)], finer)

@@ -150,6 +150,8 @@ def _bracket(path: ActivationEnergy, graph: ActivationEnergy, bound: Bound) -> A
     The value is the smaller one of both, and that of the path where the graph's error is as large.
     """
     vague = graph.numerical_error > VAGUE * path.value
-    value = path.value if vague else min(path.value, graph.value)
+    best = path if vague or path.value <= graph.value else graph
     lower = min(2 * path.value - path.upper, graph.lower)
-    return dataclasses.replace(path, value=value, lower=max(0.0, lower), bound=bound)
+    return dataclasses.replace(
+        path, value=best.value, numerical_error=best.numerical_error, lower=max(0.0, lower), bound=bound
+    )

@@ -169,6 +169,7 @@ class Analyzer(ABC):
         analyses: dict[int, Analysis] = {}
         problems: dict[int, ExitProblem] = {}
         findings: list[Finding] = []
+        stopped = False
         with working(progress, time_limit) as work:
             try:
                 for attractor in sources:
@@ -183,8 +184,9 @@ class Analyzer(ABC):
                     for attractor in sources[:-1]:  # the last one knew the others
                         with stage(type(self).__name__, subject=attractor.name):
                             analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
-            except KeyboardInterrupt as stopped:
-                findings.append(Finding.stopped(type(self).__name__, stopped, attractor.label))
+            except KeyboardInterrupt as interrupt:
+                stopped = True
+                findings.append(Finding.stopped(type(self).__name__, interrupt, attractor.label))
             finally:
                 kept.flush()
             if kept.failure:
@@ -202,7 +204,9 @@ class Analyzer(ABC):
                 scene=scene_data(osc),
                 settings=settings_of(self),
                 stats=work.stats,
-                complete=len(analyses) == len(sources) and all(one.complete for one in analyses.values()),
+                complete=not stopped
+                and len(analyses) == len(sources)
+                and all(one.complete for one in analyses.values()),
                 seconds=work.seconds,
             )
 

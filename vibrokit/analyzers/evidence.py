@@ -20,6 +20,7 @@ from vibrokit.structure.boundaries.edges import meeting_cells
 
 _EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
 """Energies with bounds that no graph gave."""
+_WITHOUT_PATH = (Code.NO_POLISHED_PATH, Code.NOT_POLISHED)
 _AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
 """What more nodes do not change, however many there are."""
 _GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
@@ -68,14 +69,18 @@ class Evidence:
         """Return the exits on which an accurate graph and a path agree, or for which finer grids are of no use."""
         if self.graph is None:
             return set()
-        if not self.attractor.repeats:
-            return self.unresolvable | self.beyond
-        accurate = {each.target for each in self.estimates if each.numerical_error <= accuracy * each.value}
-        return accurate & self._found(Code.AGREEMENT) | self._useless
+        if self.graph.last_for_all:
+            found = self._accurate(VAGUE) & self._found(Code.AGREEMENT, Code.BRACKET) | self._found(*_WITHOUT_PATH)
+        else:
+            found = self._accurate(accuracy) & self._found(Code.AGREEMENT)
+        return found | (self._useless if self.attractor.repeats else self.unresolvable | self.beyond)
+
+    def _accurate(self, accuracy: float) -> set[int]:
+        return {each.target for each in self.estimates if each.numerical_error <= accuracy * each.value}
 
     @cached_property
     def unresolvable(self) -> set[int]:
-        """Exits with a path that costs so little that even the finest graph would be too coarse.
+        """Exits with a path that costs less than the error that even the finest graph would have.
 
         The error is expected to fall again as it fell with the nodes along a side since the last graph.
         """
@@ -84,7 +89,7 @@ class Evidence:
             path = self.cheapest.get(each.target)
             if path is None or (finer and self.rougher is None and each.value > LOOSE * path.value):
                 continue  # the next grids, around the path, are far smaller
-            if each.numerical_error / self._gain(each) ** finer > VAGUE * path.value:
+            if each.numerical_error / self._gain(each) ** finer > path.value:
                 found.add(each.target)
         return found
 
@@ -113,7 +118,8 @@ class Evidence:
     def _useless(self) -> set[int]:
         """Exits for which finer grids are of no use.
 
-        An attractor that is reached through other basins only needs a rough estimate, and no better one without a path.
+        For an attractor that is reached through other basins a rough estimate suffices. Without a path it is not
+        refined.
         Mirror images have their bounds, and so have paths that cost the least possible.
         """
         agreed, exact = self._found(Code.AGREEMENT), self._found(*_EXACT)

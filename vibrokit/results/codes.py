@@ -1,4 +1,4 @@
-"""Codes of findings: for each what it means, how much it matters, and what to do. Their sentences are here only."""
+"""Codes of findings: for each what it means, how much it matters, and what to do. All sentences are defined here."""
 
 from __future__ import annotations
 
@@ -199,6 +199,11 @@ class Code(StrEnum):
 
     # Graph
     GRAPH = "graph", INFO, "Graph from {state}: {nodes_x} × {nodes_v} nodes, {steps} steps per period by {stepper}."
+    GRAPH_MEMORY = (
+        "graph-memory", INFO,
+        "Graph from {state}: {memory:g} GiB of memory allow {nodes_x} × {nodes_v} nodes instead of "
+        "{wanted_x} × {wanted_v}.", "Raise max_memory_gib.",
+    )  # fmt: skip
     GRAPH_PATH_LOST = (
         "graph-path-lost", WARNING, "The graph's path from {state} to {goal} could not be traced back.",
         "Raise the number of nodes.",
@@ -288,19 +293,19 @@ class Code(StrEnum):
     )  # fmt: skip
     CHAOTIC_BOUNDARY = (
         "chaotic-boundary", INFO,
-        "The basin boundary of {state} contains a chaotic set. Paths were polished to unstable orbits inside it, which "
+        "The basin boundary of {state} contains a chaotic set. Paths are sought to unstable orbits inside it, which "
         "are saddles {saddles}; their actions are upper bounds.",
     )  # fmt: skip
     SADDLES_OF_OTHERS = (
         "saddles-of-others", WARNING,
-        "On the basin boundary of {state} no usable saddle is known that lies outside chaotic sets; paths were "
-        "polished to saddles between other basins.",
+        "On the basin boundary of {state} no usable saddle is known that lies outside chaotic sets; paths are "
+        "sought to saddles between other basins.",
         "Refine the basin grid, so that edge tracking can follow this boundary.",
     )  # fmt: skip
     CANDIDATES_SKIPPED = (
         "candidates-skipped", INFO,
-        "{skipped} of {total} candidate paths from {state} cost more than {factor:g} times the least polished action "
-        "and were not polished.",
+        "{skipped} of {total} candidate paths from {state} cost more than {factor:g} times the least known path to the "
+        "same exit and were not polished.",
     )  # fmt: skip
     CANDIDATE_FAILED = (
         "candidate-failed", INFO,
@@ -339,7 +344,7 @@ class Code(StrEnum):
     )  # fmt: skip
     CHAOTIC_SOURCE = (
         "chaotic-source", INFO,
-        "{state} is chaotic: paths were polished from {count} unstable orbits inside it (periods: {periods}).",
+        "{state} is chaotic: paths are sought from {count} unstable orbits inside it (periods: {periods}).",
         "Its energies are brackets.",
     )  # fmt: skip
     GRAPH_ONLY_SOURCE = "graph-only-source", INFO, "{state} is {kind}: only the graph gives its energies."
@@ -382,7 +387,7 @@ class Code(StrEnum):
     BARRIER_ENERGY = (
         "barrier-energy", INFO,
         "Detailed balance holds: leaving {state} for {goal} costs {least:.10g}, which follows from the potential "
-        "energy of the barrier. No path was polished.",
+        "energy of the barrier. No polished path attains it.",
     )  # fmt: skip
     NOT_SEARCHED = (
         "not-searched", WARNING,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +13,6 @@ from vibrokit.analyzers.graph.grids import Grids, Shape, halved
 from vibrokit.analyzers.graph.seeds import orbit_visits
 from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.errors import StructureError
-from vibrokit.results.energy import ActivationEnergy
 
 _EXTENSIONS = 3  # of grids that turn out too small on more nodes
 # V on a quarter of the nodes along each side, in units of the action: twice as many divided it by 1.7 to 3.5 on scenes
@@ -36,7 +34,6 @@ class AroundPaths(Coverage):
     """
 
     beyond: ClassVar[bool] = True
-    branches: Sequence[ActivationEnergy]  # known paths to the targets, one for each label that any is known for
 
     @property
     def scale(self) -> float:
@@ -61,7 +58,10 @@ class AroundPaths(Coverage):
 
     def highest(self, solved: SolvedGrid) -> float:
         """The cost of the costliest attractor that a path is known to."""
-        return max(ratio * branch.value for ratio, branch in zip(self._ratios(solved), self.branches, strict=True))
+        return max(
+            ratio * branch.value
+            for ratio, branch in zip(self.ratios(solved, self.branches), self.branches, strict=True)
+        )
 
     def level(self, solved: SolvedGrid) -> float:
         """The action of the costliest known path."""
@@ -86,7 +86,7 @@ class AroundPaths(Coverage):
 
     def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
         """If V is not below the actions of known paths, where only linearization or a cheaper path takes it."""
-        return min(self._ratios(coarse)) >= 1 - STEP_TOLERANCE
+        return min(self.ratios(coarse, self.branches)) >= 1 - STEP_TOLERANCE
 
     def rank(self, solved: SolvedGrid) -> float:
         """By how far V is from the action of the costliest known path, above or below."""
@@ -94,11 +94,11 @@ class AroundPaths(Coverage):
 
     def excess(self, solved: SolvedGrid) -> float:
         """Of the known paths."""
-        return max(abs(ratio - 1) for ratio in self._ratios(solved))
+        return max(abs(ratio - 1) for ratio in self.ratios(solved, self.branches))
 
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Than that of a known path."""
-        return max(self._ratios(solved)) > 1 + STEP_TOLERANCE
+        return max(self.ratios(solved, self.branches)) > 1 + STEP_TOLERANCE
 
     def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
         """Solve again in any case if nodes that have to be covered lie at the edge."""
@@ -127,14 +127,6 @@ class AroundPaths(Coverage):
                 break
             solved = super().closer(solved, np.inf)
         return solved
-
-    def _ratios(self, solved: SolvedGrid) -> list[float]:
-        """For each attractor that a path is known to, the least V where it is reached from, in units of the action."""
-        found = []
-        for branch in self.branches:
-            values = [solved.arrival(target).value for target in self.targets if branch.target in target.labels]
-            found.append(min(values) / branch.value)
-        return found
 
     def _paths(self, grids: Grids) -> list[tuple[NDArray[np.int64], Array]]:
         """For each known path, the phases that it passes, and its states there."""

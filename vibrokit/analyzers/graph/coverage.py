@@ -17,7 +17,9 @@ from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.analyzers.graph.value_iteration import ValueIteration
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.results.energy import ActivationEnergy
 
+FAR_LESS = 0.25  # of the costliest exit: below, an exit gets grids that reach no farther than it needs
 ROOM = 1.2  # ceiling of V in units of the costliest exit
 _NEAR_CEILING = 0.95  # of the ceiling: a value above it may be that of the ceiling
 _RAISE, _RAISES = 3.0, 6  # factor and number of trials for a higher ceiling
@@ -27,7 +29,11 @@ STEP_TOLERANCE = 0.01  # relative change of a cost by linearization over a step 
 # Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
 # linearized steps made V ten times too small.
 _FEWEST_RELIABLE = 64
+# V that shows an error of linearization: in units of a known path's action, of that of a path on the grid, and an
+# excess over the former in units of what nodes change.
+_BELOW, _FAR_BELOW, _BEYOND_NODES = 0.9, 0.5, 2.0
 _SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
+_RETURNS = 8  # section intervals in which a state outside the region may come back to it
 _MARGIN = 0.04  # of the width, on each side of them
 
 Array = NDArray[np.float64]
@@ -44,6 +50,7 @@ class Coverage(ABC):
     problem: ExitProblem
     model: StepModel
     targets: Sequence[ExitTarget]
+    branches: Sequence[ActivationEnergy]  # known paths to the targets, one for each label that any is known for
 
     @abstractmethod
     def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
@@ -86,6 +93,14 @@ class Coverage(ABC):
         """Return the targets whose V lies well below the ceiling."""
         highest = _NEAR_CEILING * solved.potential.ceiling
         return [target for target in self.targets if solved.arrival(target).value < highest]
+
+    def ratios(self, solved: SolvedGrid, branches: Sequence[ActivationEnergy]) -> list[float]:
+        """For each attractor that a path leads to, return the least V where it is reached from, over the action."""
+        found = []
+        for branch in branches:
+            values = [solved.arrival(target).value for target in self.targets if branch.target in target.labels]
+            found.append(min(values) / branch.value)
+        return found
 
     def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
         """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess."""
@@ -159,7 +174,7 @@ class Coverage(ABC):
         return below
 
     def region(self, steps: int, shape: Shape, intervals: int) -> Grids:
-        """Grids that cover the region of the section, and in the other phases also the image of its basins.
+        """Grids that cover the region of the section and the targets, and in the other phases the image of its basins.
 
         What is in no basin is left out: such motion may grow without bound.
         """
@@ -168,7 +183,7 @@ class Coverage(ABC):
         states = region.cell_centres((_SAMPLES, _SAMPLES))
         basins, after = self.problem.structure.basins, self.model.images(states, 0.0, scene.section_interval)
         settled = (basins.at(states) >= 0) & (basins.at(after) >= 0)
-        states = states[settled] if settled.any() else states
+        states = np.concatenate([states[settled] if settled.any() else states, *(one.places for one in self.targets)])
         boxes = []
         for phase in range(1 if scene.autonomous else steps):
             low = np.minimum(states.min(axis=0), region.bounds[:, 0])
@@ -196,7 +211,23 @@ class Coverage(ABC):
         if phase not in grids.sections:
             rest = (grids.steps - phase % grids.steps) * grids.step
             states = self.model.images(states, grids.time(phase), rest)
-        return self.problem.structure.basins.at(states) == self.problem.source
+        return self._labels(states) == self.problem.source
+
+    def _labels(self, states: Array) -> NDArray[np.int16]:
+        """Return the labels of the basins that states on the section are in.
+
+        States outside the region are followed until they come back to it, for some section intervals.
+        """
+        basins, interval = self.problem.structure.basins, self.problem.scene.section_interval
+        labels, outside = basins.at(states), np.flatnonzero(~basins.region.contains(states))
+        for _ in range(_RETURNS):
+            if not outside.size:
+                break
+            images = self.model.images(states[outside], 0.0, interval)
+            labels[outside] = basins.at(images)
+            left = np.isfinite(images).all(axis=1) & ~basins.region.contains(images)
+            states[outside], outside = images, outside[left]
+        return labels
 
 
 class WholeRegion(Coverage):
@@ -229,14 +260,35 @@ class WholeRegion(Coverage):
         return self.closer(fine, WORTHWHILE) if fine.potential.grids.shape == shape and reliable else None
 
     def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
-        """As the paths on the grid show."""
-        targets = self.reached(coarse)
-        return coarse.linearization_error(targets) <= max(STEP_TOLERANCE, coarse.change(rougher, targets))
+        """As known paths show, or those on the grid where none are known.
+
+        Interpolation raises V, by no more than what nodes change once these are enough.
+        """
+        targets, branches = self._judged(coarse)
+        room = max(STEP_TOLERANCE, coarse.change(rougher, self.reached(coarse)))
+        low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room
+        if not all(low < ratio < high for ratio in self.ratios(coarse, branches)):
+            return False
+        return min(coarse.ratios(targets), default=1.0) > _FAR_BELOW and coarse.linearization_error(targets) <= room
 
     def excess(self, solved: SolvedGrid) -> float:
-        """Of the paths on the grid; infinite if no path to one of the targets could be traced."""
-        return solved.excess(self.reached(solved))
+        """Of known paths, and elsewhere of those on the grid; infinite if no path to a target could be traced."""
+        return max((abs(ratio - 1) for ratio in self._ratios(solved)), default=0.0)
 
     def lies_above(self, solved: SolvedGrid) -> bool:
-        """Than that of the path on the grid."""
-        return solved.lies_above(self.reached(solved), STEP_TOLERANCE)
+        """Than that of a known path, or elsewhere of the path on the grid."""
+        return any(1 + STEP_TOLERANCE < ratio < np.inf for ratio in self._ratios(solved))
+
+    def _ratios(self, solved: SolvedGrid) -> list[float]:
+        targets, branches = self._judged(solved)
+        return self.ratios(solved, branches) + solved.ratios(targets)
+
+    def _judged(self, solved: SolvedGrid) -> tuple[list[ExitTarget], list[ActivationEnergy]]:
+        """Targets that no path is known to, and known paths, but none that cost far less: these get other grids."""
+        known = {branch.target for branch in self.branches}
+        costs = {
+            target: solved.arrival(target).value for target in self.reached(solved) if known.isdisjoint(target.labels)
+        }
+        highest = max((*costs.values(), *(branch.value for branch in self.branches)), default=0.0)
+        targets = [target for target, cost in costs.items() if cost >= FAR_LESS * highest]
+        return targets, [branch for branch in self.branches if branch.value >= FAR_LESS * highest]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -43,8 +43,7 @@ class HierarchySearch:
 
     problem: ExitProblem
     model: StepModel
-    steps_per_period: tuple[int, ...]  # to be tried in turn
-    finest: Shape  # the last one, whose hierarchies are not kept
+    steps_per_period: Mapping[Shape, tuple[int, ...]]  # to be tried in turn, by number of nodes; the finest is the last
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
     _embedded: dict[int, ExitTarget] = dataclasses.field(default_factory=dict)  # by number of the saddle
 
@@ -61,7 +60,7 @@ class HierarchySearch:
             coverage = self._coverage(targets, before, known or KnownPaths())
             alike = before is not None and isinstance(before.coverage, type(coverage))
             hierarchy = self._hierarchy(coverage, shape, before if alike else None)
-            if shape != self.finest:
+            if shape != list(self.steps_per_period)[-1]:
                 self._solved_before[shape, frozenset(targets)] = hierarchy
             return {target: hierarchy.estimate(target) for target in coverage.targets}, hierarchy.fine.potential
 
@@ -71,7 +70,7 @@ class HierarchySearch:
         Raises StructureError if the grid does not reach it.
         """
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
-            coverage = WholeRegion(self.problem, self.model, (target,))
+            coverage = WholeRegion(self.problem, self.model, (target,), ())
             known = SolvedGrid(self.problem, self.model, potential)
             grids = coverage.around(known).with_shape(shape)
             solved = coverage.solved(grids, ROOM * coverage.highest(known), known)
@@ -79,8 +78,8 @@ class HierarchySearch:
 
     def _coverage(self, targets: Sequence[ExitTarget], before: GridHierarchy | None, known: KnownPaths) -> Coverage:
         """Around known paths, if grids there are far smaller than those before and V on these was too high."""
-        whole = WholeRegion(self.problem, self.model, targets)
         paths = known.to(targets)
+        whole = WholeRegion(self.problem, self.model, targets, paths)
         if before is None or not paths or not self.problem.attractor.is_fixed:
             return whole
         around = AroundPaths(self.problem, self.model, (*targets, *self._ends(paths, targets)), paths)
@@ -119,7 +118,7 @@ class HierarchySearch:
         """
         if before is not None and before.fine.potential.grids.shape == _shared(shape, before.intervals):
             return before
-        first, *shorter = (count for count in self.steps_per_period if before is None or count >= before.fine.steps)
+        first, *shorter = self._steps(shape, before)
         whole, rougher, coarse = self._begun(coverage, first, shape, before)
         for count in shorter:
             if coverage.steps_suffice(coarse, rougher):
@@ -135,6 +134,13 @@ class HierarchySearch:
         fine = coverage.solved(grids.with_shape(_shared(shape, coarse.intervals)), ceiling, coarse)
         long = functools.partial(coverage.solved, grids.with_double_step(), ceiling, coarse)
         return GridHierarchy(coverage, fine, coarse, whole, long)
+
+    def _steps(self, shape: Shape, before: GridHierarchy | None) -> list[int]:
+        """Numbers of steps to try, at least as many as before; raises StructureError if memory allows none of them."""
+        steps = [count for count in self.steps_per_period[shape] if before is None or count >= before.fine.steps]
+        if not steps:
+            raise StructureError(f"there is not enough memory for {shape} nodes; raise max_memory_gib.")
+        return steps
 
     def _begun(
         self, coverage: Coverage, steps: int, shape: Shape, before: GridHierarchy | None

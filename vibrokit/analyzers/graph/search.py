@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from vibrokit.analyzers.graph.beginnings import beginnings
+from vibrokit.analyzers.graph.coverage import FAR_LESS
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import TargetEstimate
 from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
@@ -30,7 +31,6 @@ from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
-_FAR_LESS = 0.25  # of the costliest exit: below, an exit gets a grid that reaches no farther than it needs
 _CLOSER = 3  # of these grids, at most, one after the other
 _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predecessor, uphill start, flags
 _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
@@ -59,12 +59,14 @@ class GraphSearch:
     Parameters
     ----------
     nodes : (int, int)
-        Nodes in x and in v.
+        Nodes in x and in v. `LeastAction` doubles them once more around paths that cost so little that these are too
+        coarse.
     steps_per_period : int, optional
         Steps of time in a section interval; even. By default 8, doubled (up to 64) until linearization over a step
         changes no cost by more than 1 %; all these numbers are larger where the interval is longer than 4π/ω_n.
     max_memory_gib : float
-        Memory that the search may take (GiB).
+        Memory that the search may take (GiB). Where it does not suffice for `nodes` with the least number of steps,
+        fewer nodes are taken: a finding tells how many. Longer steps would cost more accuracy.
 
     Raises
     ------
@@ -102,12 +104,13 @@ class GraphSearch:
         *_, best = self.solutions(problem)
         return best
 
-    def solutions(self, problem: ExitProblem, known: Callable[[], KnownPaths] = KnownPaths) -> Iterator[GraphSolution]:
+    def solutions(self, problem: ExitProblem, known: Callable[[], KnownPaths] | None = None) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
         exit has few nodes for one that costs far less. So those that do are solved again without the others. `known` is
-        called before each number of nodes.
+        called before each number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to
+        exits that are not settled then.
         """
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
@@ -122,71 +125,95 @@ class GraphSearch:
                 "the structure on a wider region."
             )
         with stage("exit targets", subject=attractor.name):
-            search = self._hierarchies(problem)
+            steps = self._affordable(problem.scene)
+            search = self._hierarchies(problem, steps)
             targets = exit_targets(problem, search.model)
-        found, refinements = _Found(), list(self._refinements())
-        for number, nodes in enumerate(refinements, start=1):
-            found.finer, paths = len(refinements) - number, known()
+        shapes = [nodes for nodes in steps if known is not None or nodes[0] <= self.nodes[0]]
+        found = _Found(self._findings(problem, shapes))
+        for number, nodes in enumerate(shapes, start=1):
+            found.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
+            found.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
             unsettled = [target for target in targets if not paths.settled >= set(target.labels)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for group in both if group]
             for group in groups:
                 try:
-                    yield from _solutions(problem, search, group, nodes, paths, found, last=group is groups[-1])
+                    yield from _solutions(problem, search, group, nodes, paths, found)
                 except StructureError:  # on few nodes, no exit may be reached
-                    if nodes == self.nodes and not found.estimates:
+                    if found.last_for_all and not found.estimates:
                         raise
+            if groups and found.estimates:
+                yield _solution(problem, search, found, nodes, last=True)
 
     def beginnings(
         self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
     ) -> tuple[Candidate, ...]:
         """Return candidates that begin otherwise than a known path, from a closer look at where a solution has it."""
-        return beginnings(problem, self._hierarchies(problem), solved.potential, energy)
+        search = self._hierarchies(problem, self._affordable(problem.scene))
+        return beginnings(problem, search, solved.potential, energy)
 
-    def _hierarchies(self, problem: ExitProblem) -> HierarchySearch:
-        """What solves hierarchies of up to the nodes that are set."""
-        steps = self._affordable_steps(problem.scene)
-        model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-        return HierarchySearch(problem, model, steps, self.nodes)
+    def _hierarchies(self, problem: ExitProblem, steps: Mapping[Shape, tuple[int, ...]]) -> HierarchySearch:
+        """What solves hierarchies, with some numbers of steps to try for each number of nodes."""
+        return HierarchySearch(problem, StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED)), steps)
 
-    def _refinements(self) -> Iterator[Shape]:
-        """Numbers of nodes from few to those that are set, each twice the one before."""
-        nx, nv = self.nodes
-        for part in _PARTS:
-            if min(nx, nv) // part >= _FEWEST_REFINED:
-                yield nx // part, nv // part
-        yield self.nodes
+    def _affordable(self, scene: Oscillator) -> dict[Shape, tuple[int, ...]]:
+        """Numbers of nodes, each twice the one before, with the numbers of steps to try that there is memory for.
 
-    def _affordable_steps(self, scene: Oscillator) -> tuple[int, ...]:
-        """Numbers of steps to try that there is memory for; in a long period, fewer than wanted if need be."""
-        doublings = doublings_of(scene)
+        Fewer nodes are taken before fewer steps. The last one has twice the `nodes`.
+        """
+        doublings, (nx, nv) = doublings_of(scene), self.nodes
         wanted = [2**doublings * steps for steps in _STEPS_PER_PERIOD]
-        fewer = [2**times * _STEPS_PER_PERIOD[0] for times in range(doublings)]
+        fewer = [2**times * _STEPS_PER_PERIOD[0] for times in reversed(range(doublings))]
         if self.steps_per_period is not None:
             wanted, fewer = [self.steps_per_period], []
-        allowed = [steps for steps in (*fewer, *wanted) if self._memory(scene, steps) <= self.max_memory_gib]
-        if not allowed:
-            (nx, nv), steps = self.nodes, (*fewer, *wanted)[0]
-            raise StructureError(
-                f"a graph of {nx} × {nv} nodes at {steps} phases needs {self._memory(scene, steps):.3g} GiB of "
-                f"memory, and max_memory_gib is {self.max_memory_gib:.3g}; lower nodes or raise max_memory_gib."
-            )
-        return tuple(steps for steps in allowed if steps >= wanted[0]) or (allowed[-1],)
+        shapes = [(nx // part, nv // part) for part in _PARTS if min(nx, nv) // part >= _FEWEST_REFINED] + [self.nodes]
+        found = {nodes: self._within(scene, nodes, wanted) for nodes in shapes}
+        finest = max((nodes for nodes, steps in found.items() if steps), default=None)
+        if finest is not None:
+            most = found[finest]
+            closer = self._within(scene, (2 * nx, 2 * nv), most)
+            return {nodes: most for nodes in shapes if nodes <= finest} | ({(2 * nx, 2 * nv): closer} if closer else {})
+        allowed = self._within(scene, shapes[0], fewer)
+        if allowed:
+            return {shapes[0]: allowed[:1]}
+        needs = self._memory(scene, self.nodes, wanted[0])
+        raise StructureError(
+            f"a graph of {nx} × {nv} nodes at {wanted[0]} phases needs {needs:.3g} GiB of memory, and max_memory_gib "
+            f"is {self.max_memory_gib:.3g}; lower nodes or raise max_memory_gib."
+        )
 
-    def _memory(self, scene: Oscillator, steps: int) -> float:
+    def _within(self, scene: Oscillator, nodes: Shape, steps: Iterable[int]) -> tuple[int, ...]:
+        """Numbers of steps that there is memory for on so many nodes."""
+        return tuple(count for count in steps if self._memory(scene, nodes, count) <= self.max_memory_gib)
+
+    def _memory(self, scene: Oscillator, nodes: Shape, steps: int) -> float:
         """Memory that a graph takes (GiB)."""
         phases = 1 if scene.autonomous else steps
-        return _ALL_GRIDS * self.nodes[0] * self.nodes[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
+        return _ALL_GRIDS * nodes[0] * nodes[1] * (phases * _BYTES_KEPT + _BYTES_PASSING) / 2**30
+
+    def _findings(self, problem: ExitProblem, shapes: Sequence[Shape]) -> tuple[Finding, ...]:
+        """What memory left out."""
+        if shapes[-1] >= self.nodes:
+            return ()
+        (nx, nv), (fewer_x, fewer_v) = self.nodes, shapes[-1]
+        return (
+            Finding.of(
+                Code.GRAPH_MEMORY, problem.source, nodes_x=fewer_x, nodes_v=fewer_v, wanted_x=nx, wanted_v=nv,
+                memory=self.max_memory_gib,
+            ),
+        )  # fmt: skip
 
 
 @dataclasses.dataclass(eq=False)
 class _Found:
     """What was found so far."""
 
+    findings: tuple[Finding, ...]
     estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
     potential: Potential | None = None  # on the finest grid that reaches the costliest target
     finer: int = 0  # refinements that follow
+    last_for_all: bool = False  # whether these are only for exits that the graph is too coarse for
 
 
 def _solutions(
@@ -196,8 +223,6 @@ def _solutions(
     nodes: Shape,
     known: KnownPaths,
     found: _Found,
-    *,
-    last: bool,
 ) -> Iterator[GraphSolution]:
     """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
     estimates = found.estimates
@@ -208,7 +233,7 @@ def _solutions(
     for _ in range(_CLOSER):
         costs = {target: min(estimates[target].value, known.cost(target)) for target in targets}
         highest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
-        targets = [target for target in targets if 0 < costs[target] < _FAR_LESS * highest]
+        targets = [target for target in targets if 0 < costs[target] < FAR_LESS * highest]
         if not targets:
             break
         yield _solution(problem, search, found, nodes, last=False)
@@ -221,7 +246,6 @@ def _solutions(
         ]
         targets = [target for target in targets if target in better]
         estimates |= {target: closer[target] for target in better}
-    yield _solution(problem, search, found, nodes, last=last)
 
 
 def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:
@@ -249,10 +273,10 @@ def _solution(
     used = Finding.of(
         Code.GRAPH, problem.source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=repr(search.model.stepper)
     )  # fmt: skip
+    cheapest = {label: estimate for target, estimate in reversed(reached) for label in target.labels}
     lost = [
         Finding.of(Code.GRAPH_PATH_LOST, problem.source, label)
-        for target, estimate in reached
-        for label in target.labels
+        for label, estimate in cheapest.items()
         if not estimate.candidates
     ]
     return GraphSolution(
@@ -273,11 +297,12 @@ def _solution(
         ),
         tuple(_labelled(reached)),
         potential,
-        (used, *lost),
-        {label: estimate.by_nodes for target, estimate in reversed(reached) for label in target.labels},
-        {label: estimate.side for target, estimate in reversed(reached) for label in target.labels},
+        (used, *found.findings, *lost),
+        {label: estimate.by_nodes for label, estimate in cheapest.items()},
+        {label: estimate.side for label, estimate in cheapest.items()},
         last,
         found.finer,
+        found.last_for_all,
     )
 
 

@@ -25,8 +25,9 @@ class GraphSolution:
     findings: tuple[Finding, ...]
     by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
     sides: Mapping[int, float]  # nodes along a side of the grid that gave it, the geometric mean
-    last: bool  # with so many nodes
+    last: bool  # no other one on as many nodes follows
     finer: int  # how many times the nodes along a side may still be doubled
+    last_for_all: bool  # whether finer ones follow only for exits that it is too coarse for
 
     def calibrated(self, polished: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """Return the estimates, with errors from actions that are known.

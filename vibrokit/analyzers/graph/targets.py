@@ -55,6 +55,11 @@ class ExitTarget(ABC):
         """Whether paths to it may pass basins of other attractors."""
         return False
 
+    @property
+    def places(self) -> Array:
+        """States on the section that a grid has to cover, shape (count, 2)."""
+        return np.empty((0, 2))
+
     @abstractmethod
     def evaluate(self, potential: Potential) -> Arrival:
         """Return what reaching the target costs, and where paths to it are traced back from."""
@@ -73,6 +78,11 @@ class StateTarget(ExitTarget):
         """Whether it is a basin: a saddle on the boundary of the own basin is reached before any other basin."""
         return self.depth is not None
 
+    @property
+    def places(self) -> Array:
+        """Its states: a saddle may lie outside the region."""
+        return self.states
+
     def evaluate(self, potential: Potential) -> Arrival:
         """The cheapest state.
 
@@ -84,13 +94,13 @@ class StateTarget(ExitTarget):
             return Arrival(np.inf)
         section, best = np.unravel_index(int(np.nanargmin(values)), values.shape)
         phase, cheapest = potential.grids.sections[section], self.states[best]
+        place = TraceStart(cheapest, phase)
         error = 0.0 if len(potential.orbit) else potential.rise(phase, cheapest)
         if self.depth is not None:
             error += max(0.0, potential.fall(phase, cheapest, self.depth))
         if self.direction is not None and np.isfinite(values[:, 0]).any():  # the saddle's point of that direction
             phase = potential.grids.sections[int(np.nanargmin(values[:, 0]))]
-        starts, place = self._starts(potential, phase, cheapest), TraceStart(cheapest, phase)
-        return Arrival(float(values[section, best]), error, starts, place)
+        return Arrival(float(values[section, best]), error, self._starts(potential, phase, cheapest), place)
 
     def _starts(self, potential: Potential, phase: int, cheapest: Array) -> tuple[TraceStart, ...]:
         """The cheapest state, or some just beyond a saddle, on the side that a path from the source comes to last."""

@@ -90,18 +90,7 @@ class SolvedGrid:
         known = [both for both in found if np.isfinite(both).all() and both[0] > 0]
         return max((abs(rough / value - 1) for value, rough in known), default=0.0)
 
-    def excess(self, targets: Iterable[ExitTarget]) -> float:
-        """Return the largest relative difference between V at a reached exit and the action of the path to it.
-
-        Infinite if no path to one of them could be traced.
-        """
-        return max((abs(ratio - 1) for ratio in self._ratios(targets)), default=0.0)
-
-    def lies_above(self, targets: Iterable[ExitTarget], tolerance: float) -> bool:
-        """Return whether V at a reached exit is larger than the action of the path to it, as by interpolation."""
-        return any(1 + tolerance < ratio < np.inf for ratio in self._ratios(targets))
-
-    def _ratios(self, targets: Iterable[ExitTarget]) -> list[float]:
+    def ratios(self, targets: Iterable[ExitTarget]) -> list[float]:
         """V at each reached exit in units of the action of the path to it; infinite where no path could be traced."""
         found = [(self.arrival(target).value, target) for target in targets]
         traced = [(value, self.paths(target)) for value, target in found if np.isfinite(value)]

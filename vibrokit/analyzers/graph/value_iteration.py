@@ -30,8 +30,8 @@ _IMPROVING = 3
 _WIDE_SEARCHES = 4  # each evaluates up to (2 · 8 + 1)² nodes for every node, many times what following costs
 _CONVERGED = 2e-5  # relative change of the mean of √V over a cycle; 10 times less changes V by at most 0.1 %
 _MOST_PERIODS = 400
-# Cycles whose mean is compared with that of as many before, and how many times the drift between the two their range
-# must be: at most once, where V converges from one side. In a stiff contact V may go round by 1e-4 to 1e-3 for ever.
+# V goes round if its range over 5 cycles is more than 4 times the drift of its mean from the 5 cycles before; where it
+# converges from one side, the ratio is at most 1. In a stiff contact V may go round by 1e-4 to 1e-3 for ever.
 _ROUND, _DRIFT = 5, 4.0
 
 Array = NDArray[np.float64]

@@ -106,8 +106,8 @@ class CandidatePolisher:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
-        near = itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES)
-        for candidate in itertools.chain(near, ranked[:1]):
+        near = list(itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES))
+        for candidate in (*near, *(each for each in ranked[:1] if each not in near)):
             if not self._is_wanted(end, candidate):
                 return
             try:

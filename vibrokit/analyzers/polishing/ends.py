@@ -217,9 +217,9 @@ class SaddleEnding(Ending):
 
 
 def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
-    """Return the ends that paths are polished to: those that are not a last resort, if any of them can be used.
+    """Return the ends that paths are polished to: the usable ones on the own basin boundary.
 
-    Those that are one are used as well where all others lie inside chaotic sets.
+    Where there are none, or all of them lie inside chaotic sets, saddles between other basins are added.
     """
     own = [end for end in problem.path_ends if not end.last_resort]
     usable = [end for end in own if not obstacle(end, problem)]
@@ -240,7 +240,7 @@ def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
 
 
 def obstacle(end: PathEnd, problem: ExitProblem) -> str:
-    """Return what an end is if no path can be polished to it, as to a basin; empty if one can."""
+    """Return why no path can be polished to an end, as a word; empty if one can."""
     if isinstance(end, AtFace):
         return ""
     if not isinstance(end, AtSaddle):

@@ -37,8 +37,12 @@ class FollowedPath:
     def of(cls, problem: ExitProblem, energy: ActivationEnergy) -> FollowedPath:
         """Polish the path of an energy once more; raises StructureError if it has none or that fails."""
         path, attractor = energy.path, problem.attractor
-        if path is None or not attractor.repeats:
-            raise StructureError(f"there is no polished path from {attractor.name}, an attractor that is an orbit.")
+        if not attractor.repeats:
+            raise StructureError(
+                f"{attractor.name} is {attractor.kind}; only paths that leave an orbit can be followed."
+            )
+        if path is None:
+            raise StructureError(f"the energy of leaving {attractor.name} has no path that could be followed.")
         ends = [
             end for end in problem.path_ends if end.saddle == energy.saddle and energy.target in end.targets
         ]  # fmt: skip

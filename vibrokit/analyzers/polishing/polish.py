@@ -141,6 +141,7 @@ class Polishing:
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("certifying", error, self._problem.source))
             for solved in found[certified:]:
+                self._findings += _remarks(self._problem, solved)
                 self._branches += _energies(self._problem, solved)
 
     def _new(self) -> list[SolvedPath]:
@@ -172,6 +173,7 @@ def _key(candidate: Candidate) -> tuple[int, bytes]:
 def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]) -> list[ActivationEnergy]:
     """The energies of a path with its certificate, or without if that fails."""
     source, action = problem.source, solved.action
+    findings += _remarks(problem, solved)
     try:
         certificates = [certify(leg.propagator, leg.found) for leg in solved.legs]
     except StructureError as failure:
@@ -180,14 +182,6 @@ def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]
     certificate = Certificate.combined(certificates)
     if any(leg.found.source.start_on_orbit for leg in solved.legs):
         findings.append(Finding.of(Code.STARTS_ON_ORBIT, source, action=action, periods=certificate.periods))
-    if solved.through:
-        findings += [
-            Finding.of(Code.PASSES_ORBITS, source, target, action=action, through=list(solved.through))
-            for target in solved.targets
-        ]
-    if len(solved.targets) > 1:
-        goals = [goal_name(problem.structure.names, label) for label in solved.targets]
-        findings.append(Finding.of(Code.ONE_SADDLE_TO_SEVERAL, source, saddle=solved.end.saddle, goals=goals))
     derivatives = [sensitivities(problem, leg.end, leg.propagator, leg.found) for leg in solved.legs]
     names = [name for name in derivatives[0] if all(name in each for each in derivatives)]
     return _energies(
@@ -199,6 +193,19 @@ def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]
         sensitivity={name: sum(each[name].value for each in derivatives) for name in names},
         sensitivity_error={name: sum(each[name].error for each in derivatives) for name in names},
     )
+
+
+def _remarks(problem: ExitProblem, solved: SolvedPath) -> list[Finding]:
+    """What a path passes, and where its end leads."""
+    found = [
+        Finding.of(Code.PASSES_ORBITS, problem.source, target, action=solved.action, through=list(solved.through))
+        for target in solved.targets
+        if solved.through
+    ]
+    if len(solved.targets) > 1:
+        goals = [goal_name(problem.structure.names, label) for label in solved.targets]
+        found.append(Finding.of(Code.ONE_SADDLE_TO_SEVERAL, problem.source, saddle=solved.end.saddle, goals=goals))
+    return found
 
 
 def _energies(
@@ -235,7 +242,8 @@ def _valleys(branches: Sequence[ActivationEnergy]) -> list[Finding]:
         return []
     best, findings = branches[0], []
     limit = (1 + _COMPETING) * best.value
-    alike = [branch.value for branch in branches if branch.path is not best.path and branch.value <= limit]
+    paths = {id(branch.path): branch for branch in branches if branch.value <= limit}  # one may lead to several
+    alike = [branch.value for branch in paths.values() if branch.path is not best.path]
     if alike:
         percent = 100 * _COMPETING
         findings.append(

@@ -1,0 +1,58 @@
+"""What the grids cover: a basin and a saddle that reach beyond the region, within the memory allowed."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.analyzers.graph.grids import Grids
+from vibrokit.analyzers.graph.potential import Potential
+from vibrokit.analyzers.graph.targets import StateTarget
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.results.codes import Code
+
+DAMPING = 0.05
+EXACT = 4 * DAMPING / 6  # ΔU = 4 ζ ω_n ΔE, and the well of x − x² is 1/6 deep
+# The exit path swings from −1/2 to the saddle at 1.
+REGIONS = {"cuts the basin": ((-0.2, 1.2), (-0.3, 0.3)), "leaves the saddle out": ((-0.2, 0.9), (-0.3, 0.3))}
+
+
+@functools.cache
+def problem(which):
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=DAMPING, spring=vk.CustomSpring("x - x**2"), noise=vk.WhiteNoise(1e-4)
+    )
+    structure = vk.find_structure(osc, region=REGIONS[which], rng=0, manifolds=False)
+    return ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
+
+
+@pytest.mark.parametrize("which", REGIONS)
+@pytest.mark.parametrize("nodes", [60, 120])
+def test_grids_reach_beyond_the_region_as_far_as_the_exit_needs(which, nodes):
+    (found,) = vk.GraphSearch(nodes=(nodes, nodes)).search(problem(which)).estimates
+    assert found.value == pytest.approx(EXACT, rel=0.01)
+    assert abs(found.value - EXACT) < found.numerical_error < 0.25 * EXACT
+
+
+def test_where_memory_is_short_fewer_nodes_are_taken():
+    search, many = vk.GraphSearch(nodes=(240, 240), max_memory_gib=0.05), vk.GraphSearch(nodes=(120, 120))
+    found, fewer = search.search(problem("cuts the basin")), many.search(problem("cuts the basin"))
+    assert found.estimates[0].value == fewer.estimates[0].value
+    (finding,) = [each for each in found.findings if each.code is Code.GRAPH_MEMORY]
+    assert (finding.values["nodes_x"], finding.values["wanted_x"]) == (120, 240)
+    assert Code.GRAPH_MEMORY not in [each.code for each in fewer.findings]
+
+
+def test_the_place_of_a_target_has_the_section_where_v_is_least():
+    """A saddle of period 2 on grids of two section intervals: V is least at its second point, on the second section."""
+    box = [[-1.0, 1.0], [-1.0, 1.0]]
+    grids = Grids(np.array([box] * 4), (21, 21), 0.5, 2)
+    x, v = np.moveaxis(grids.nodes(0), -1, 0)
+    values = [1 + (x + 0.5) ** 2 + v**2, np.ones_like(x), 0.5 + (x - 0.5) ** 2 + v**2, np.ones_like(x)]
+    potential = Potential(grids, values, [], np.zeros((21, 21), dtype=bool), np.empty((0, 2)), 9.0)
+    states = np.array([[-0.5, 0.0], [0.5, 0.0]])
+    arrival = StateTarget((1,), 0, 1.0, states, direction=np.array([1.0, 0.0])).evaluate(potential)
+    assert arrival.value == pytest.approx(0.5)
+    assert arrival.place.phase == 2
+    assert arrival.place.state == pytest.approx([0.5, 0.0])
