@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -110,6 +111,22 @@ def test_what_is_known_is_the_cheapest_path_to_each_attractor():
     assert [found.value for found in known.to([one])] == [1.0]
     assert known.cost(one) == 1.0
     assert KnownPaths().cost(one) == np.inf
+
+
+def test_a_saddle_is_left_out_if_known_paths_to_its_attractors_cost_far_less_or_need_no_graph():
+    """A saddle that leads to two attractors; one of them is reached far cheaper by another saddle."""
+    target = SimpleNamespace(labels=(1, 2), saddle=0)
+
+    def branch(label, value, saddle):
+        return ActivationEnergy(0, label, value, value, value, "", Bound.UPPER, saddle=saddle)
+
+    over = [branch(1, 1.0, 0), branch(2, 1.0, 0)]
+    cheaper = [*over, branch(1, 0.1, 3)]
+    assert KnownPaths(over, {2}).needs(target)
+    assert KnownPaths(cheaper).needs(target)
+    assert not KnownPaths(cheaper, {2}).needs(target)
+    assert not KnownPaths((), {1, 2}).needs(target)
+    assert KnownPaths([branch(1, 0.1, 3)], {2}).needs(target)  # no path over this saddle is known
 
 
 @pytest.mark.slow

@@ -266,7 +266,8 @@ class WholeRegion(Coverage):
         """
         targets, branches = self._judged(coarse)
         room = max(STEP_TOLERANCE, coarse.change(rougher, self.reached(coarse)))
-        low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room
+        fewer = rougher.potential.grids.shape < coarse.potential.grids.shape
+        low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
         if not all(low < ratio < high for ratio in self.ratios(coarse, branches)):
             return False
         return min(coarse.ratios(targets), default=1.0) > _FAR_BELOW and coarse.linearization_error(targets) <= room

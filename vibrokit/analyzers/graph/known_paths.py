@@ -7,6 +7,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
+from vibrokit.analyzers.graph.coverage import FAR_LESS
 from vibrokit.analyzers.graph.targets import ExitTarget
 from vibrokit.results.energy import ActivationEnergy
 
@@ -28,6 +29,19 @@ class KnownPaths:
             if usable and (label not in cheapest or branch.value < cheapest[label].value):
                 cheapest[label] = branch
         return list(cheapest.values())
+
+    def needs(self, target: ExitTarget) -> bool:
+        """Return whether an exit that needs the graph may lead there.
+
+        It does not if a known path to the same attractor costs far less by another saddle, whose grids reach less far.
+        """
+        for label in set(target.labels) - self.settled:
+            costs = [(branch.value, branch.saddle) for branch in self.branches if branch.target == label]
+            own = min((value for value, saddle in costs if saddle == target.saddle), default=np.inf)
+            least = min((value for value, _ in costs), default=np.inf)
+            if not (np.isfinite(own) and least < FAR_LESS * own):
+                return True
+        return False
 
     def cost(self, target: ExitTarget) -> float:
         """Return the action of the costliest path to the attractors that are reached from a target.

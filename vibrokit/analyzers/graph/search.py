@@ -133,7 +133,7 @@ class GraphSearch:
         for number, nodes in enumerate(shapes, start=1):
             found.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
             found.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
-            unsettled = [target for target in targets if not paths.settled >= set(target.labels)]
+            unsettled = [target for target in targets if paths.needs(target)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for group in both if group]
