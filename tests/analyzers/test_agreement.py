@@ -88,14 +88,17 @@ def test_a_vague_graph_is_not_the_energy_of_a_set():
     """Its lower bound holds, but its value says nothing."""
     energy, _ = only(CHAOS, (path(1.0),), (graph(0.1, 3.9),))
     assert (energy.value, energy.lower, energy.bound) == (1.0, 0.0, Bound.BRACKET)
+    assert energy.numerical_error == ERROR
 
 
 def test_the_energy_of_a_set_is_a_bracket():
     energy, finding = only(CHAOS, (path(1.0),), (graph(0.9, 0.2),))
     assert finding.code is Code.BRACKET
     assert energy.bound is Bound.BRACKET
-    assert energy.value == 0.9
+    assert (energy.value, energy.numerical_error) == (0.9, 0.2)
     assert (energy.lower, energy.upper) == pytest.approx((0.7, 1.0))
+    energy, _ = only(CHAOS, (path(1.0),), (graph(1.1, 0.2),))
+    assert (energy.value, energy.numerical_error) == (1.0, ERROR)
 
 
 def test_without_a_path_there_is_the_graph_s_estimate():

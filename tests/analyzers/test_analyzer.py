@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.results.codes import Code
 
 OSC = vk.load_scene("double-well")
 SOUND = vk.ActivationEnergy(0, 1, 0.05, 0.04, 0.06, "given", vk.Bound.ESTIMATE)
@@ -109,6 +110,20 @@ def test_an_analysis_may_change_with_what_is_found_later(structure):
     assert [energy.value for energy in Later(again=better).run(OSC, structure).energies] == [0.045, 0.05]
     assert [energy.value for energy in Later().run(OSC, structure).energies] == [0.05, 0.05]
     assert [energy.value for energy in Later(again=better, source=0).run(OSC, structure).energies] == [0.05]
+
+
+def test_a_result_that_was_interrupted_while_it_changed_is_not_complete(structure):
+    class Interrupted(Later):
+        def analyze(self, problem):
+            def revisit(known):
+                raise KeyboardInterrupt
+
+            return dataclasses.replace(super().analyze(problem), revisit=revisit)
+
+    result = Interrupted().run(OSC, structure)
+    assert not result.complete
+    assert [energy.value for energy in result.energies] == [0.05, 0.05]
+    assert len(result.found(Code.STOPPED)) == 1
 
 
 def test_what_it_changes_to_is_checked(structure):

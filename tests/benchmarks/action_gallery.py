@@ -60,6 +60,7 @@ forced("double well, forced", 0.8, 0.1, spring=WELLS, damping=0.1)
 forced("double well, linear stops", 0.9, 0.15, spring=WELLS, damping=0.15, stops=both(vk.Linear(30.0), 1.2))
 forced("double well, stops", 0.0, 0.0, spring=WELLS, stops=both(vk.Hertz(20.0), 0.9))
 forced("double well, slowly forced", 0.05, 0.15, spring=WELLS, damping=0.1)
+forced("double well, very slowly forced", 0.02, 0.2, spring=WELLS, damping=0.2)
 forced("double well, five orbits", 2.4, 0.3, spring=WELLS, damping=0.03)
 forced("double well, chaotic", 1.2, 0.3, spring=WELLS, damping=0.15)
 TRIPLE = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")
@@ -67,6 +68,9 @@ forced("triple well", 0.0, 0.0, spring=TRIPLE)
 forced("triple well, overdamped", 0.0, 0.0, spring=TRIPLE, damping=1.5)
 forced("triple well, forced", 0.8, 0.05, spring=TRIPLE, damping=0.2)
 forced("cubic well", 0.85, 0.05, spring=vk.CustomSpring("x - x**2"))
+forced("cubic well, one orbit", 0.88, 0.035, spring=vk.CustomSpring("x - x**2"), damping=0.04)
+forced("cubic well, stop", 0.85, 0.04, spring=vk.CustomSpring("x - x**2"), damping=0.03,
+       stops=(vk.Barrier(vk.Linear(50.0), -0.35, "left"),))  # fmt: skip
 forced("cubic well, unforced", 0.0, 0.0, spring=vk.CustomSpring("x - x**2"))
 forced("pendulum", 0.75, 0.25, spring=vk.CustomSpring("sin(x)"))
 forced("pendulum, tilted", 0.0, 0.0, spring=vk.CustomSpring("sin(x)"), damping=0.1, push=0.3)
@@ -75,6 +79,7 @@ for frequency in (0.525, 0.570):
 forced("linear stops", 0.57, 0.18, damping=0.01, push=0.2, stops=both(vk.Linear(50.0), 0.5))
 forced("hunt-crossley", 0.57, 0.18, damping=0.01, push=0.2,
        stops=both(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=0.3), 0.5))  # fmt: skip
+forced("kelvin-voigt", 0.75, 0.2, damping=0.02, stops=both(vk.CustomLaw("k*depth + c*rate", k=100.0, c=1.0), 0.4))
 forced("one stop, hard", 1.3, 0.2, damping=0.03, stops=(vk.Barrier(vk.Hertz(100.0), 0.5, "right"),))
 forced("two tones", 0.6, 0.2, damping=0.03, stops=both(vk.Hertz(30.0), 0.6), more=(vk.Harmonic(0.05, 1.2),))
 forced("zero gap", 2.0, 0.3, damping=0.03, stops=(vk.Barrier(vk.Linear(3.0), 0.0, "right"),))
