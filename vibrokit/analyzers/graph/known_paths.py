@@ -30,6 +30,10 @@ class KnownPaths:
                 cheapest[label] = branch
         return list(cheapest.values())
 
+    def leads_to_all(self, targets: Sequence[ExitTarget]) -> bool:
+        """Return whether a path is known to each attractor that is reached from some targets."""
+        return {label for target in targets for label in target.labels} <= {path.target for path in self.to(targets)}
+
     def needs(self, target: ExitTarget) -> bool:
         """Return whether an exit that needs the graph may lead there.
 

@@ -11,7 +11,7 @@ from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.graph.coverage import FAR_LESS
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import TargetEstimate
-from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
+from vibrokit.analyzers.graph.hierarchy_search import LOOSE, HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.potential import Potential
@@ -227,13 +227,11 @@ def _solutions(
     """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
     estimates = found.estimates
     solved, potential = search.estimates(targets, nodes, known)
-    estimates |= solved
+    estimates |= {target: one for target, one in solved.items() if np.isfinite(one.value) or target not in estimates}
     if found.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
         found.potential = potential
     for _ in range(_CLOSER):
-        costs = {target: min(estimates[target].value, known.cost(target)) for target in targets}
-        highest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
-        targets = [target for target in targets if 0 < costs[target] < FAR_LESS * highest]
+        targets = _apart(targets, estimates, known)
         if not targets:
             break
         yield _solution(problem, search, found, nodes, last=False)
@@ -246,6 +244,20 @@ def _solutions(
         ]
         targets = [target for target in targets if target in better]
         estimates |= {target: closer[target] for target in better}
+
+
+def _apart(
+    targets: Sequence[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate], known: KnownPaths
+) -> list[ExitTarget]:
+    """Targets that get grids of their own: they cost far less than others, or have known paths and others have none."""
+    costs = {target: min(estimates[target].value, known.cost(target)) for target in targets}
+    highest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
+    unknown = not known.leads_to_all(targets)
+    return [
+        target
+        for target in targets
+        if 0 < costs[target] < FAR_LESS * highest or (unknown and estimates[target].value > LOOSE * known.cost(target))
+    ]
 
 
 def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:

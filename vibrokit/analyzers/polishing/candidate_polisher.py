@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -26,6 +26,7 @@ _NEAR = 3.0  # times the distance to the nearest end: other ends that near are t
 _INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
 _QUICKLY = 0.0  # for the least action known: no finer pieces where the coarser ones do not converge
 _MOST_FAILURES = 6  # candidates that lead to no path to an end, after which no other one is tried
+_CHEAPER = 0.95  # times the least action that failed
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 
 
@@ -43,7 +44,7 @@ class CandidatePolisher:
         self.findings: list[Finding] = []
         self._solver = LegSolver(self.nodes, _left(problem, orbit))
         self._passing = PassingSearch(self.nodes)
-        self._failures: Counter[PathEnd] = Counter()
+        self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
         self._unsolved: list[Candidate] = []  # that led nowhere quickly
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
@@ -95,7 +96,7 @@ class CandidatePolisher:
                 new = self._add(self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,))))
             except StructureError as error:
                 failures.append(str(error))
-                self._failures[end] += not quick
+                self._failures[end] += [] if quick else [candidate.action]
             else:
                 found = True
                 if not new:  # another candidate has led there, and to where the other way leads
@@ -114,7 +115,7 @@ class CandidatePolisher:
                 self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
                 return
             except StructureError:
-                self._failures[end] += 1
+                self._failures[end].append(candidate.action)
 
     def _add(self, one: SolvedPath) -> bool:
         """Whether a path is new; it is added then."""
@@ -147,8 +148,13 @@ class CandidatePolisher:
         return [end for end in self._passing.ends if candidate.target in end.targets]
 
     def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
-        """Whether to look for a path to an end: not after many failures, nor inside a set if others cost less."""
-        if self._failures[end] >= _MOST_FAILURES and not any(one.end is end for one in self.solved):
+        """Whether to look for a path to an end: not after many failures, nor inside a set if others cost less.
+
+        A candidate that is cheaper than all that failed, as of a finer graph, is tried all the same.
+        """
+        failed = self._failures[end]
+        known = any(one.end is end for one in self.solved)
+        if len(failed) >= _MOST_FAILURES and not known and candidate.action > _CHEAPER * min(failed):
             return False
         others = (other for other in self.ends if set(other.targets) & set(end.targets))
         return not end.one_of_many or candidate.action < self._least(others)
