@@ -1,16 +1,19 @@
 """What the grids cover: a basin and a saddle that reach beyond the region, within the memory allowed."""
 
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.graph.coverage import WholeRegion
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
+from vibrokit.results.energy import ActivationEnergy, Bound
 
 DAMPING = 0.05
 EXACT = 4 * DAMPING / 6  # ΔU = 4 ζ ω_n ΔE, and the well of x − x² is 1/6 deep
@@ -42,6 +45,33 @@ def test_where_memory_is_short_fewer_nodes_are_taken():
     (finding,) = [each for each in found.findings if each.code is Code.GRAPH_MEMORY]
     assert (finding.values["nodes_x"], finding.values["wanted_x"]) == (120, 240)
     assert Code.GRAPH_MEMORY not in [each.code for each in fewer.findings]
+
+
+def grid(value, change, side):
+    """A grid with V at the only target in units of the known action."""
+    return SimpleNamespace(
+        arrival=lambda target: SimpleNamespace(value=value),
+        change=lambda rougher, targets: change,
+        ratios=lambda targets: [],
+        linearization_error=lambda targets: 0.0,
+        potential=SimpleNamespace(ceiling=9.0, grids=SimpleNamespace(shape=(side, side))),
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "change", "nodes_before", "suffice"),
+    [
+        (1.0, 0.0, 45, True), (0.98, 0.0, 45, False), (0.98, 0.05, 45, True), (0.92, 0.05, 45, False),
+        (0.92, 3.0, 45, True), (0.85, 3.0, 45, False), (1.5, 0.1, 45, False), (1.5, 0.1, 90, True),
+        (1.15, 0.1, 45, True), (5.0, 3.0, 45, True),
+    ],
+)  # fmt: skip
+def test_v_at_a_known_exit_asks_for_shorter_steps_where_nodes_do_not_explain_it(value, change, nodes_before, suffice):
+    """Interpolation raises V, and by no more than about what twice the nodes change."""
+    target = SimpleNamespace(labels=(1,), saddle=0)
+    known = ActivationEnergy(0, 1, 1.0, 1.0, 1.0, "", Bound.UPPER)
+    coverage = WholeRegion(None, None, (target,), (known,))
+    assert coverage.steps_suffice(grid(value, change, 90), grid(value, change, nodes_before)) is suffice
 
 
 def test_the_place_of_a_target_has_the_section_where_v_is_least():
