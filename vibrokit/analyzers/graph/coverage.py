@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -29,9 +30,9 @@ STEP_TOLERANCE = 0.01  # relative change of a cost by linearization over a step 
 # Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
 # linearized steps made V ten times too small.
 _FEWEST_RELIABLE = 64
-# V that shows an error of linearization: in units of a known path's action, of that of a path on the grid, and an
-# excess over the former in units of what nodes change.
-_BELOW, _FAR_BELOW, _BEYOND_NODES = 0.9, 0.5, 2.0
+# V that shows an error of linearization: in units of a known path's action, and an excess over it in units of what
+# nodes change.
+_BELOW, _BEYOND_NODES = 0.9, 2.0
 _SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
 _RETURNS = 8  # section intervals in which a state outside the region may come back to it
 _MARGIN = 0.04  # of the width, on each side of them
@@ -211,7 +212,15 @@ class Coverage(ABC):
         if phase not in grids.sections:
             rest = (grids.steps - phase % grids.steps) * grids.step
             states = self.model.images(states, grids.time(phase), rest)
-        return self._labels(states) == self.problem.source
+        labels = self._labels(states) if self._paths_leave_region else self.problem.structure.basins.at(states)
+        return labels == self.problem.source
+
+    @cached_property
+    def _paths_leave_region(self) -> bool:
+        """Whether known paths show that what lies beyond the region has to be covered."""
+        region = self.problem.structure.basins.region
+        paths = (branch.path for branch in self.branches)
+        return any(not region.contains(path.q[path.section, :2]).all() for path in paths if path is not None)
 
     def _labels(self, states: Array) -> NDArray[np.int16]:
         """Return the labels of the basins that states on the section are in.
@@ -270,7 +279,7 @@ class WholeRegion(Coverage):
         low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
         if not all(low < ratio < high for ratio in self.ratios(coarse, branches)):
             return False
-        return min(coarse.ratios(targets), default=1.0) > _FAR_BELOW and coarse.linearization_error(targets) <= room
+        return coarse.linearization_error(targets) <= room
 
     def excess(self, solved: SolvedGrid) -> float:
         """Of known paths, and elsewhere of those on the grid; infinite if no path to a target could be traced."""
