@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, ClassVar, dataclass_transform
@@ -167,28 +167,17 @@ class Analyzer(ABC):
         sources = self._checked(osc, structure, executor)
         kept = self._checkpoint(osc, structure, checkpoint)
         analyses: dict[int, Analysis] = {}
-        problems: dict[int, ExitProblem] = {}
-        findings: list[Finding] = []
-        stopped = False
+
+        def problem(attractor: Attractor) -> ExitProblem:
+            known = _known(analyses, attractor.label)
+            return ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept, known)
+
         with working(progress, time_limit) as work:
             try:
-                for attractor in sources:
-                    known = _known(analyses, attractor.label)
-                    problem = ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept, known)
-                    problems[attractor.label] = problem
-                    with stage(type(self).__name__, subject=attractor.name):
-                        analyses[attractor.label] = self._analyzed(problem)
-                    if not analyses[attractor.label].complete:
-                        break
-                else:
-                    for attractor in sources[:-1]:  # the last one knew the others
-                        with stage(type(self).__name__, subject=attractor.name):
-                            analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
-            except KeyboardInterrupt as interrupt:
-                stopped = True
-                findings.append(Finding.stopped(type(self).__name__, interrupt, attractor.label))
+                findings = self._analyze_all(sources, problem, analyses)
             finally:
                 kept.flush()
+            complete = not findings and len(analyses) == len(sources) and all(one.complete for one in analyses.values())
             if kept.failure:
                 findings.append(Finding.of(Code.CHECKPOINT_NOT_WRITTEN, path=str(kept.path), reason=kept.failure))
             return self.result.assembled(
@@ -204,9 +193,7 @@ class Analyzer(ABC):
                 scene=scene_data(osc),
                 settings=settings_of(self),
                 stats=work.stats,
-                complete=not stopped
-                and len(analyses) == len(sources)
-                and all(one.complete for one in analyses.values()),
+                complete=complete,
                 seconds=work.seconds,
             )
 
@@ -244,6 +231,28 @@ class Analyzer(ABC):
                 "versions": versions(),
             },
         )
+
+    def _analyze_all(
+        self,
+        sources: Sequence[Attractor],
+        problem_of: Callable[[Attractor], ExitProblem],
+        analyses: dict[int, Analysis],
+    ) -> list[Finding]:
+        """Analyze all attractors, then see what those found later change of the earlier ones; note an interrupt."""
+        problems: dict[int, ExitProblem] = {}
+        try:
+            for attractor in sources:
+                problem = problems[attractor.label] = problem_of(attractor)
+                with stage(type(self).__name__, subject=attractor.name):
+                    analyses[attractor.label] = self._analyzed(problem)
+                if not analyses[attractor.label].complete:
+                    return []
+            for attractor in sources[:-1]:  # the last one knew the others
+                with stage(type(self).__name__, subject=attractor.name):
+                    analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
+        except KeyboardInterrupt as interrupt:
+            return [Finding.stopped(type(self).__name__, interrupt, attractor.label)]
+        return []
 
     def _analyzed(self, problem: ExitProblem) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""

@@ -58,10 +58,7 @@ class AroundPaths(Coverage):
 
     def highest(self, solved: SolvedGrid) -> float:
         """The cost of the costliest attractor that a path is known to."""
-        return max(
-            ratio * branch.value
-            for ratio, branch in zip(self.ratios(solved, self.branches), self.branches, strict=True)
-        )
+        return max(ratio * branch.value for ratio, branch in zip(self.ratios(solved), self.branches, strict=True))
 
     def level(self, solved: SolvedGrid) -> float:
         """The action of the costliest known path."""
@@ -86,19 +83,19 @@ class AroundPaths(Coverage):
 
     def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
         """If V is not below the actions of known paths, where only linearization or a cheaper path takes it."""
-        return min(self.ratios(coarse, self.branches)) >= 1 - STEP_TOLERANCE
+        return min(self.ratios(coarse)) >= 1 - STEP_TOLERANCE
 
     def rank(self, solved: SolvedGrid) -> float:
         """By how far V is from the action of the costliest known path, above or below."""
         return abs(self.highest(solved) / self.scale - 1)
 
-    def excess(self, solved: SolvedGrid) -> float:
-        """Of the known paths."""
-        return max(abs(ratio - 1) for ratio in self.ratios(solved, self.branches))
+    def ratios(self, solved: SolvedGrid) -> list[float]:
+        """By the known paths."""
+        return self.known_ratios(solved, self.branches)
 
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Than that of a known path."""
-        return max(self.ratios(solved, self.branches)) > 1 + STEP_TOLERANCE
+        return max(self.ratios(solved)) > 1 + STEP_TOLERANCE
 
     def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
         """Solve again in any case if nodes that have to be covered lie at the edge."""

@@ -83,19 +83,23 @@ class Coverage(ABC):
         """Return whether shorter steps would change costs by less than the error of the nodes."""
 
     @abstractmethod
-    def excess(self, solved: SolvedGrid) -> float:
-        """Return the largest relative difference between V at an exit and the action of the path to it."""
-
-    @abstractmethod
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Return whether V at an exit is larger than the action of the path to it, as by interpolation."""
+
+    @abstractmethod
+    def ratios(self, solved: SolvedGrid) -> list[float]:
+        """V at the exits that the grids are for, in units of the actions of paths; infinite where there is no path."""
+
+    def excess(self, solved: SolvedGrid) -> float:
+        """Return the largest relative difference between V at an exit and the action of the path to it."""
+        return max((abs(ratio - 1) for ratio in self.ratios(solved)), default=0.0)
 
     def reached(self, solved: SolvedGrid) -> list[ExitTarget]:
         """Return the targets whose V lies well below the ceiling."""
         highest = _NEAR_CEILING * solved.potential.ceiling
         return [target for target in self.targets if solved.arrival(target).value < highest]
 
-    def ratios(self, solved: SolvedGrid, branches: Sequence[ActivationEnergy]) -> list[float]:
+    def known_ratios(self, solved: SolvedGrid, branches: Sequence[ActivationEnergy]) -> list[float]:
         """For each attractor that a path leads to, return the least V where it is reached from, over the action."""
         found = []
         for branch in branches:
@@ -229,13 +233,14 @@ class Coverage(ABC):
         """
         basins, interval = self.problem.structure.basins, self.problem.scene.section_interval
         labels, outside = basins.at(states), np.flatnonzero(~basins.region.contains(states))
+        states = states[outside]
         for _ in range(_RETURNS):
             if not outside.size:
                 break
-            images = self.model.images(states[outside], 0.0, interval)
-            labels[outside] = basins.at(images)
-            left = np.isfinite(images).all(axis=1) & ~basins.region.contains(images)
-            states[outside], outside = images, outside[left]
+            states = self.model.images(states, 0.0, interval)
+            labels[outside] = basins.at(states)
+            left = np.isfinite(states).all(axis=1) & ~basins.region.contains(states)
+            states, outside = states[left], outside[left]
         return labels
 
 
@@ -277,21 +282,18 @@ class WholeRegion(Coverage):
         room = max(STEP_TOLERANCE, coarse.change(rougher, self.reached(coarse)))
         fewer = rougher.potential.grids.shape < coarse.potential.grids.shape
         low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
-        if not all(low < ratio < high for ratio in self.ratios(coarse, branches)):
+        if not all(low < ratio < high for ratio in self.known_ratios(coarse, branches)):
             return False
         return coarse.linearization_error(targets) <= room
 
-    def excess(self, solved: SolvedGrid) -> float:
-        """Of known paths, and elsewhere of those on the grid; infinite if no path to a target could be traced."""
-        return max((abs(ratio - 1) for ratio in self._ratios(solved)), default=0.0)
-
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Than that of a known path, or elsewhere of the path on the grid."""
-        return any(1 + STEP_TOLERANCE < ratio < np.inf for ratio in self._ratios(solved))
+        return any(1 + STEP_TOLERANCE < ratio < np.inf for ratio in self.ratios(solved))
 
-    def _ratios(self, solved: SolvedGrid) -> list[float]:
+    def ratios(self, solved: SolvedGrid) -> list[float]:
+        """By known paths, and elsewhere by those on the grid."""
         targets, branches = self._judged(solved)
-        return self.ratios(solved, branches) + solved.ratios(targets)
+        return self.known_ratios(solved, branches) + solved.ratios(targets)
 
     def _judged(self, solved: SolvedGrid) -> tuple[list[ExitTarget], list[ActivationEnergy]]:
         """Targets that no path is known to, and known paths, but none that cost far less: these get other grids."""

@@ -80,7 +80,7 @@ class HierarchySearch:
         """Around known paths to all targets, if grids there are far smaller and V on those before was too high."""
         paths = known.to(targets)
         whole = WholeRegion(self.problem, self.model, targets, paths)
-        if before is None or not paths or not known.leads_to_all(targets) or not self.problem.attractor.is_fixed:
+        if before is None or not known.leads_to_all(targets) or not self.problem.attractor.is_fixed:
             return whole
         around = AroundPaths(self.problem, self.model, (*targets, *self._ends(paths, targets)), paths)
         if isinstance(before.coverage, AroundPaths):

@@ -32,7 +32,7 @@ class KnownPaths:
 
     def leads_to_all(self, targets: Sequence[ExitTarget]) -> bool:
         """Return whether a path is known to each attractor that is reached from some targets."""
-        return {label for target in targets for label in target.labels} <= {path.target for path in self.to(targets)}
+        return bool(np.isfinite([self.cost(target) for target in targets]).all())
 
     def needs(self, target: ExitTarget) -> bool:
         """Return whether an exit that needs the graph may lead there.

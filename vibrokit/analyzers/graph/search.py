@@ -8,30 +8,25 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from vibrokit.analyzers.graph.beginnings import beginnings
-from vibrokit.analyzers.graph.coverage import FAR_LESS
+from vibrokit.analyzers.graph.exit_costs import ExitCosts
 from vibrokit.analyzers.graph.grids import Shape
-from vibrokit.analyzers.graph.hierarchy import TargetEstimate
-from vibrokit.analyzers.graph.hierarchy_search import LOOSE, HierarchySearch
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
-from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.graph.targets import ExitTarget
-from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import SceneError, StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
 from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
 
-_CLOSER = 3  # of these grids, at most, one after the other
 _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predecessor, uphill start, flags
 _BYTES_PASSING = 700  # for each node of one phase, while its steps are integrated
 _ALL_GRIDS = 1.9  # memory of all grids together, in units of the finest
@@ -129,22 +124,22 @@ class GraphSearch:
             search = self._hierarchies(problem, steps)
             targets = exit_targets(problem, search.model)
         shapes = [nodes for nodes in steps if known is not None or nodes[0] <= self.nodes[0]]
-        found = _Found(self._findings(problem, shapes))
+        costs = ExitCosts(search, self._findings(problem, shapes))
         for number, nodes in enumerate(shapes, start=1):
-            found.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
-            found.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
+            costs.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
+            costs.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
             unsettled = [target for target in targets if paths.needs(target)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for group in both if group]
             for group in groups:
                 try:
-                    yield from _solutions(problem, search, group, nodes, paths, found)
+                    yield from costs.refined(group, nodes, paths)
                 except StructureError:  # on few nodes, no exit may be reached
-                    if found.last_for_all and not found.estimates:
+                    if costs.last_for_all and not costs.estimates:
                         raise
-            if groups and found.estimates:
-                yield _solution(problem, search, found, nodes, last=True)
+            if groups and costs.estimates:
+                yield costs.solution(nodes, last=True)
 
     def beginnings(
         self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
@@ -203,125 +198,3 @@ class GraphSearch:
                 memory=self.max_memory_gib,
             ),
         )  # fmt: skip
-
-
-@dataclasses.dataclass(eq=False)
-class _Found:
-    """What was found so far."""
-
-    findings: tuple[Finding, ...]
-    estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
-    potential: Potential | None = None  # on the finest grid that reaches the costliest target
-    finer: int = 0  # refinements that follow
-    last_for_all: bool = False  # whether these are only for exits that the graph is too coarse for
-
-
-def _solutions(
-    problem: ExitProblem,
-    search: HierarchySearch,
-    targets: Sequence[ExitTarget],
-    nodes: Shape,
-    known: KnownPaths,
-    found: _Found,
-) -> Iterator[GraphSolution]:
-    """Solve for all targets together, then for those that cost far less without the others; keep what is known."""
-    estimates = found.estimates
-    solved, potential = search.estimates(targets, nodes, known)
-    estimates |= {target: one for target, one in solved.items() if np.isfinite(one.value) or target not in estimates}
-    if found.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
-        found.potential = potential
-    for _ in range(_CLOSER):
-        targets = _apart(targets, estimates, known)
-        if not targets:
-            break
-        yield _solution(problem, search, found, nodes, last=False)
-        try:
-            closer, _ = search.estimates(targets, nodes, known)
-        except StructureError:  # too close to the attractor for any grid
-            break
-        better = [
-            target for target in closer if target not in estimates or closer[target].error < estimates[target].error
-        ]
-        targets = [target for target in targets if target in better]
-        estimates |= {target: closer[target] for target in better}
-
-
-def _apart(
-    targets: Sequence[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate], known: KnownPaths
-) -> list[ExitTarget]:
-    """Targets that get grids of their own: they cost far less than others, or have known paths and others have none."""
-    costs = {target: min(estimates[target].value, known.cost(target)) for target in targets}
-    highest = max((cost for cost in costs.values() if np.isfinite(cost)), default=0.0)
-    unknown = not known.leads_to_all(targets)
-    return [
-        target
-        for target in targets
-        if 0 < costs[target] < FAR_LESS * highest or (unknown and estimates[target].value > LOOSE * known.cost(target))
-    ]
-
-
-def _highest(targets: Iterable[ExitTarget], estimates: Mapping[ExitTarget, TargetEstimate]) -> float:
-    """The cost of the costliest of those targets that are reached; 0 if none is."""
-    return max((estimates[target].value for target in targets if np.isfinite(estimates[target].value)), default=0.0)
-
-
-def _solution(
-    problem: ExitProblem,
-    search: HierarchySearch,
-    found: _Found,
-    nodes: Shape,
-    *,
-    last: bool,
-) -> GraphSolution:
-    """What is known of the targets, put together."""
-    reached = [
-        (target, estimate)
-        for target, estimate in sorted(found.estimates.items(), key=lambda entry: entry[1].value)
-        if np.isfinite(estimate.value)
-    ]
-    potential, (nx, nv) = found.potential, nodes
-    assert potential is not None
-    steps = potential.grids.steps
-    used = Finding.of(
-        Code.GRAPH, problem.source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=repr(search.model.stepper)
-    )  # fmt: skip
-    cheapest = {label: estimate for target, estimate in reversed(reached) for label in target.labels}
-    lost = [
-        Finding.of(Code.GRAPH_PATH_LOST, problem.source, label)
-        for label, estimate in cheapest.items()
-        if not estimate.candidates
-    ]
-    return GraphSolution(
-        tuple(
-            ActivationEnergy(
-                source=problem.source,
-                target=label,
-                value=estimate.value,
-                lower=max(0.0, estimate.value - estimate.error),
-                upper=estimate.value + estimate.error,
-                method=METHOD,
-                bound=Bound.ESTIMATE,
-                numerical_error=estimate.error,
-                saddle=target.saddle,
-            )
-            for target, estimate in reached
-            for label in target.labels
-        ),
-        tuple(_labelled(reached)),
-        potential,
-        (used, *found.findings, *lost),
-        {label: estimate.by_nodes for label, estimate in cheapest.items()},
-        {label: estimate.side for label, estimate in cheapest.items()},
-        last,
-        found.finer,
-        found.last_for_all,
-    )
-
-
-def _labelled(reached: Sequence[tuple[ExitTarget, TargetEstimate]]) -> Iterator[Candidate]:
-    """The candidates of targets, the cheapest first, each for an attractor that no cheaper target leads to, if any."""
-    known = set[int]()
-    for target, estimate in reached:
-        label = next((label for label in target.labels if label not in known), target.labels[0])
-        known |= set(target.labels)
-        yield from (dataclasses.replace(candidate, target=label) for candidate in estimate.candidates)
