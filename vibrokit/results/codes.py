@@ -209,6 +209,12 @@ class Code(StrEnum):
         "Raise the number of nodes.",
     )  # fmt: skip
 
+    GRAPH_NOT_CONVERGED = (
+        "graph-not-converged", WARNING,
+        "The graph's potential around {state} had not converged when its sweeps ended: more of them may change it by "
+        "{part:.1%}.", "Where damping is weak, use the polished path; the graph's error includes this part.",
+    )  # fmt: skip
+
     # Exit times
     CHECKPOINT_NOT_WRITTEN = (
         "checkpoint-not-written", WARNING, "The checkpoint {path} could not be written: {reason}",

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.analyzers.graph import linear
+from vibrokit.analyzers.graph import value_iteration
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.seeds import seeds
 from vibrokit.analyzers.graph.step_model import StepModel
@@ -117,3 +118,19 @@ def test_a_path_that_never_comes_closer_to_the_attractor_is_given_up(solved):
     counting = SimpleNamespace(into=lambda *given: steps.append(given) or model.into(*given))
     assert backtrack(counting, hollow, np.array([0.6, 0.0])) is None
     assert len(steps) <= 16 * GRIDS.steps
+
+
+def test_what_more_sweeps_change_is_estimated_where_these_end_too_early(monkeypatch):
+    model = StepModel(linear.oscillator(0.005), RK4(256))
+    (attractor,) = linear.structure(0.005).attractors
+    iteration = ValueIteration(model, attractor, GRIDS)
+    ceiling = linear.potential(0.005, 1.0, np.array([1.2, 0.0]))
+    settled = iteration.up_to(ceiling)
+    assert settled.unsettled == 0.0
+    levels = {}
+    for periods in (44, 80):
+        monkeypatch.setattr(value_iteration, "_MOST_PERIODS", periods)
+        early = iteration.up_to(ceiling)
+        change = 1 - float(np.mean(np.sqrt(settled.values[0])) / np.mean(np.sqrt(early.values[0]))) ** 2
+        levels[periods] = change, early.unsettled
+    assert all(0 < change < left for change, left in levels.values())

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from vibrokit.analyzers.graph.coverage import FAR_LESS
+from vibrokit.analyzers.graph.coverage import FAR_LESS, STEP_TOLERANCE
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import TargetEstimate
 from vibrokit.analyzers.graph.hierarchy_search import LOOSE, HierarchySearch
@@ -98,13 +98,19 @@ class ExitCosts:
             ),
             tuple(_labelled(reached)),
             potential,
-            (used, *self.findings, *lost),
+            (used, *self.findings, *self._not_converged(), *lost),
             {label: estimate.by_nodes for label, estimate in cheapest.items()},
             {label: estimate.side for label, estimate in cheapest.items()},
             last,
             self.finer,
             self.last_for_all,
         )
+
+    def _not_converged(self) -> Iterator[Finding]:
+        """What sweeps left open, if that matters."""
+        part = max((estimate.unsettled for estimate in self.estimates.values()), default=0.0)
+        if part > STEP_TOLERANCE:
+            yield Finding.of(Code.GRAPH_NOT_CONVERGED, self.search.problem.source, part=part)
 
 
 def _apart(

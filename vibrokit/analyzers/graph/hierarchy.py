@@ -25,6 +25,7 @@ class TargetEstimate:
     value: float
     error: float  # both are infinite if the target was not reached
     by_nodes: float  # part of the error that the nodes alone show
+    unsettled: float  # the part of the value by which more sweeps may change it
     side: float  # nodes along a side of the grid, the geometric mean of both
     candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
 
@@ -53,9 +54,10 @@ class GridHierarchy:
         """Return what an exit target costs.
 
         The error is the change by halving the nodes, the difference from a path's action by Hamilton's equations (if
-        no path was traced, half the change by doubling the step), and that of the target's own place.
+        no path was traced, half the change by doubling the step), that of the target's own place, and what more sweeps
+        may change.
         """
-        by_nodes = np.inf
+        by_nodes, unsettled = np.inf, self.fine.potential.unsettled
         fine, coarse = self._value(self.fine, target), self._value(self.coarse, target)
         grids = (self.fine, self.coarse) if np.isfinite(fine) else (self.whole,)
         reached = (grid for grid in grids if np.isfinite(self._value(grid, target)))
@@ -68,12 +70,12 @@ class GridHierarchy:
                 else _STEP_FACTOR * abs(coarse - self._value(self.long, target))
             )
         if np.isfinite(by_step):
-            by_nodes = abs(fine - coarse) + self.fine.arrival(target).error
+            by_nodes = abs(fine - coarse) + self.fine.arrival(target).error + unsettled * fine
             value, error = fine, by_nodes + by_step
         else:
             value = error = self._value(self.whole, target)
         side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
-        return TargetEstimate(value, error, by_nodes, side, tuple(path.candidate for path in paths))
+        return TargetEstimate(value, error, by_nodes, unsettled, side, tuple(path.candidate for path in paths))
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""

@@ -28,6 +28,7 @@ class Potential:
     seeded: NDArray[np.bool_]  # (nx, nv): nodes of phase 0 whose V is known beforehand
     orbit: Array  # (count, 2): states of the attractor from phase to phase if it is an orbit; else empty
     ceiling: float  # V up to which paths are searched
+    unsettled: float = 0.0  # the part of V by which more sweeps may change it
 
     def reached(self, grids: Grids, level: float) -> list[Mask]:
         """Return which nodes of each phase of other grids lie near nodes where V is below a level and the ceiling.

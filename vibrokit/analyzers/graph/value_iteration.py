@@ -77,11 +77,14 @@ class ValueIteration:
         self.ceilings = [np.minimum(bound, ceiling) for bound in self.bounds]
         self.values = [np.minimum(*both) for both in zip(self.known, self.ceilings, strict=True)]
         self.predecessors = [known.copy() for known in self.predecessors]
-        self._improve()
-        return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, ceiling)
+        unsettled = self._improve()
+        return Potential(self.grids, self.values, self.predecessors, self.fixed[0], self.orbit, ceiling, unsettled)
 
-    def _improve(self) -> None:
-        """Sweep, period by period, until V stays the same even after every node was evaluated once more."""
+    def _improve(self) -> float:
+        """Sweep, period by period, until V stays the same even after every node was evaluated once more.
+
+        Return the part of V by which it may still change.
+        """
         active, risen = self._all(), False
         levels, at_rest = [self._level()], np.inf
         for period in range(_MOST_PERIODS):
@@ -93,12 +96,13 @@ class ValueIteration:
                 level = self._level()
                 if changes == 0 or abs(levels[-1] - level) <= _CONVERGED * level:
                     if abs(at_rest - level) <= _CONVERGED * level:
-                        break
+                        return 0.0
                     at_rest, active = level, self._all()
                 risen = risen or level > levels[-1]
                 levels.append(level)
                 if _goes_round(levels):
-                    break
+                    return 2 * float(np.ptp(levels[-_ROUND:])) / level
+        return 2 * _left(levels)
 
     def _all(self) -> list[Flags]:
         return [np.ones(self.grids.shape, dtype=np.uint8) for _ in range(self.grids.phases)]
@@ -166,6 +170,16 @@ def _goes_round(levels: Sequence[float]) -> bool:
         return False
     earlier, later = levels[-2 * _ROUND : -_ROUND], levels[-_ROUND:]
     return float(np.ptp(later)) > _DRIFT * abs(float(np.mean(later) - np.mean(earlier)))
+
+
+def _left(levels: Sequence[float]) -> float:
+    """Return the part by which levels still change, if they go on as in the last two times 5 cycles; at most 1."""
+    recent = np.array(levels[-2 * _ROUND - 1 :])
+    changes = np.diff(recent)
+    if not (np.all(changes <= 0) or np.all(changes >= 0)):
+        return float(np.ptp(recent) / recent[-1])
+    earlier, later = np.abs([changes[:_ROUND].sum(), changes[_ROUND:].sum()])
+    return float(min(1.0, later**2 / (earlier - later) / recent[-1])) if later < earlier else 1.0
 
 
 def _on_nodes(rows: Array, kept: Mask) -> Array:

@@ -168,7 +168,10 @@ class PathSolver:
         )  # fmt: skip
 
     def _from_orbit(self, first: int, cut: Cut, points: Array, failure: StructureError) -> ExtremalPath:
-        """A path that starts on the orbit itself, so long that a longer one is hardly cheaper; else the failure."""
+        """A path that starts on the orbit itself: the longest that converges, or hardly costs more than a longer one.
+
+        Raises the failure if none converges. What its length changes is in its certificate.
+        """
         best, failures, propagator = None, 0, self.propagator
         source = self.source.with_start_on_orbit()
         if source is None:
