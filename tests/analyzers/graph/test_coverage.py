@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers.graph import value_iteration
 from vibrokit.analyzers.graph.coverage import WholeRegion
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.known_paths import KnownPaths
@@ -50,6 +51,17 @@ def test_where_memory_is_short_fewer_nodes_are_taken():
     (finding,) = [each for each in found.findings if each.code is Code.GRAPH_MEMORY]
     assert (finding.values["nodes_x"], finding.values["wanted_x"]) == (120, 240)
     assert Code.GRAPH_MEMORY not in [each.code for each in fewer.findings]
+
+
+def test_sweeps_that_end_too_early_are_found(monkeypatch):
+    search = vk.GraphSearch(nodes=(60, 60))
+    enough = search.search(problem("cuts the basin"))
+    assert Code.GRAPH_NOT_CONVERGED not in [finding.code for finding in enough.findings]
+    monkeypatch.setattr(value_iteration, "_MOST_PERIODS", 4)
+    early = search.search(problem("cuts the basin"))
+    (finding,) = [each for each in early.findings if each.code is Code.GRAPH_NOT_CONVERGED]
+    assert finding.values["part"] > 0.01
+    assert early.estimates[0].numerical_error >= finding.values["part"] * early.estimates[0].value
 
 
 def grid(value, change, side):

@@ -178,7 +178,8 @@ def _left(levels: Sequence[float]) -> float:
     changes = np.diff(recent)
     if not (np.all(changes <= 0) or np.all(changes >= 0)):
         return float(np.ptp(recent) / recent[-1])
-    earlier, later = np.abs([changes[:_ROUND].sum(), changes[_ROUND:].sum()])
+    half = len(changes) // 2
+    earlier, later = np.abs([changes[:half].sum(), changes[half:].sum()])
     return float(min(1.0, later**2 / (earlier - later) / recent[-1])) if later < earlier else 1.0
 
 
