@@ -100,7 +100,8 @@ def estimate(target, value, error):
 
 
 def graph_of(estimates, finer=0, side=180.0):
-    return SimpleNamespace(estimates=estimates, finer=finer, sides={each.target: side for each in estimates})
+    cheapest = {each.target: SimpleNamespace(side=side) for each in estimates}
+    return SimpleNamespace(estimates=estimates, finer=finer, cheapest=cheapest)
 
 
 def test_the_last_doubling_of_the_nodes_is_for_exits_with_a_path_that_the_graph_is_too_coarse_for():

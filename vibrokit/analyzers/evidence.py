@@ -98,7 +98,7 @@ class Evidence:
         target, error = estimate.target, estimate.numerical_error
         if self.graph is None or self.rougher is None or target not in self._errors_before or not error:
             return _GAIN
-        doublings = math.log2(self.graph.sides[target] / self.rougher.sides[target])
+        doublings = math.log2(self.graph.cheapest[target].side / self.rougher.cheapest[target].side)
         return min(_GAIN, max(1.0, self._errors_before[target] / error) ** (1 / doublings)) if doublings > 0 else _GAIN
 
     @cached_property
@@ -119,11 +119,12 @@ class Evidence:
         """Exits for which finer grids are of no use.
 
         For an attractor that is reached through other basins a rough estimate suffices. Without a path it is not
-        refined.
-        Mirror images have their bounds, and so have paths that cost the least possible.
+        refined further once its error is below its value. Mirror images have their bounds, and so have paths that cost
+        the least possible.
         """
         agreed, exact = self._found(Code.AGREEMENT), self._found(*_EXACT)
-        beyond = {label for label in self.beyond if label in agreed or label not in self.cheapest}
+        rough = {each.target for each in self.estimates if each.numerical_error < each.value} - self.cheapest.keys()
+        beyond = self.beyond & (agreed | rough)
         return self.unresolvable | exact | beyond
 
     @cached_property

@@ -74,8 +74,9 @@ class GridHierarchy:
             value, error = fine, by_nodes + by_step
         else:
             value = error = self._value(self.whole, target)
+        candidates = tuple(path.candidate for path in paths)
         side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
-        return TargetEstimate(value, error, by_nodes, unsettled, side, tuple(path.candidate for path in paths))
+        return TargetEstimate(value, error, by_nodes, unsettled, side, candidates)
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""

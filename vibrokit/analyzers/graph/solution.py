@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray
 
-from vibrokit.analyzers.graph.hierarchy import PATH_FACTOR
+from vibrokit.analyzers.graph.hierarchy import PATH_FACTOR, TargetEstimate
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.results.energy import ActivationEnergy
@@ -23,8 +23,7 @@ class GraphSolution:
     candidates: tuple[Candidate, ...]  # distinct paths to these places, in the same order, that end beyond the exit
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
-    by_nodes: Mapping[int, float]  # part of the error of each target's best energy that the nodes alone show
-    sides: Mapping[int, float]  # nodes along a side of the grid that gave it, the geometric mean
+    cheapest: Mapping[int, TargetEstimate]  # what gave each target's best energy
     last: bool  # no other one on as many nodes follows
     finer: int  # how many times the nodes along a side may still be doubled
     last_for_all: bool  # whether finer ones follow only for exits that it is too coarse for
@@ -42,7 +41,7 @@ class GraphSolution:
         found = []
         for one in self.estimates:
             action = least.get(one.target, np.inf)
-            error = self.by_nodes[one.target] + PATH_FACTOR * abs(action - one.value)
+            error = self.cheapest[one.target].by_nodes + PATH_FACTOR * abs(action - one.value)
             found.append(_with_error(one, error if action < one.value else min(error, one.numerical_error)))
         return tuple(found)
 
