@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.analyzers.graph import linear
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
@@ -241,6 +242,14 @@ def test_motion_without_an_orbit_to_start_from_is_a_finding(paper, kind):
     assert [energy.source for energy in result.energies] == [0]
     with pytest.raises(StructureError, match=kind):
         Shooting().search(problem(osc, changed, 1))
+
+
+@pytest.mark.parametrize(("damping", "least", "most"), [(0.05, 23_000, 25_000), (1e-3, 6000, 7500), (1e-5, 900, 1100)])
+def test_weakly_damped_attractors_are_left_by_fewer_paths(damping, least, most):
+    """A path that grows from a hundredth of the exit's distance takes ln(100) / (2 π ζ) periods of the free motion."""
+    attractor = problem(linear.oscillator(damping), linear.structure(damping))
+    found = Shooting(rounds=0, budget=1).search(attractor)
+    assert least < len(found.shots.boxes.centres) < most
 
 
 def test_too_few_rounds_are_a_finding(paper):

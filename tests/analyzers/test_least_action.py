@@ -147,6 +147,21 @@ def test_a_first_graph_on_grids_far_too_large_for_a_path_tells_nothing_of_finer_
     assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph).unresolvable == useless
 
 
+def test_without_a_saddle_the_action_plot_bounds_the_energies():
+    """Of a Duffing oscillator; its certified energy was confirmed by direct minimization of the action."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(1.0, 0.3),
+        excitations=(vk.Harmonic(0.4, 1.4),), noise=vk.WhiteNoise(1e-4),
+    )  # fmt: skip
+    found = vk.find_structure(osc, cells=(60, 60), starts=(8, 8), saddles=False, manifolds=False, rng=0)
+    source = min(found.attractors, key=lambda attractor: np.ptp(attractor.orbit[:, 0]))
+    few = vk.LeastAction(source=source.label, graph=vk.GraphSearch(nodes=(60, 60)), shooting=vk.Shooting(points=1500))
+    (energy,) = few.run(osc, found).energies
+    assert energy.bound is Bound.UPPER
+    assert energy.path is not None
+    assert 0.18001715 * (1 - 1e-6) <= energy.value == pytest.approx(0.18001715, rel=0.02)
+
+
 def test_all_work_belongs_to_a_named_stage(structure):
     work = vk.LeastAction(source=0, **SMALL)
     work.run(OSC, structure)  # imports what is imported at first use only

@@ -17,7 +17,6 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ends import usable_ends
 from vibrokit.analyzers.polishing.leg import pieces_of
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
@@ -117,19 +116,18 @@ class ExitSearch:
         self._reversed = True
 
     def shoot(self) -> None:
-        """Shoot from an orbit or an equilibrium, and polish what is found, if there is an end to polish paths to."""
+        """Shoot from an orbit or an equilibrium, and polish what is found; without an end to polish to, it bounds."""
         shooting, follow, self._shots_follow = self.analyzer.shooting, self._shots_follow, False
         if shooting is None or not follow:
             return
         candidates: Sequence[Candidate] = ()
         limit = None
-        if self.analyzer.graph is None or usable_ends(self.problem)[0]:
-            try:
-                found = self._shots = shooting.search(self.problem)
-                candidates, limit = found.candidates, None if found.complete else _AFTERWARDS
-                self.findings += found.findings
-            except (StructureError, StepperError) as error:
-                self._failed("action plot", error, only=self.analyzer.graph is None)
+        try:
+            found = self._shots = shooting.search(self.problem)
+            candidates, limit = found.candidates, None if found.complete else _AFTERWARDS
+            self.findings += found.findings
+        except (StructureError, StepperError) as error:
+            self._failed("action plot", error, only=self.analyzer.graph is None)
         if candidates or self._polishing_begun:  # candidates of the first graph may wait
             with working(time_limit=limit):
                 self._polish(candidates, quick=limit is not None)

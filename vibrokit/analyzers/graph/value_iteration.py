@@ -98,7 +98,7 @@ class ValueIteration:
                     if abs(at_rest - level) <= _CONVERGED * level:
                         return 0.0
                     at_rest, active = level, self._all()
-                risen = risen or level > levels[-1]
+                risen = risen or level > (1 + _CONVERGED) * levels[-1]
                 levels.append(level)
                 if _goes_round(levels):
                     return 2 * float(np.ptp(levels[-_ROUND:])) / level

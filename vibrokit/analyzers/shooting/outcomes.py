@@ -24,6 +24,7 @@ _BATCH = 256
 _PARTS = 8
 _PATIENCE = 4.0  # times the time in which linear growth takes a path to the exit
 _LEAST_BUDGET = 100
+_SHORT = 512  # part of a path's tests that is left out before it is tested again
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -122,12 +123,17 @@ class Shooter:
         outcomes.status[which[~exits & (reached == ESCAPED)]] = DIVERGED
         again = which[returned]
         left = np.maximum(self.budget * self.problem.checks - outcomes.checks[again], 0)
-        untested = np.minimum(2 ** outcomes.returns[again] - 1, left)
+        untested = np.minimum(self._burst * 2 ** outcomes.returns[again] - 1, left)
         beyond = self._integrated(states[returned], untested, Stop())
         more = self._integrated(beyond.states, left - untested, self._stop)
         outcomes.states[again], outcomes.status[again], outcomes.targets[again] = more.states, more.status, more.label
         outcomes.checks[again] += untested + more.intervals
         outcomes.returns[again] += 1
+
+    @property
+    def _burst(self) -> int:
+        """Exit tests that are left out first where a path returns, few against all of its tests."""
+        return max(1, self.budget * self.problem.checks // _SHORT)
 
     @cached_property
     def _classifier(self) -> BasinClassifier:
@@ -168,10 +174,14 @@ class Shooter:
         return begun, section
 
 
-def default_budget(slowest: float, period: int, growth: float) -> int:
-    """Return a number of section intervals in which deviations grow by a factor, with a margin.
+def growing_time(slowest: float, period: int, growth: float) -> float:
+    """Return in how many section intervals deviations grow by a factor.
 
     `slowest` is the absolute value of the orbit's largest multiplier over its period, in section intervals.
     """
-    decay = -math.log(max(slowest, 1e-12)) / period
-    return _LEAST_BUDGET + math.ceil(_PATIENCE * max(0.0, math.log(growth)) / decay)
+    return -max(0.0, math.log(growth)) * period / math.log(max(slowest, 1e-12))
+
+
+def default_budget(intervals: float) -> int:
+    """Return for how many section intervals a path is followed, given the time in which linear growth takes it out."""
+    return _LEAST_BUDGET + math.ceil(_PATIENCE * intervals)

@@ -12,7 +12,7 @@ import numpy as np
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.boxes import Boxes
 from vibrokit.analyzers.shooting.domain import fitted_domain
-from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget
+from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget, growing_time
 from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.analyzers.shooting.starts import Ring, Starts
@@ -25,6 +25,9 @@ from vibrokit.symbolic.flow_kind import Flow
 _MOST_PERIODS = 10**8
 _MOST_POINTS = 10**7  # some GiB of starts and outcomes
 _MOST_ROUNDS = 1000
+# On weakly damped scenes a quarter of the starts led to the same paths without stops, and between stops to paths that
+# cost up to a tenth more. All intervals take about 2.5 s on two processors.
+_STARTS, _FEWEST_STARTS, _ALL_INTERVALS = 24_000, 1000, 5e6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -44,8 +47,10 @@ class Shooting:
     ----------
     radius : float, optional
         Radius of the ring (in m and m s⁻¹ alike); by default the whole fundamental domain is covered.
-    points : int
-        Number of starts on the ring, or in the first grid over the domain; each round adds about a quarter of it.
+    points : int, optional
+        Number of starts on the ring, or in the first grid over the domain; each round adds about a quarter of it. By
+        default 24 000, or fewer, down to 1000, where damping is so weak that the paths would take more than 5 million
+        periods in all.
     budget : int, optional
         Maximum number of periods that a path is followed; by default from the growth rate of deviations.
     rounds : int
@@ -57,7 +62,7 @@ class Shooting:
     """
 
     radius: float | None = None
-    points: int = 24_000
+    points: int | None = None
     budget: int | None = None
     rounds: int = 24
     tolerance: float = 0.01
@@ -66,7 +71,8 @@ class Shooting:
         if self.radius is not None:
             _check_positive("radius", self.radius, " or None (the whole domain)")
         _check_positive("tolerance", self.tolerance)
-        whole("points", self.points, 4, _MOST_POINTS)
+        if self.points is not None:
+            whole("points", self.points, 4, _MOST_POINTS)
         whole("rounds", self.rounds, 0, _MOST_ROUNDS)
         if self.budget is not None:
             whole("budget", self.budget, 1, _MOST_PERIODS)
@@ -89,11 +95,12 @@ class Shooting:
             stepper = problem.ensemble_stepper(Flow.HAMILTONIAN)
             starts = self._starts(problem, stepper)
         slowest = float(np.abs(problem.attractor.multipliers).max())
-        budget = self.budget or default_budget(slowest, problem.attractor.period, starts.growth)
+        intervals = growing_time(slowest, problem.attractor.period, starts.growth)
+        budget, points = self.budget or default_budget(intervals), self.points or _affordable(intervals)
         rounds = 0 if self.radius is not None else self.rounds
         interrupt = None
-        with stage(FINDER, unit=TRAJECTORIES, total=None if rounds else self.points):
-            shots = Shots.over(starts, Shooter(problem, stepper, budget), Boxes.grid(starts.grid(self.points)))
+        with stage(FINDER, unit=TRAJECTORIES, total=None if rounds else points):
+            shots = Shots.over(starts, Shooter(problem, stepper, budget), Boxes.grid(starts.grid(points)))
             try:
                 for refined in shots.refinements(rounds, self.tolerance):
                     shots = refined
@@ -106,6 +113,11 @@ class Shooting:
         if self.radius is None:
             return fitted_domain(problem, stepper)
         return Ring.around(problem, stepper, self.radius)
+
+
+def _affordable(intervals: float) -> int:
+    """The default number of starts, of paths that take so many section intervals to grow."""
+    return int(max(_FEWEST_STARTS, min(_STARTS, _ALL_INTERVALS / max(intervals, 1.0))))
 
 
 def _check_positive(name: str, value: Any, alternative: str = "") -> None:
