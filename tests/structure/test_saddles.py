@@ -396,3 +396,21 @@ class TestEdgeBudget:
     def test_one_that_is_large_enough_changes_nothing(self):
         few, many = (self.straddles(budget) for budget in (1e7, np.inf))
         assert few.ends.tobytes() == many.ends.tobytes()
+
+
+def test_basins_that_a_saddle_connects_count_as_one_where_a_saddle_to_others_is_missing():
+    """Two orbits in each of two wells: next to the hilltop, motion on the boundary of any pair ends inside a well."""
+    damping, slope, force, frequency = 0.1, 5.0, 0.3, 2.5
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=damping, spring=vk.CubicSpring(-slope, slope),
+        excitations=(vk.Harmonic(force, frequency),),
+    )  # fmt: skip
+    structure = vk.find_structure(osc, cells=(100, 100), starts=(12, 12), manifolds=False, rng=0)
+    assert [attractor.period for attractor in structure.attractors] == [1, 1, 1, 1]
+    linear = force / (-slope - frequency**2 + 2j * damping * frequency)
+    hilltops = [saddle for saddle in structure.saddles if np.abs(saddle.points[0, 0]) < 0.1]
+    (hilltop,) = hilltops
+    assert hilltop.points[0] == pytest.approx([linear.real, (1j * frequency * linear).real], abs=1e-4)
+    right = {attractor.label for attractor in structure.attractors if attractor.points[0, 0] > 0}
+    assert 0 < len(right & set(hilltop.leads_to)) < len(set(hilltop.leads_to))
+    assert len(structure.saddles) == 3

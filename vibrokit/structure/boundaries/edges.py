@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Container
+from collections.abc import Container, Mapping
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ _MOST_CUTS = 60
 _FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label; the third choice is random
 
 Array = NDArray[np.float64]
+Whole = TypeVar("Whole", bound=np.integer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,8 +77,9 @@ class Straddles:
     They start between neighbouring cells of different labels, distributed over the cells where the labels meet, at most
     `trackers` pairs for each pair of labels. `only` are the pairs of labels to start between, the lower first; by
     default all that meet. Pairs without a change of label between them are dropped. Between two sections they are
-    brought together `parts` times. None are brought together any more once classifying states has taken `budget`
-    sections, or with the first cut so many that more are to be expected.
+    brought together `parts` times. Labels that `groups` has, of cells too, are replaced. None are brought together any
+    more once classifying states has taken `budget` sections, or with the first cut so many that more are to be
+    expected.
     """
 
     def __init__(
@@ -88,12 +91,13 @@ class Straddles:
         only: Container[tuple[int, int]] | None = None,
         parts: int = 1,
         budget: float = math.inf,
+        groups: Mapping[int, int] | None = None,
     ) -> None:
-        self.classifier, self.rng, self.budget = classifier, rng, budget
+        self.classifier, self.rng, self.budget, self.groups = classifier, rng, budget, groups or {}
         self.parts = _PARTS_OF_A_TURN if classifier.osc.autonomous else parts
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
-        for pair, cells in meeting_cells(basins).items():
+        for pair, cells in meeting_cells(basins, self.groups).items():
             if only is None or pair in only:
                 lines.append(spread(centres[cells], trackers, rng))
                 origins.append(np.tile(pair, (len(lines[-1]), 1)))
@@ -214,7 +218,7 @@ class Straddles:
     def _labels(self, states: Array) -> NDArray[np.int64]:
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.sections += self.classifier.label(found, states, self.time)
-        return found
+        return grouped(found, self.groups)
 
     def _widths(self) -> Array:
         return self.classifier.region.apart(self.ends[:, 1], self.ends[:, 0])
@@ -225,19 +229,29 @@ def _pieces(lines: int) -> int:
     return int(np.clip(_AT_ONCE // lines - 1, _FEWEST_PIECES, _MOST_PIECES))
 
 
+def grouped(labels: NDArray[Whole], groups: Mapping[int, int]) -> NDArray[Whole]:
+    """Replace labels by those of their groups."""
+    found = labels.copy()
+    for label, group in groups.items():
+        found[labels == label] = group
+    return found
+
+
 def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
     """Whether labels are those of states that lead to an attractor, or escape."""
     return (labels >= 0) | (labels == ESCAPED)
 
 
-def meeting_cells(basins: Basins) -> dict[tuple[int, int], NDArray[np.intp]]:
+def meeting_cells(basins: Basins, groups: Mapping[int, int] | None = None) -> dict[tuple[int, int], NDArray[np.intp]]:
     """Return, for each pair of labels that meet, the flat indices of the cells on both sides, shape (count, 2).
 
-    The lower label is first. Cells that did not settle are skipped; only the nearest meetings of a pair are returned.
+    The lower label is first. Labels that `groups` has are replaced. Cells that did not settle are skipped; only the
+    nearest meetings of a pair are returned.
     """
     numbers = np.arange(basins.labels.size).reshape(basins.labels.shape)
     meetings: dict[tuple[int, int], list[tuple[int, int, int]]] = {}
-    for labels, cells in ((basins.labels, numbers), (basins.labels.T, numbers.T)):
+    every = grouped(basins.labels, groups or {})
+    for labels, cells in ((every, numbers), (every.T, numbers.T)):
         for row, cell in zip(labels, cells, strict=True):
             known = np.flatnonzero(settled(row))
             for change in np.flatnonzero(np.diff(row[known])):

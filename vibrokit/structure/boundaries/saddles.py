@@ -8,6 +8,7 @@ import functools
 import itertools
 import math
 from collections import defaultdict
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,18 +131,47 @@ class SaddleSearch:
                     tracked += len(straddles.origins)
                     spent = straddles.spent
                 unexplained = pairs - self._explained
+            while not spent:
+                found = len(self._found)
+                spent, more = self._connect(rng, most, tracked)
+                tracked += more
+                if len(self._found) == found:
+                    break
         if unexplained and spent:
             self._findings.append(Finding.of(Code.EDGE_BUDGET, count=len(unexplained), budget=self.budget))
         else:
             self._lost = tuple(sorted(unexplained))
 
+    def _connect(self, rng: np.random.Generator, most: int, tracked: int) -> tuple[bool, int]:
+        """Follow boundaries between basins that saddles do not connect, those connected by saddles taken as one basin.
+
+        Motion on the boundary of one basin with another often ends at a saddle between the first and a third. Returns
+        whether the budget is spent, and the number of motions.
+        """
+        groups = _groups(self._found)
+        large = set(groups.values())
+        apart = {pair for pair in meeting_cells(self.basins, groups) if not large.isdisjoint(pair)}
+        if not apart or self.osc.autonomous:
+            return False, 0
+        each = max(2, min(self.trackers, most // len(apart)))
+        straddles = self._straddles(self.classifier, each, rng, apart, groups)
+        self._follow(straddles, tracked)
+        return straddles.spent, len(straddles.origins)
+
     def _straddles(
-        self, classifier: BasinClassifier, each: int, rng: np.random.Generator, only: set[Pair]
+        self,
+        classifier: BasinClassifier,
+        each: int,
+        rng: np.random.Generator,
+        only: set[Pair],
+        groups: Mapping[int, int] | None = None,
     ) -> Straddles:
         """Start motions, and bring their sides together as often between two sections as they separate fast."""
         parts = 1
         while True:
-            straddles = Straddles(classifier, self.basins, each, rng, only=only, parts=parts, budget=self.budget)
+            straddles = Straddles(
+                classifier, self.basins, each, rng, only=only, parts=parts, budget=self.budget, groups=groups
+            )
             for _ in range(straddles.parts):
                 straddles.advance()
             if straddles.spent or not straddles.too_fast:
@@ -309,6 +339,16 @@ def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:
     """Return a finding about the boundary between two basins; a side from which motion escapes is last."""
     first, second = pair if pair[0] >= 0 else pair[::-1]
     return Finding(code, first, second, values)
+
+
+def _groups(saddles: Iterable[Saddle]) -> dict[int, int]:
+    """Return, for each label of basins that saddles connect with others, the highest label of all of these."""
+    groups: dict[int, int] = {}
+    for saddle in saddles:
+        joined = {groups.get(label, label) for label in saddle.leads_to}
+        for label in [*saddle.leads_to, *(label for label, group in groups.items() if group in joined)]:
+            groups[label] = max(joined)
+    return groups
 
 
 def _first_few(labels: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
