@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.graph.coverage import BELOW
 from vibrokit.analyzers.graph.hierarchy_search import LOOSE
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
@@ -87,11 +88,18 @@ class Evidence:
         found, finer = set[int](), 0 if self.graph is None else self.graph.finer
         for each in self.estimates:
             path = self.cheapest.get(each.target)
-            if path is None or (finer and self.rougher is None and each.value > LOOSE * path.value):
-                continue  # the next grids, around the path, are far smaller
+            if path is None or (finer and self._will_differ(each, path)):
+                continue
             if each.numerical_error / self._gain(each) ** finer > path.value:
                 found.add(each.target)
         return found
+
+    def _will_differ(self, estimate: ActivationEnergy, path: ActivationEnergy) -> bool:
+        """Whether the next grids are far smaller, around the path, or have shorter steps, and so tell more."""
+        assert self.graph is not None
+        smaller = self.rougher is None and estimate.value > LOOSE * path.value
+        shorter = self.graph.cheapest[estimate.target].steps < self.graph.most_steps
+        return smaller or (shorter and estimate.value < BELOW * path.value)
 
     def _gain(self, estimate: ActivationEnergy) -> float:
         """By which the error of an estimate of the graph is expected to fall when the nodes along a side double."""

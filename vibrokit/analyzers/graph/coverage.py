@@ -32,7 +32,7 @@ STEP_TOLERANCE = 0.01  # relative change of a cost by linearization over a step 
 _FEWEST_RELIABLE = 64
 # V that shows an error of linearization: in units of a known path's action, and an excess over it in units of what
 # nodes change.
-_BELOW, _BEYOND_NODES = 0.9, 2.0
+BELOW, _BEYOND_NODES = 0.9, 2.0
 _SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
 _RETURNS = 8  # section intervals in which a state outside the region may come back to it
 _MARGIN = 0.04  # of the width, on each side of them
@@ -281,7 +281,7 @@ class WholeRegion(Coverage):
         targets, branches = self._judged(coarse)
         room = max(STEP_TOLERANCE, coarse.change(rougher, self.reached(coarse)))
         fewer = rougher.potential.grids.shape < coarse.potential.grids.shape
-        low, high = max(_BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
+        low, high = max(BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
         if not all(low < ratio < high for ratio in self.known_ratios(coarse, branches)):
             return False
         return coarse.linearization_error(targets) <= room

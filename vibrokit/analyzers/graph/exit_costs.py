@@ -100,6 +100,7 @@ class ExitCosts:
             potential,
             (used, *self.findings, *self._not_converged(), *lost),
             cheapest,
+            max((max(steps) for shape, steps in self.search.steps_per_period.items() if shape > nodes), default=0),
             last,
             self.finer,
             self.last_for_all,

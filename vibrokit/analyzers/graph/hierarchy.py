@@ -27,6 +27,7 @@ class TargetEstimate:
     by_nodes: float  # part of the error that the nodes alone show
     unsettled: float  # the part of the value by which more sweeps may change it
     side: float  # nodes along a side of the grid, the geometric mean of both
+    steps: int  # in a section interval
     candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
 
 
@@ -76,7 +77,7 @@ class GridHierarchy:
             value = error = self._value(self.whole, target)
         candidates = tuple(path.candidate for path in paths)
         side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
-        return TargetEstimate(value, error, by_nodes, unsettled, side, candidates)
+        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, candidates)
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""

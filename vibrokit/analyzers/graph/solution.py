@@ -24,6 +24,7 @@ class GraphSolution:
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
     cheapest: Mapping[int, TargetEstimate]  # what gave each target's best energy
+    most_steps: int  # steps in a section interval that those on more nodes may have
     last: bool  # no other one on as many nodes follows
     finer: int  # how many times the nodes along a side may still be doubled
     last_for_all: bool  # whether finer ones follow only for exits that it is too coarse for
