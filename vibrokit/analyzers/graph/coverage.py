@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
@@ -11,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.graph.grids import Grids, Shape
+from vibrokit.analyzers.graph.grids import Grids, Shape, halved
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.targets import ExitTarget, TraceStart
 from vibrokit.analyzers.graph.tracing import SolvedGrid
@@ -91,8 +92,8 @@ class Coverage(ABC):
         """V at the exits that the grids are for, in units of the actions of paths; infinite where there is no path."""
 
     def excess(self, solved: SolvedGrid) -> float:
-        """Return the largest relative difference between V at an exit and the action of the path to it."""
-        return max((abs(ratio - 1) for ratio in self.ratios(solved)), default=0.0)
+        """Return the largest difference of the logarithms of V at an exit and of the action of the path to it."""
+        return max((abs(math.log(ratio)) for ratio in self.ratios(solved)), default=0.0)
 
     def reached(self, solved: SolvedGrid) -> list[ExitTarget]:
         """Return the targets whose V lies well below the ceiling."""
@@ -108,15 +109,16 @@ class Coverage(ABC):
         return found
 
     def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
-        """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess."""
+        """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess.
+
+        Half as many nodes along each side show well enough how wide they have to be.
+        """
         grids = self.first(steps, shape, intervals)
-        whole = self.solved(grids, ceiling)
-        for _ in range(_WIDENINGS):
-            wider = grids.widened(self.needed(whole, self.level(whole)))
-            if wider is grids:
-                break
-            grids = wider
-            whole = self.solved(grids, 2 * self.highest(whole))
+        if min(halved(shape)) >= _FEWEST_RELIABLE:
+            rough = self._wide(grids.with_shape(halved(shape)), ceiling)
+            whole = self.solved(rough.potential.grids.with_shape(shape), 2 * self.highest(rough))
+        else:
+            whole = self._wide(grids, ceiling)
         coarse = self.closer(whole, np.inf)
         for _ in range(_ZOOMS - 1):
             closer = self.closer(coarse, WORTHWHILE)
@@ -124,6 +126,16 @@ class Coverage(ABC):
                 break
             coarse = closer
         return whole, coarse
+
+    def _wide(self, grids: Grids, ceiling: float) -> SolvedGrid:
+        """Solve on grids that are widened until no node that has to be covered lies at their edge."""
+        solved = self.solved(grids, ceiling)
+        for _ in range(_WIDENINGS):
+            wider = grids.widened(self.needed(solved, self.level(solved)))
+            if wider is grids:
+                break
+            grids, solved = wider, self.solved(wider, 2 * self.highest(solved))
+        return solved
 
     def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
         """Solve on as many nodes around what has to be covered, if that is at most a part of the area."""
