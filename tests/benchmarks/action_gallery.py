@@ -62,6 +62,7 @@ forced("double well, stops", 0.0, 0.0, spring=WELLS, stops=both(vk.Hertz(20.0), 
 forced("double well, slowly forced", 0.05, 0.15, spring=WELLS, damping=0.1)
 forced("double well, very slowly forced", 0.02, 0.2, spring=WELLS, damping=0.2)
 forced("double well, five orbits", 2.4, 0.3, spring=WELLS, damping=0.03)
+forced("double well, two orbits each", 2.5, 0.3, spring=vk.CubicSpring(-5.0, 5.0), damping=0.1)
 forced("double well, chaotic", 1.2, 0.3, spring=WELLS, damping=0.15)
 TRIPLE = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")
 forced("triple well", 0.0, 0.0, spring=TRIPLE)
@@ -77,6 +78,7 @@ forced("pendulum, tilted", 0.0, 0.0, spring=vk.CustomSpring("sin(x)"), damping=0
 for frequency in (0.525, 0.570):
     SCENES[f"hertz-{frequency:.3f}"] = vk.load_scene(f"hertz-{frequency:.3f}")
 forced("linear stops", 0.57, 0.18, damping=0.01, push=0.2, stops=both(vk.Linear(50.0), 0.5))
+forced("two linear stops", 1.3, 0.25, damping=0.03, stops=both(vk.Linear(200.0), 0.25))
 forced("hunt-crossley", 0.57, 0.18, damping=0.01, push=0.2,
        stops=both(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=0.3), 0.5))  # fmt: skip
 forced("kelvin-voigt", 0.75, 0.2, damping=0.02, stops=both(vk.CustomLaw("k*depth + c*rate", k=100.0, c=1.0), 0.4))
