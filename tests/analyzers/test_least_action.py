@@ -99,9 +99,9 @@ def estimate(target, value, error):
     return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
 
-def graph_of(estimates, finer=0, side=180.0):
-    cheapest = {each.target: SimpleNamespace(side=side) for each in estimates}
-    return SimpleNamespace(estimates=estimates, finer=finer, cheapest=cheapest)
+def graph_of(estimates, finer=0, side=180.0, steps=64):
+    cheapest = {each.target: SimpleNamespace(side=side, steps=steps) for each in estimates}
+    return SimpleNamespace(estimates=estimates, finer=finer, cheapest=cheapest, most_steps=64)
 
 
 def test_the_last_doubling_of_the_nodes_is_for_exits_with_a_path_that_the_graph_is_too_coarse_for():
@@ -145,6 +145,16 @@ def test_the_gain_of_a_finer_graph_is_that_of_twice_the_nodes(side, useless):
 def test_a_first_graph_on_grids_far_too_large_for_a_path_tells_nothing_of_finer_ones(finer, useless):
     graph = graph_of([estimate(1, 1.0, 2.0)], finer)
     assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph).unresolvable == useless
+
+
+@pytest.mark.parametrize(
+    ("finer", "steps", "value", "useless"),
+    [(0, 32, 0.8, {1}), (1, 32, 0.8, set()), (1, 64, 0.8, {1}), (1, 32, 0.95, {1})],
+)
+def test_v_below_a_path_tells_nothing_of_a_finer_graph_with_shorter_steps(finer, steps, value, useless):
+    rougher = graph_of([estimate(1, 1.0, 1.2)], side=90.0)
+    graph = graph_of([estimate(1, value, 1.2)], finer, steps=steps)
+    assert Evidence(NEVER_REPEATS, (estimate(1, 1.0, 0.0),), graph, rougher).unresolvable == useless
 
 
 def test_without_a_saddle_the_action_plot_bounds_the_energies():
