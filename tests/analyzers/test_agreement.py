@@ -91,6 +91,14 @@ def test_a_vague_graph_is_not_the_energy_of_a_set():
     assert energy.numerical_error == ERROR
 
 
+@pytest.mark.parametrize(("value", "error", "lower"), [(1.04, 0.05, 0.99), (1.1, 0.2, 0.9), (1.1, 0.05, 0.9)])
+def test_a_graph_above_a_path_by_more_than_its_error_has_the_difference_as_error(value, error, lower):
+    bound = dataclasses.replace(path(1.0), bound=Bound.BRACKET)
+    ((energy,), _) = combined(ORBIT, [bound], [graph(value, error)])
+    assert energy.value == 1.0
+    assert energy.lower == pytest.approx(lower)
+
+
 def test_the_energy_of_a_set_is_a_bracket():
     energy, finding = only(CHAOS, (path(1.0),), (graph(0.9, 0.2),))
     assert finding.code is Code.BRACKET
@@ -111,7 +119,7 @@ def test_without_a_path_there_is_the_graph_s_estimate():
 
 @pytest.mark.parametrize(
     ("estimate", "expected"),
-    [((0.003, 0.6), (0.0, 1.0, 1.1)), ((0.95, 0.1), (0.85, 0.95, 1.1)), ((2.0, 0.1), (0.9, 1.0, 1.1)), (None, None)],
+    [((0.003, 0.6), (0.0, 1.0, 1.1)), ((0.95, 0.1), (0.85, 0.95, 1.1)), ((2.0, 0.1), (0.0, 1.0, 1.1)), (None, None)],
     ids=str,
 )
 def test_a_path_of_the_action_plot_bounds_the_energy_where_none_was_polished(estimate, expected):

@@ -147,11 +147,14 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, Ac
 def _bracket(path: ActivationEnergy, graph: ActivationEnergy, bound: Bound) -> ActivationEnergy:
     """Between the graph and a path that need not be the best: of a few orbits inside a set, or not polished.
 
-    The value is the smaller one of both, and that of the path where the graph's error is as large.
+    The value is the smaller one of both, and that of the path where the graph's error is as large. A graph above the
+    path by more than its error has at least the difference as error.
     """
     vague = graph.numerical_error > VAGUE * path.value
     best = path if vague or path.value <= graph.value else graph
-    lower = min(2 * path.value - path.upper, graph.lower)
+    above = graph.value - path.value
+    least = graph.lower if above <= graph.numerical_error else path.value - above
+    lower = min(2 * path.value - path.upper, least)
     return dataclasses.replace(
         path, value=best.value, numerical_error=best.numerical_error, lower=max(0.0, lower), bound=bound
     )
