@@ -208,7 +208,6 @@ class Code(StrEnum):
         "graph-path-lost", WARNING, "The graph's path from {state} to {goal} could not be traced back.",
         "Raise the number of nodes.",
     )  # fmt: skip
-
     GRAPH_NOT_CONVERGED = (
         "graph-not-converged", WARNING,
         "The graph's potential around {state} had not converged when its sweeps ended: more of them may change it by "

@@ -124,39 +124,40 @@ class SaddleSearch:
             for shared in (True, False):
                 if unexplained and not spent:
                     classifier = self.classifier if shared else self.plain
-                    each = max(2, min(self.trackers, most // len(unexplained)))
-                    straddles = self._straddles(classifier, each, rng, unexplained)
-                    self._follow(straddles, tracked)
+                    straddles = self._track(classifier, most, rng, unexplained, tracked)
                     self._look_into_strips(straddles)
                     tracked += len(straddles.origins)
                     spent = straddles.spent
                 unexplained = pairs - self._explained
-            while not spent:
-                found = len(self._found)
-                spent, more = self._connect(rng, most, tracked)
-                tracked += more
-                if len(self._found) == found:
+            # Motion on the boundary of one basin with another often ends at a saddle between the first and a third. So
+            # boundaries that saddles do not connect are followed again, with all basins that they connect as one.
+            found = -1
+            while not spent and not self.osc.autonomous and found < len(self._found):
+                found, groups = len(self._found), _groups(self._found)
+                if not (apart := _apart(meetings, groups)):
                     break
+                straddles = self._track(self.classifier, most, rng, apart, tracked, groups)
+                tracked += len(straddles.origins)
+                spent = straddles.spent
         if unexplained and spent:
             self._findings.append(Finding.of(Code.EDGE_BUDGET, count=len(unexplained), budget=self.budget))
         else:
             self._lost = tuple(sorted(unexplained))
 
-    def _connect(self, rng: np.random.Generator, most: int, tracked: int) -> tuple[bool, int]:
-        """Follow boundaries between basins that saddles do not connect, those connected by saddles taken as one basin.
-
-        Motion on the boundary of one basin with another often ends at a saddle between the first and a third. Returns
-        whether the budget is spent, and the number of motions.
-        """
-        groups = _groups(self._found)
-        large = set(groups.values())
-        apart = {pair for pair in meeting_cells(self.basins, groups) if not large.isdisjoint(pair)}
-        if not apart or self.osc.autonomous:
-            return False, 0
-        each = max(2, min(self.trackers, most // len(apart)))
-        straddles = self._straddles(self.classifier, each, rng, apart, groups)
+    def _track(
+        self,
+        classifier: BasinClassifier,
+        most: int,
+        rng: np.random.Generator,
+        only: set[Pair],
+        tracked: int,
+        groups: Mapping[int, int] | None = None,
+    ) -> Straddles:
+        """Follow motions on some boundaries, of basins taken as one where `groups` says so."""
+        each = max(2, min(self.trackers, most // len(only)))
+        straddles = self._straddles(classifier, each, rng, only, groups)
         self._follow(straddles, tracked)
-        return straddles.spent, len(straddles.origins)
+        return straddles
 
     def _straddles(
         self,
@@ -349,6 +350,13 @@ def _groups(saddles: Iterable[Saddle]) -> dict[int, int]:
         for label in [*saddle.leads_to, *(label for label, group in groups.items() if group in joined)]:
             groups[label] = max(joined)
     return groups
+
+
+def _apart(pairs: Iterable[Pair], groups: Mapping[int, int]) -> set[Pair]:
+    """Return the pairs of groups that meet, at least one of which has several basins."""
+    large = set(groups.values())
+    both = ((groups.get(first, first), groups.get(second, second)) for first, second in pairs)
+    return {(min(pair), max(pair)) for pair in both if pair[0] != pair[1] and not large.isdisjoint(pair)}
 
 
 def _first_few(labels: NDArray[np.int64], most: int) -> NDArray[np.bool_]:
