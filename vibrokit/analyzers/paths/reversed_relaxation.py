@@ -26,7 +26,7 @@ FINDER = "reversed relaxation"
 _NEAR = 1e-4  # of the distance between both ends: so far from them it begins and ends
 _BENT = 1e-3  # of the linearized rates: so little others are where the path begins
 _AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
-_CHUNK, _LASTING, _MOST_SAMPLES = 256, 64, 2**20  # samples: recorded at a time, to be linear for, in all
+_CHUNK, _LASTING, _MOST_SAMPLES = 256, 64, 2**20  # samples: recorded at first, to be linear for, in all
 
 Array = NDArray[np.float64]
 
@@ -72,23 +72,24 @@ def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, 
     around = Region.around(problem.structure.basins.region.bounds.T, _AROUND)
     osc, units, field = problem.scene, _units(problem), VectorField(problem.scene)
     wanted, jacobian = _NEAR * np.linalg.norm((start - goal) / units), field.jacobian(goal)
-    states: Array = start[None]
-    while len(states) < _MOST_SAMPLES:
-        more = record(osc, Flow.STATE, propagator.stepper, states[-1], 0.0, propagator.piece, _CHUNK)[1:]
+    recorded, samples = [start[None]], _CHUNK
+    while samples < _MOST_SAMPLES:
+        more = record(osc, Flow.STATE, propagator.stepper, recorded[-1][-1], 0.0, propagator.piece, samples)[1:]
         distances = np.linalg.norm((more - goal) / units, axis=1)
         linear = (more - goal) @ jacobian.T
         bent = np.linalg.norm(field.rate(more) - linear, axis=1) > _BENT * np.linalg.norm(linear, axis=1)
         far = np.flatnonzero((distances > wanted) | (bent & (distances > _BENT * wanted)))
         enough = int(far[-1]) + 2 if far.size else 1
         if enough <= len(more) - _LASTING:
-            states = np.vstack([states, more[:enough]])
+            states = np.concatenate([*recorded, more[:enough]])
             return None if problem.is_out(states[1:]).any() else states
-        states = np.vstack([states, more])
+        recorded.append(more)
         if not around.contains(more[-1:]).all():  # where the motion may never come to rest
             break
         at_rest = np.linalg.norm(np.ptp(more, axis=0) / units) <= wanted  # in another well
-        if len(more) < _CHUNK or (at_rest and distances[-1] > wanted):
+        if len(more) < samples or (at_rest and distances[-1] > wanted):
             break
+        samples *= 2
     return None
 
 
