@@ -38,10 +38,9 @@ free = vk.Oscillator(
     natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(1.0, 0.3), excitations=(vk.Harmonic(0.18, 0.57),),
     noise=vk.WhiteNoise(intensity=1e-4),
 )
-widest = [Flow.HAMILTONIAN_VARIATIONAL]  # RK4 and Order8, one of each kind of driver, take others too
-cases = [(smooth, vk.RK4(128), [*widest, Flow.STATE, Flow.NOISY]), (smooth, vk.RK8(64), widest)]
-cases += [(jumping, vk.Order8(1e-8), [*widest, Flow.STATE, Flow.COVARIANCE_REVERSED])]
-cases += [(jumping, vk.FreeFlight(1e-8), widest), (free, vk.RKN12(16), widest)]
+widest = Flow.HAMILTONIAN_VARIATIONAL  # for one of each kind of driver
+cases = [(smooth, vk.RK4(128), [Flow.NOISY]), (smooth, vk.RK8(64), [Flow.STATE]), (free, vk.RKN12(16), [widest])]
+cases += [(jumping, vk.Order8(1e-8), [widest, Flow.COVARIANCE_REVERSED]), (jumping, vk.FreeFlight(1e-8), [Flow.STATE])]
 digests = {}
 for osc, stepper, flows in cases:
     for flow in flows:
@@ -75,7 +74,7 @@ def printed_by_two_processes(script, cache):
 
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     compiled, loaded = (json.loads(printed) for printed in printed_by_two_processes(DIGESTS, tmp_path))
-    assert len(compiled) == 9
+    assert len(compiled) == 6
     assert compiled == loaded
 
 

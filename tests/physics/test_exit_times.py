@@ -43,20 +43,19 @@ def scene_and_structure(request):
     return osc, vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
 
 
-@pytest.mark.parametrize("ratio", [6.0, 8.0])
-def test_direct_rates_are_those_of_kramers(scene_and_structure, ratio):
+def test_direct_rates_are_those_of_kramers(scene_and_structure):
     osc, structure = scene_and_structure
-    rate = rate_at(osc, structure, ratio, splitting=False, target_error=0.02)
+    rate = rate_at(osc, structure, 6.0, splitting=False, target_error=0.02)
     expected, formula_error = kramers_rate(osc.damping_ratio, rate.intensity)
     # The formula has no time to settle in the other well, which is two or three relaxations here.
     settling = 3.0 * osc.section_interval * math.exp(rate.log_value)
     assert abs(rate.log_value - expected) <= 3 * rate.log_error + formula_error + settling
 
 
-@pytest.mark.parametrize("ratio", [8.0, 12.0, 30.0])
+@pytest.mark.parametrize("ratio", [12.0, 30.0])
 def test_rates_by_splitting_are_those_of_kramers(scene_and_structure, ratio):
     osc, structure = scene_and_structure
-    rate = rate_at(osc, structure, ratio, splitting=True, target_error=0.1)
+    rate = rate_at(osc, structure, ratio, splitting=True, target_error=0.15)
     expected, formula_error = kramers_rate(osc.damping_ratio, rate.intensity)
     assert rate.log_error < 0.2
     assert abs(rate.log_value - expected) <= 3 * rate.log_error + formula_error + 0.01
