@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import pickle
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ending import resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
+from vibrokit.analyzers.polishing.newton import NotConverged
 from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
 from vibrokit.analyzers.polishing.polish import Polishing, Shared, polish
 from vibrokit.analyzers.problem import ExitProblem
@@ -326,12 +328,42 @@ def test_a_candidate_with_momenta_follows_hamilton_s_equations_between_its_sampl
 
 
 @pytest.fixture(scope="module")
-def from_orbit(problem):
+def parts(problem):
+    """The propagator, the well, and the candidate cut at the saddle."""
     propagator = SegmentPropagator(problem.scene, single_stepper(problem.scene, Flow.HAMILTONIAN_VARIATIONAL))
-    source = linearized_orbit(propagator, problem.attractor.points[:1], 1, 0.0).with_start_on_orbit()
     (end,) = problem.path_ends
     cuts = ending_at(end, problem, propagator).cuts(resampled(propagator, guess(straight())))
-    return propagator, PathSolver(propagator, source).solve(cuts)
+    return propagator, linearized_orbit(propagator, problem.attractor.points[:1], 1, 0.0), cuts
+
+
+@pytest.fixture(scope="module")
+def from_orbit(parts):
+    propagator, source, cuts = parts
+    return propagator, PathSolver(propagator, source.with_start_on_orbit()).solve(cuts)
+
+
+@pytest.mark.parametrize(("misfit", "starts"), [(0.5, 1), (1e-3, 4)], ids=["hopeless", "hopeful"])
+def test_what_failed_is_not_tried_again(parts, monkeypatch, misfit, starts):
+    """From the orbit itself, in three lengths, only where a linearized start has nearly converged."""
+    propagator, source, cuts = parts
+    solver, tried = PathSolver(propagator, source), []
+
+    def fails(*given, **settings):
+        tried.append(given)
+        raise NotConverged(misfit, 1e-9)
+
+    monkeypatch.setattr("vibrokit.analyzers.polishing.path_solver.extremal_path", fails)
+    for way in (solver.solve_near, solver.solve):
+        with pytest.raises(NotConverged):
+            way(cuts)
+    assert len(tried) == starts
+
+
+def test_a_failure_keeps_its_misfit_between_processes():
+    failure = NotConverged(0.25, 1e-9)
+    copied = pickle.loads(pickle.dumps(failure))
+    assert copied.misfit == failure.misfit == 0.25
+    assert str(copied) == str(failure)
 
 
 def test_less_time_costs_more(from_orbit):

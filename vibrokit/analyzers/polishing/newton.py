@@ -33,6 +33,21 @@ _MATCHED = 1e-4  # of that step: length of what is left of Newton's step when al
 Array = NDArray[np.float64]
 
 
+class NotConverged(StructureError):
+    """No extremal path is near the guess; raised with the relative misfit that is left, and what is accepted."""
+
+    @property
+    def misfit(self) -> float:
+        return float(self.args[0])
+
+    def __str__(self) -> str:
+        misfit, accepted = self.args
+        return (
+            f"Newton's method found no extremal path near the guess: the relative misfit stays at {misfit:.1e}, above "
+            f"{accepted:g}. The guess is too far off, or the path grazes a stop."
+        )
+
+
 def extremal_path(
     propagator: SegmentPropagator,
     source: LinearizedOrbit,
@@ -52,7 +67,7 @@ def extremal_path(
     Problems, 3.3). Where two manifolds meet at a small angle, the error of a linearized start can be more than any
     change of the path makes up for; such a path begins ten times as near to its source then.
 
-    Raises StructureError if it does not converge.
+    Raises NotConverged if the misfit stays above `accepted`.
     """
     found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations, accepted)
     if accepted < found.residual < nearly and not source.start_on_orbit:
@@ -61,10 +76,7 @@ def extremal_path(
         first -= added
         found = _Matching(propagator, source, first, ending, points, found.last).solve(points, evaluations, accepted)
     if not found.residual <= accepted:
-        raise StructureError(
-            f"Newton's method found no extremal path near the guess: the relative misfit stays at "
-            f"{found.residual:.1e}, above {accepted:g}. The guess is too far off, or the path grazes a stop."
-        )
+        raise NotConverged(found.residual, accepted)
     return found
 
 

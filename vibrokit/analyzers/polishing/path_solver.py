@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
@@ -14,7 +15,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import MOST_EVALUATIONS, extremal_path
+from vibrokit.analyzers.polishing.newton import MOST_EVALUATIONS, NotConverged, extremal_path
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
@@ -28,6 +29,7 @@ _FROM_NEAR = 60  # evaluations for a candidate with momenta, or a longer path; t
 _FROM_EXACT = 12  # for one that is a path but for its ends: those that converge need 3 to 6
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
+_HOPEFUL = 0.02  # misfit up to which a path is solved for from the orbit; those that were found had up to 0.012
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _ROUGHLY_ACCEPTED = 1e-6  # misfit of a path that starts farther from its source than the final one
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
@@ -41,6 +43,27 @@ _COMPARED = 512  # nodes of a path, at most, that are compared with another one
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Known:
+    """A path that was completed, or could not be."""
+
+    found: ExtremalPath  # before
+    result: ExtremalPath | StructureError
+    final: bool  # whether it was solved for from the orbit too
+
+    def answers(self, found: ExtremalPath, *, final: bool) -> bool:
+        """Whether another path is the same, so far as its completion matters.
+
+        Where this one could not be completed, its action decides: one that begins at another time fails likewise.
+        """
+        if isinstance(self.result, ExtremalPath):
+            return _are_one(self.found, found)
+        alike = abs(self.found.action - found.action) <= _ONE_FAMILY * self.found.action
+        return alike and (self.final or not final)
+
+
 Fallback = Callable[[StructureError, float], ExtremalPath]
 
 
@@ -49,7 +72,8 @@ class PathSolver:
 
     def __init__(self, propagator: SegmentPropagator, source: LinearizedOrbit) -> None:
         self.propagator, self.source = propagator, source
-        self._known: list[tuple[ExtremalPath, ExtremalPath | StructureError]] = []
+        self._known: list[_Known] = []
+        self._failed: dict[tuple[int, int, bytes], StructureError] = {}  # descents, by where they began
         self._lost = 0  # paths that were not found from the orbit either
 
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
@@ -73,12 +97,14 @@ class PathSolver:
             states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), source, first, cut))
         points, action, source, first, cut = min(fitted, key=lambda each: each[1])
-        for _, known in self._known:
-            if isinstance(known, ExtremalPath) and _in_family(known, first, points, action):
-                return known
+        for known in self._known:
+            path = known.result
+            if isinstance(path, ExtremalPath) and _in_family(path, first, points, action):
+                return path
 
         def fallback(failure: StructureError, known: float) -> ExtremalPath:
-            if not from_orbit or not known < worth or self._lost >= _MOST_LOST:
+            hopeless = isinstance(failure, NotConverged) and failure.misfit > _HOPEFUL
+            if hopeless or not from_orbit or not known < worth or self._lost >= _MOST_LOST:
                 raise failure
             try:
                 return self._from_orbit(first, cut, points, failure)
@@ -88,7 +114,7 @@ class PathSolver:
 
         try:
             iterations = MANY_ITERATIONS if action < worth else FEW_ITERATIONS
-            found = self._descended(source, first, cut, points, iterations)
+            found = self._descended_once(source, first, cut, points, iterations)
         except StructureError as error:
             return fallback(error, action)
         return self._once(found, fallback, final=from_orbit)
@@ -118,25 +144,36 @@ class PathSolver:
         raise failure
 
     def _once(self, found: ExtremalPath, fallback: Fallback, *, final: bool = True) -> ExtremalPath:
-        """Complete a path, unless that was done, or failed for good, before."""
-        result = next((known for before, known in self._known if _are_one(before, found)), None)
-        if result is None:
+        """Complete a path, unless that was done, or failed, before; a `final` failure is one from the orbit too."""
+        known = next((each for each in self._known if each.answers(found, final=final)), None)
+        if known is None:
             try:
-                result = self._completed(found, fallback)
+                known = _Known(found, self._completed(found, fallback), final)
             except StructureError as error:
-                if not final:  # starting on the orbit may help later
-                    raise
-                result = error
-            self._known.append((found, result))
-        if isinstance(result, StructureError):
-            raise result
-        return result
+                known = _Known(found, error, final)
+            self._known.append(known)
+        if isinstance(known.result, StructureError):
+            raise known.result
+        return known.result
 
     def _completed(self, found: ExtremalPath, fallback: Fallback) -> ExtremalPath:
         try:
             return completed(self.propagator, found)
         except StructureError as error:
             return fallback(error, found.action)
+
+    def _descended_once(
+        self, source: LinearizedOrbit, first: int, cut: Cut, points: Array, iterations: int
+    ) -> ExtremalPath:
+        """Descend, unless that failed before: candidates are tried quickly first, and again with all that is left."""
+        began = first, iterations, points.tobytes()
+        if began in self._failed:
+            raise self._failed[began]
+        try:
+            return self._descended(source, first, cut, points, iterations)
+        except StructureError as error:
+            self._failed[began] = error
+            raise
 
     def _descended(
         self,
