@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,27 +42,6 @@ _COMPARED = 512  # nodes of a path, at most, that are compared with another one
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Known:
-    """A path that was completed, or could not be."""
-
-    found: ExtremalPath  # before
-    result: ExtremalPath | StructureError
-    final: bool  # whether it was solved for from the orbit too
-
-    def answers(self, found: ExtremalPath, *, final: bool) -> bool:
-        """Whether another path is the same, so far as its completion matters.
-
-        Where this one could not be completed, its action decides: one that begins at another time fails likewise.
-        """
-        if isinstance(self.result, ExtremalPath):
-            return _are_one(self.found, found)
-        alike = abs(self.found.action - found.action) <= _ONE_FAMILY * self.found.action
-        return alike and (self.final or not final)
-
-
 Fallback = Callable[[StructureError, float], ExtremalPath]
 
 
@@ -72,8 +50,8 @@ class PathSolver:
 
     def __init__(self, propagator: SegmentPropagator, source: LinearizedOrbit) -> None:
         self.propagator, self.source = propagator, source
-        self._known: list[_Known] = []
-        self._failed: dict[tuple[int, int, bytes], StructureError] = {}  # descents, by where they began
+        self._known: list[tuple[ExtremalPath, ExtremalPath | StructureError]] = []
+        self._failed: dict[Hashable, StructureError] = {}  # attempts, by where they began
         self._lost = 0  # paths that were not found from the orbit either
 
     def solve(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
@@ -97,10 +75,9 @@ class PathSolver:
             states = points[:, : propagator.size]
             fitted.append((*gauss_newton(propagator, first, states, cut.last, cut.ending.free), source, first, cut))
         points, action, source, first, cut = min(fitted, key=lambda each: each[1])
-        for known in self._known:
-            path = known.result
-            if isinstance(path, ExtremalPath) and _in_family(path, first, points, action):
-                return path
+        for _, known in self._known:
+            if isinstance(known, ExtremalPath) and _in_family(known, first, points, action):
+                return known
 
         def fallback(failure: StructureError, known: float) -> ExtremalPath:
             hopeless = isinstance(failure, NotConverged) and failure.misfit > _HOPEFUL
@@ -114,7 +91,8 @@ class PathSolver:
 
         try:
             iterations = MANY_ITERATIONS if action < worth else FEW_ITERATIONS
-            found = self._descended_once(source, first, cut, points, iterations)
+            begun = "descent", first, iterations, cut.last, points.tobytes()
+            found = self._attempted(begun, lambda: self._descended(source, first, cut, points, iterations))
         except StructureError as error:
             return fallback(error, action)
         return self._once(found, fallback, final=from_orbit)
@@ -144,35 +122,35 @@ class PathSolver:
         raise failure
 
     def _once(self, found: ExtremalPath, fallback: Fallback, *, final: bool = True) -> ExtremalPath:
-        """Complete a path, unless that was done, or failed, before; a `final` failure is one from the orbit too."""
-        known = next((each for each in self._known if each.answers(found, final=final)), None)
-        if known is None:
+        """Complete a path, unless that was done, or failed for good, before."""
+        result = next((known for before, known in self._known if _are_one(before, found)), None)
+        if result is None:
             try:
-                known = _Known(found, self._completed(found, fallback), final)
+                result = self._completed(found, fallback)
             except StructureError as error:
-                known = _Known(found, error, final)
-            self._known.append(known)
-        if isinstance(known.result, StructureError):
-            raise known.result
-        return known.result
+                if not final:  # starting on the orbit may help later
+                    raise
+                result = error
+            self._known.append((found, result))
+        if isinstance(result, StructureError):
+            raise result
+        return result
 
     def _completed(self, found: ExtremalPath, fallback: Fallback) -> ExtremalPath:
         try:
-            return completed(self.propagator, found)
+            begun = "completion", found.first, found.points.tobytes()
+            return self._attempted(begun, lambda: completed(self.propagator, found))
         except StructureError as error:
             return fallback(error, found.action)
 
-    def _descended_once(
-        self, source: LinearizedOrbit, first: int, cut: Cut, points: Array, iterations: int
-    ) -> ExtremalPath:
-        """Descend, unless that failed before: candidates are tried quickly first, and again with all that is left."""
-        began = first, iterations, points.tobytes()
-        if began in self._failed:
-            raise self._failed[began]
+    def _attempted(self, begun: Hashable, attempt: Callable[[], ExtremalPath]) -> ExtremalPath:
+        """Do what did not fail before: candidates are tried quickly first, and again with all that is left."""
+        if begun in self._failed:
+            raise self._failed[begun]
         try:
-            return self._descended(source, first, cut, points, iterations)
+            return attempt()
         except StructureError as error:
-            self._failed[began] = error
+            self._failed[begun] = error
             raise
 
     def _descended(
