@@ -9,9 +9,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.completion import MORE_PERIODS, solved_again
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.newton import extremal_path
-from vibrokit.analyzers.polishing.path_solver import MORE_PERIODS, solved_again
 from vibrokit.results.energy import Certificate
 
 _FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows

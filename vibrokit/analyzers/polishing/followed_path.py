@@ -11,10 +11,10 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
+from vibrokit.analyzers.polishing.completion import FEW_EVALUATIONS, completed
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import extremal_path
-from vibrokit.analyzers.polishing.path_solver import FEW_EVALUATIONS, completed
 from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

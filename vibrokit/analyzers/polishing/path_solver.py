@@ -11,19 +11,23 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.action_descent import FEW_ITERATIONS, MANY_ITERATIONS, descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.completion import (
+    FEWEST_NODES,
+    MORE_PERIODS,
+    RADIUS,
+    completed,
+    solved_again,
+    within,
+)
 from vibrokit.analyzers.polishing.ending import Cut
-from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import MOST_EVALUATIONS, NotConverged, extremal_path
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
-_RADIUS = 1e-4  # of a path's extent: within this distance of its ends the linearized equations replace the path
-_CLOSER, _UNCHANGED = 4, 1e-8  # the radius is divided by 10 until the action changes by no more (relative), 4 times
 LONG_ENOUGH = 1e-6
 """Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
-FEW_EVALUATIONS = 24
-"""Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 _FROM_NEAR = 60  # evaluations for a candidate with momenta, or a longer path; those that converge need no more
 _FROM_EXACT = 12  # for one that is a path but for its ends: those that converge need 3 to 6
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
@@ -31,10 +35,6 @@ _FAILURES = 3  # of these in turn, after which no longer one is tried
 _HOPEFUL = 0.02  # misfit up to which a path is solved for from the orbit; those that were found had up to 0.012
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _ROUGHLY_ACCEPTED = 1e-6  # misfit of a path that starts farther from its source than the final one
-_MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
-MORE_PERIODS = 2
-"""Periods of its orbits by which a certified path must allow to be extended."""
-_FEWEST = 2  # nodes of a path
 _NEARLY = 1e-4  # misfit of a path that may converge if it begins nearer to its source
 _ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
@@ -198,7 +198,7 @@ class PathSolver:
                 longer, _ = gauss_newton(propagator, first - added, states, cut.last, cut.ending.free)
                 evaluations = MOST_EVALUATIONS if best is None else _FROM_NEAR
                 found = self._descended(source, first - added, cut, longer, evaluations=evaluations)
-                found = _within(propagator, found, _RADIUS * found.extent)
+                found = within(propagator, found, RADIUS * found.extent)
                 solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)
             except StructureError:
                 failures += 1
@@ -211,28 +211,6 @@ class PathSolver:
         if best is None:
             raise failure
         return best
-
-
-def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
-    """Return the same path, started and ended so near to its orbits that the action no longer changes.
-
-    Raises StructureError if it cannot be joined to them by the linearized equations.
-    """
-    radius = _RADIUS * found.extent
-    try:
-        found = _within(propagator, found, radius)
-    except StructureError:
-        if not found.flat:  # of one of a family, only the error of the linearized equations may be too large
-            raise
-        radius /= 10
-        found = _within(propagator, found, radius)
-    for _ in range(_CLOSER):
-        radius /= 10
-        closer = _within(propagator, found, radius)
-        if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
-            break
-        found = closer
-    return found
 
 
 def _give_up(failure: StructureError, action: float) -> ExtremalPath:
@@ -260,7 +238,7 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
         nodes[-number % pieces :: pieces, : len(known.scale) // 2] / known.scale[: len(known.scale) // 2]
         for nodes, number in ((known.points, known.first), (points, first))
     )
-    if not len(own) or len(line) < _FEWEST:
+    if not len(own) or len(line) < FEWEST_NODES:
         return False
     starts, ways = line[:-1], np.diff(line, axis=0)
     lengths = np.maximum((ways**2).sum(axis=1), 1e-300)
@@ -269,46 +247,6 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
         if np.linalg.norm(state - starts - along[:, None] * ways, axis=1).min() >= _SAME:
             return False
     return True
-
-
-def solved_again(
-    propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int, accepted: float = ACCEPTED
-) -> ExtremalPath:
-    """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
-
-    Raises StructureError if it does not converge, or if hardly anything of the path would be left.
-    """
-    points, first = found.points, found.first
-    if len(points) + min(before, 0) + min(after, 0) < _FEWEST:
-        raise StructureError(
-            f"a path of {len(points)} nodes cannot be made {-min(before, 0) - min(after, 0)} nodes shorter."
-        )
-    more = found.source.continued(points[0], first, -max(before, 0))
-    points = np.concatenate([more, points[max(-before, 0) :]])
-    points, ending = found.ending.extended(points, after)
-    return extremal_path(
-        propagator, found.source, first - before, ending, points, found.last,
-        evaluations=FEW_EVALUATIONS, accepted=accepted,
-    )  # fmt: skip
-
-
-def _within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -> ExtremalPath:
-    """The same path, started and ended within a radius of its orbits; in steps where all at once does not converge."""
-    grain, source, share, failures = propagator.grain, found.source, 1, 0
-    while True:
-        before = 0 if source.start_on_orbit else source.missing(found.points, found.first, -1, radius, grain) // grain
-        after = found.ending.missing(found.points, radius) // grain
-        try:
-            longer = solved_again(propagator, found, int(before / share) * grain, int(after / share) * grain)
-        except StructureError:
-            failures += 1
-            if failures > _MOST_FAILURES or max(abs(before), abs(after)) < 2 * share:
-                raise
-            share *= 2
-            continue
-        if share == 1:
-            return longer
-        found, share = longer, share // 2
 
 
 def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[LinearizedOrbit, int, Array]:
