@@ -14,6 +14,7 @@ from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
@@ -62,6 +63,31 @@ def test_sweeps_that_end_too_early_are_found(monkeypatch):
     (finding,) = [each for each in early.findings if each.code is Code.GRAPH_NOT_CONVERGED]
     assert finding.values["part"] > 0.01
     assert early.estimates[0].numerical_error >= finding.values["part"] * early.estimates[0].value
+
+
+def test_where_half_as_many_nodes_reach_no_exit_all_of_them_show_how_wide_grids_have_to_be(monkeypatch):
+    """Around a chaotic attractor whose exit costs almost nothing, the exit is within a node of it on fewer nodes."""
+    asked = []
+
+    def solved(self, grids, ceiling, rougher=None):
+        asked.append(grids.shape)
+        if grids.shape == (64, 64):
+            raise StructureError("the exits are within a node of it.")
+        return SimpleNamespace(potential=SimpleNamespace(grids=grids))
+
+    box = Grids(np.array([[[-1.0, 1.0], [-1.0, 1.0]]]), (128, 128), 1.0, 1)
+    monkeypatch.setattr(WholeRegion, "first", lambda self, steps, shape, intervals: box.with_shape(shape))
+    monkeypatch.setattr(WholeRegion, "solved", solved)
+    monkeypatch.setattr(WholeRegion, "highest", lambda self, solved: 1.0)
+    monkeypatch.setattr(
+        WholeRegion, "needed", lambda self, solved, level: [np.ones(solved.potential.grids.shape, bool)]
+    )
+    with pytest.raises(StructureError):
+        WholeRegion(None, None, (), ()).coarser(1, (64, 64), 1, 1.0)
+    asked.clear()
+    whole, _ = WholeRegion(None, None, (), ()).coarser(1, (128, 128), 1, 1.0)
+    assert asked[0] == (64, 64)
+    assert (whole.potential.grids.shape, whole.potential.grids.area > box.area) == ((128, 128), True)
 
 
 def grid(value, change, side):

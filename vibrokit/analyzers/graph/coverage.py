@@ -109,16 +109,8 @@ class Coverage(ABC):
         return found
 
     def coarser(self, steps: int, shape: Shape, intervals: int, ceiling: float) -> tuple[SolvedGrid, SolvedGrid]:
-        """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess.
-
-        Half as many nodes along each side show well enough how wide they have to be.
-        """
-        grids = self.first(steps, shape, intervals)
-        if min(halved(shape)) >= _FEWEST_RELIABLE:
-            rough = self._wide(grids.with_shape(halved(shape)), ceiling)
-            whole = self.solved(rough.potential.grids.with_shape(shape), 2 * self.highest(rough))
-        else:
-            whole = self._wide(grids, ceiling)
+        """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess."""
+        whole = self._wide_enough(self.first(steps, shape, intervals), ceiling)
         coarse = self.closer(whole, np.inf)
         for _ in range(_ZOOMS - 1):
             closer = self.closer(coarse, WORTHWHILE)
@@ -126,6 +118,20 @@ class Coverage(ABC):
                 break
             coarse = closer
         return whole, coarse
+
+    def _wide_enough(self, grids: Grids, ceiling: float) -> SolvedGrid:
+        """Solve on grids that are as wide as half as many nodes along each side show to be needed.
+
+        Where these are too few to reach an exit, all of them show it.
+        """
+        shape = grids.shape
+        if min(halved(shape)) < _FEWEST_RELIABLE:
+            return self._wide(grids, ceiling)
+        try:
+            rough = self._wide(grids.with_shape(halved(shape)), ceiling)
+        except StructureError:
+            return self._wide(grids, ceiling)
+        return self.solved(rough.potential.grids.with_shape(shape), 2 * self.highest(rough))
 
     def _wide(self, grids: Grids, ceiling: float) -> SolvedGrid:
         """Solve on grids that are widened until no node that has to be covered lies at their edge."""
