@@ -14,9 +14,12 @@ from vibrokit.structure.linear_map import HamiltonianMap
 
 MANY_ITERATIONS, FEW_ITERATIONS = 100, 30
 """Generic paths need 5 to 30 iterations; those of a nearly degenerate family descend slowly."""
-_INNER = 8  # Newton's method on the momenta of the segments; it converges in 2 to 4
+_INNER = 20  # Newton's method on the momenta of the segments; it converges in 2 to 4, beside contacts in up to 20
 _MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
 _CONVERGED = 1e-9  # of the action
+# Pieces between a node and a short contact: a nearer node is left out, since its velocity would have to be reversed for
+# the impact to move to its other side.
+_BESIDE = 0.25
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-8, 1e6
 
 Array = NDArray[np.float64]
@@ -26,12 +29,23 @@ Closing = tuple[Array, Array]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Evaluation:
-    """A path through given states, its segments extremal."""
+    """A path through the states at some of its nodes, its segments extremal."""
 
+    nodes: NDArray[np.intp]
     states: Array
     momenta: Array
     carried: HamiltonianMap
+    between: Array  # (q, p) at the other nodes
     action: float
+
+    @property
+    def points(self) -> Array:
+        """(q, p) at all nodes."""
+        last = self.carried.images[-1:, self.states.shape[1] :]
+        found = np.empty((self.nodes[-1] + 1, 2 * self.states.shape[1]))
+        found[self.nodes] = np.hstack([self.states, np.vstack([self.momenta, last])])
+        found[np.setdiff1d(np.arange(len(found)), self.nodes)] = self.between
+        return found
 
 
 def descend_action(
@@ -54,13 +68,12 @@ def descend_action(
     Returns the points (nodes, 2n) and the action: the guess and NaN where no extremal segments through its states were
     found.
     """
-    n = propagator.size
     path = _Descent(propagator, first, last, free, closing)
-    current = path.evaluate(points[:, :n], points[:-1, n:])
+    current = path.through(points, path.chosen(points))
     if current is None:
         return points, float("nan")
     current = path.minimize(current, iterations, converged)
-    return np.hstack([current.states, np.vstack([current.momenta, current.carried.images[-1:, n:]])]), current.action
+    return current.points, current.action
 
 
 class _Descent:
@@ -77,21 +90,48 @@ class _Descent:
         self.held = np.full(n, closing is None) if free is None or closing is not None else ~free
         self.target, self.form = (np.zeros(n), np.zeros((n, n))) if closing is None else closing
 
-    def evaluate(self, states: Array, momenta: Array) -> _Evaluation | None:
-        """Find the momenta that lead from node to node; None where there are none near those given."""
+    def chosen(self, points: Array) -> NDArray[np.intp]:
+        """Choose the nodes whose states are varied: all but those next to a short contact."""
+        left_out = self.propagator.in_short_contact(points, _BESIDE)
+        left_out[-2:] = False
+        return np.flatnonzero(~left_out)
+
+    def through(self, points: Array, nodes: NDArray[np.intp]) -> _Evaluation | None:
+        """Evaluate the path through the states at some nodes."""
+        return self.evaluate(nodes, points[nodes, : self.n], points[nodes[:-1], self.n :])
+
+    def evaluate(self, nodes: NDArray[np.intp], states: Array, momenta: Array) -> _Evaluation | None:
+        """Find the momenta that lead from node to node; None where there are none near those given.
+
+        Each segment has a Newton method of its own. A step that would miss the end by more is shortened: where a
+        segment first touches a stop, steps from either side would lead to the other.
+        """
         extent = np.ptp(states, axis=0)
+        extent[extent == 0] = 1.0
+        step, share = np.zeros_like(momenta), np.ones(len(momenta))
+        least = np.full(len(momenta), np.inf)
         for _ in range(_INNER):
-            carried = self.propagator.extremal(np.hstack([states[:-1], momenta]), self.first, self.last)
+            tried = momenta + share[:, None] * step
+            starts = np.hstack([states[:-1], tried])
+            carried, between = self.propagator.extremal_between(starts, nodes, self.first, self.last)
             misses = states[1:] - carried.images[:, : self.n]
-            if not np.isfinite(carried.derivatives).all():
+            missed = (np.abs(misses) / extent).max(axis=1)
+            if np.all(missed <= _MATCHED):
+                return _Evaluation(nodes, states, tried, carried, between, self._action(states, carried, misses))
+            better = missed < least
+            momenta, least = np.where(better[:, None], tried, momenta), np.fmin(least, missed)
+            if not np.isfinite(least).all():
                 return None
-            if np.all(np.abs(misses) <= _MATCHED * extent):
-                tail = states[-1] - self.target
-                missed = float(np.sum(carried.images[:, self.n :] * misses))
-                action = float(np.sum(carried.actions)) + missed + 0.5 * float(tail @ self.form @ tail)
-                return _Evaluation(states, momenta, carried, action)
-            momenta = momenta + np.linalg.solve(carried.derivatives[:, : self.n, self.n :], misses[..., None])[..., 0]
+            slopes = carried.derivatives[better, : self.n, self.n :]
+            step[better] = np.linalg.solve(slopes, misses[better, :, None])[..., 0]
+            share = np.where(better, 1.0, share / 4)
         return None
+
+    def _action(self, states: Array, carried: HamiltonianMap, misses: Array) -> float:
+        """The action of a path; what its segments miss counts to first order."""
+        tail = states[-1] - self.target
+        missed = float(np.sum(carried.images[:, self.n :] * misses))
+        return float(np.sum(carried.actions)) + missed + 0.5 * float(tail @ self.form @ tail)
 
     def minimize(self, current: _Evaluation, iterations: int, converged: float) -> _Evaluation:
         """Descend until the next step promises no more."""
@@ -113,18 +153,25 @@ class _Descent:
                 elif gain > 0.75:
                     damping = max(damping / 6, _LEAST_DAMPING)
                 if tried is not None and gain > 0:
-                    current = tried
+                    current = self._rearranged(tried)
                     break
             else:
                 break
         return current
+
+    def _rearranged(self, current: _Evaluation) -> _Evaluation:
+        """Choose the nodes again, where impacts have moved."""
+        points = current.points
+        nodes = self.chosen(points)
+        found = None if np.array_equal(nodes, current.nodes) else self.through(points, nodes)
+        return current if found is None or found.action > current.action else found
 
     def _moved(self, current: _Evaluation, step: Array) -> _Evaluation | None:
         """Evaluate the path whose states are moved, its momenta moved to first order."""
         n, slopes = self.n, current.carried.derivatives
         ahead = step[1:] - np.einsum("kij,kj->ki", slopes[:, :n, :n], step[:-1])
         momenta = current.momenta + np.linalg.solve(slopes[:, :n, n:], ahead[..., None])[..., 0]
-        return self.evaluate(current.states + step, momenta)
+        return self.evaluate(current.nodes, current.states + step, momenta)
 
     def _gradient(self, current: _Evaluation) -> Array:
         """∂S/∂q at each node: the momentum before it less the one after it; 0 where the state is held."""

@@ -59,14 +59,14 @@ class SegmentPropagator:
         durations = (contact.duration for contact in contact_times(self.osc, Flow.STATE))
         return min(durations, default=math.inf) < _SHORT * self.piece
 
-    def in_short_contact(self, nodes: Array) -> NDArray[np.bool_]:
+    def in_short_contact(self, nodes: Array, beside: float = _BESIDE) -> NDArray[np.bool_]:
         """Return which inner nodes of a path (count, n or more) lie in a contact that is much shorter than a piece.
 
-        Neither neighbour lies in it. A node just beside a contact counts as one in it.
+        Neither neighbour lies in it. A node that is `beside` a contact, in pieces, counts as one in it.
         """
         touching, short = np.zeros(len(nodes), dtype=bool), np.zeros(len(nodes), dtype=bool)
         if self._has_short_contacts:
-            x, close = nodes[:, 0], _BESIDE * self.piece * np.abs(nodes[:, 1])
+            x, close = nodes[:, 0], beside * self.piece * np.abs(nodes[:, 1])
             for barrier in self.osc.barriers:
                 touching |= barrier.sign * (x - barrier.position) > -close
             short[1:-1] = touching[1:-1] & ~touching[:-2] & ~touching[2:]
@@ -86,6 +86,23 @@ class SegmentPropagator:
     def extremal_from(self, points: Array, phases: NDArray[np.int64], last: float | None = None) -> HamiltonianMap:
         """Map (q, p) at any phases (count,) over one piece each; arguments otherwise as for `linear`."""
         return self._by_phase(hamiltonian_map, points, phases, last)
+
+    def extremal_between(
+        self, points: Array, nodes: NDArray[np.intp], first: int, last: float | None = None
+    ) -> tuple[HamiltonianMap, Array]:
+        """Map (q, p) at some nodes of a path, one or two pieces apart, each to the next; return also those between.
+
+        The last two nodes are one piece apart, which may have another duration (s).
+        """
+        phases, twice = first + nodes[:-1], np.diff(nodes) == 2
+        over = self.extremal_from(points, phases, last)
+        between = over.images[twice]
+        if twice.any():
+            more = self.extremal_from(between, phases[twice] + 1)
+            over.images[twice] = more.images
+            over.derivatives[twice] = more.derivatives @ over.derivatives[twice]
+            over.actions[twice] += more.actions
+        return over, between
 
     def _by_phase(
         self, mapped: Callable[..., Map], points: Array, phases: NDArray[np.int64], last: float | None

@@ -46,6 +46,7 @@ class CandidatePolisher:
         self._passing = PassingSearch(self.nodes)
         self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
         self._unsolved: list[Candidate] = []  # that led nowhere quickly
+        self._shots: dict[int, float] = {}  # by target, the action of the first, the cheapest shot that led to a path
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
@@ -53,7 +54,7 @@ class CandidatePolisher:
         A candidate of a grid may pass an orbit on its way to an end. No path does that in finite time, so that it is
         polished in legs first. If it is polished quickly and no path is found, it is left for `polish_the_rest`.
         """
-        if candidate.action > WORTH * self._known(candidate):
+        if candidate.action > WORTH * max(self._known(candidate), self._priced(candidate)):
             self.skipped += 1
             return
         failures, solved = list[str](), False
@@ -64,6 +65,8 @@ class CandidatePolisher:
                     solved = True  # no failure of this candidate
                 else:
                     solved |= self._solve_directly(end, candidate, failures, quick=quick) or in_legs
+                    if solved and candidate.momenta is not None:
+                        self._shots.setdefault(candidate.target, candidate.action)
             for end in self._farther(candidate):
                 if self._solve_in_legs(end, candidate):
                     break
@@ -137,6 +140,13 @@ class CandidatePolisher:
         if np.isinf(to_target) and self._passes(candidate, near):
             return np.inf
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
+
+    def _priced(self, candidate: Candidate) -> float:
+        """The action of the cheapest shot that led to a path, for other shots; 0 if none did, or for no shot.
+
+        Between stiff stops, a path may cost a third less than the shot that led to it, and other shots lead to others.
+        """
+        return 0.0 if candidate.momenta is None else self._shots.get(candidate.target, 0.0)
 
     def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
         """Whether only ends that are not near a candidate lead to its target."""
