@@ -52,11 +52,13 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     assert second.certificate.residual < 1e-9
 
 
-@pytest.mark.parametrize("kind", ["noise", "one stop", pytest.param("second harmonic", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["forced", *OTHERS])
 def test_other_scenes_have_none(kind):
-    result = both(kind)
-    assert len(result.energies) == 2
-    assert not result.found(Code.MIRROR_IMAGE)
+    """Whatever path is known, only in the symmetric scene is there a mirror image of it."""
+    osc, structure = wells(kind)
+    known = both("forced").energies[:1]
+    images = Mirror(ExitProblem(osc, structure, structure.attractors[1], vk.LeaveBasin(), known=known)).candidates(())
+    assert len(images) == (kind == "forced")
 
 
 def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():

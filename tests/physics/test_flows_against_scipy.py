@@ -12,7 +12,7 @@ import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
-STARTS, PERIODS = 100, 20
+STARTS, PERIODS = 50, 20
 OMEGA, STOP, STIFFNESS = 0.57, 0.5, 50.0
 FINEST = [vk.FreeFlight(tolerance=1e-14), vk.Order8(tolerance=1e-14)]
 

@@ -261,7 +261,8 @@ def test_both_wells_of_a_symmetric_scene_have_one_energy():
         excitations=(vk.Harmonic(amplitude=0.15, frequency=0.9),), noise=vk.WhiteNoise(intensity=1e-4),
     )  # fmt: skip
     structure = vk.find_structure(osc, manifolds=False)
-    left, right = (vk.LeastAction(source=label).run(osc, structure).energies[0] for label in (0, 1))
+    graph = vk.GraphSearch(nodes=(180, 180))
+    left, right = (vk.LeastAction(source=label, graph=graph).run(osc, structure).energies[0] for label in (0, 1))
     assert (left.bound, right.bound) == (Bound.CERTIFIED, Bound.CERTIFIED)
     assert left.value == pytest.approx(right.value, rel=1e-8)
 

@@ -114,14 +114,12 @@ def test_reference_crosses_contacts():
     np.testing.assert_allclose(end, [-np.sin(np.pi / 3), -np.cos(np.pi / 3)], atol=1e-11)
 
 
-def test_command(tmp_path, monkeypatch, capsys):
-    small = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05)
-    trade = measure_steppers(small, ladders=LADDERS[:1], **SETTINGS)
-    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: trade)
+def test_command(linear, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: linear)
     monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
     monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
     monkeypatch.setattr("vibrokit.trade.densities.measure_densities", lambda osc, source: "densities")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
-    assert str(trade) in capsys.readouterr().out
+    assert str(linear) in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")

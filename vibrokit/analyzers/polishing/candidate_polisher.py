@@ -46,7 +46,7 @@ class CandidatePolisher:
         self._passing = PassingSearch(self.nodes)
         self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
         self._unsolved: list[Candidate] = []  # that led nowhere quickly
-        self._shots: dict[int, float] = {}  # by target, the action of the first, the cheapest shot that led to a path
+        self._shots: dict[int, float] = {}  # by target, action of the first shot that led to a path, over that path's
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
@@ -54,7 +54,7 @@ class CandidatePolisher:
         A candidate of a grid may pass an orbit on its way to an end. No path does that in finite time, so that it is
         polished in legs first. If it is polished quickly and no path is found, it is left for `polish_the_rest`.
         """
-        if candidate.action > WORTH * max(self._known(candidate), self._priced(candidate)):
+        if candidate.action > WORTH * self._known(candidate) * self._overpriced(candidate):
             self.skipped += 1
             return
         failures, solved = list[str](), False
@@ -65,8 +65,6 @@ class CandidatePolisher:
                     solved = True  # no failure of this candidate
                 else:
                     solved |= self._solve_directly(end, candidate, failures, quick=quick) or in_legs
-                    if solved and candidate.momenta is not None:
-                        self._shots.setdefault(candidate.target, candidate.action)
             for end in self._farther(candidate):
                 if self._solve_in_legs(end, candidate):
                     break
@@ -96,13 +94,15 @@ class CandidatePolisher:
         ways = (first or (PathSolver.solve_near,)) if quick else (*first, PathSolver.solve)
         for way in ways:
             try:
-                new = self._add(self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,))))
+                one = self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,)))
             except StructureError as error:
                 failures.append(str(error))
                 self._failures[end] += [] if quick else [candidate.action]
             else:
                 found = True
-                if not new:  # another candidate has led there, and to where the other way leads
+                if candidate.momenta is not None:
+                    self._shots.setdefault(candidate.target, max(1.0, candidate.action / one.action))
+                if not self._add(one):  # another candidate has led there, and to where the other way leads
                     break
         return found
 
@@ -141,12 +141,12 @@ class CandidatePolisher:
             return np.inf
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
 
-    def _priced(self, candidate: Candidate) -> float:
-        """The action of the cheapest shot that led to a path, for other shots; 0 if none did, or for no shot.
+    def _overpriced(self, candidate: Candidate) -> float:
+        """By how much shots to its target cost more than the paths that they lead to, as the first one did.
 
-        Between stiff stops, a path may cost a third less than the shot that led to it, and other shots lead to others.
+        Between stiff stops, a path may cost a third less than the shot, and the next shot lead to another path.
         """
-        return 0.0 if candidate.momenta is None else self._shots.get(candidate.target, 0.0)
+        return 1.0 if candidate.momenta is None else self._shots.get(candidate.target, 1.0)
 
     def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
         """Whether only ends that are not near a candidate lead to its target."""
