@@ -31,7 +31,7 @@ Closing = tuple[Array, Array]
 class _Evaluation:
     """A path through the states at some of its nodes, its segments extremal."""
 
-    nodes: NDArray[np.intp]
+    nodes: NDArray[np.intp]  # one or two pieces apart
     states: Array
     momenta: Array
     carried: HamiltonianMap
@@ -64,6 +64,7 @@ def descend_action(
     The action of a segment as a function of the states at its two nodes has the momenta as its derivatives, and blocks
     of the variational equations as its second derivatives: Newton's method on the sum has a banded matrix, and is
     damped where a step would not descend. It converges from farther away than multiple shooting, and to minima only.
+    The states at nodes beside short contacts are not varied, so that an impact can move from one piece to the next.
 
     Returns the points (nodes, 2n) and the action: the guess and NaN where no extremal segments through its states were
     found.
