@@ -18,7 +18,8 @@ _INNER = 20  # Newton's method on the momenta of the segments; it converges in 2
 _MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
 _CONVERGED = 1e-9  # of the action
 # Pieces between a node and a short contact: a nearer node is left out, since its velocity would have to be reversed for
-# the impact to move to its other side.
+# the impact to move to its other side. Of 16 paths between fixed states, 13 were the same with 8, 16 and 32 pieces for
+# 0.02, 0.1 and 0.25, and 12 for 0.5; from 0.25 on, their actions were 6 % less on average.
 _BESIDE = 0.25
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-8, 1e6
 

@@ -46,7 +46,7 @@ class CandidatePolisher:
         self._passing = PassingSearch(self.nodes)
         self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
         self._unsolved: list[Candidate] = []  # that led nowhere quickly
-        self._shots: dict[int, float] = {}  # by target, action of the first shot that led to a path, over that path's
+        self._overpricing: dict[int, float] = {}  # by target: action of the first shot that led to a path, over its
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
@@ -101,7 +101,7 @@ class CandidatePolisher:
             else:
                 found = True
                 if candidate.momenta is not None:
-                    self._shots.setdefault(candidate.target, max(1.0, candidate.action / one.action))
+                    self._overpricing.setdefault(candidate.target, max(1.0, candidate.action / one.action))
                 if not self._add(one):  # another candidate has led there, and to where the other way leads
                     break
         return found
@@ -146,7 +146,7 @@ class CandidatePolisher:
 
         Between stiff stops, a path may cost a third less than the shot, and the next shot lead to another path.
         """
-        return 1.0 if candidate.momenta is None else self._shots.get(candidate.target, 1.0)
+        return 1.0 if candidate.momenta is None else self._overpricing.get(candidate.target, 1.0)
 
     def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
         """Whether only ends that are not near a candidate lead to its target."""
