@@ -78,7 +78,8 @@ def steps_taken(osc, stepper, states):
         settings[1] = limit
         out = np.empty((1, 2)), *(np.zeros(1, dtype=np.int64) for _ in range(3))
         budget, none = np.ones(1, dtype=np.int64), np.empty((1, 0, 2))
-        kernel.advance(state[None], theta, 0.0, interval, settings, budget, *tests, *out, none)
+        noise = np.empty((1, 0), dtype=np.uint64), np.empty((0, 2))
+        kernel.advance(state[None], theta, 0.0, interval, settings, *noise, budget, *tests, *out, none)
         return out[2][0] == STALLED
 
     counts = []

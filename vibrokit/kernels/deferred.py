@@ -1,7 +1,10 @@
-"""Compiles functions only as a part of those that call them.
+"""Compiles functions only as a part of those that call them, and optimises each part once.
 
 Numba optimises each function together with all that it calls, and makes machine code of it, though only its callers
 use it. In a stepper of seventy small functions, each would be optimised as often as the calls above it are deep.
+
+Numba also optimises each function by itself before all that it calls is linked to it. A short loop over lanes is then
+repeated for each lane, because the calls in it look small, and becomes vector code no more.
 """
 
 from __future__ import annotations
@@ -36,7 +39,18 @@ def _refuse(*_arguments: Any) -> None:
 _REFUSED = ctypes.cast(_refuse, ctypes.c_void_p).value
 
 
-class _DeferredLibrary(JITCodeLibrary):
+class _Library(JITCodeLibrary):
+    """The code of a function and of all that it calls, which is optimised once, as a whole."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
+
+
+class _DeferredLibrary(_Library):
     """The code of a function and of all that it calls, as lowered."""
 
     @property
@@ -54,28 +68,49 @@ class _DeferredLibrary(JITCodeLibrary):
         self._finalized = True
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _Defer(LoweringPass):
-    """Gives a function a library that is not compiled."""
+class _Pass(LoweringPass):
+    """Gives a function a library of a kind."""
 
-    _name = "vibrokit_defer"
+    library: type[_Library]
 
     def __init__(self) -> None:
         super().__init__()
 
     def run_pass(self, state: Any) -> bool:
         codegen = state.targetctx.codegen()
-        state.library = _DeferredLibrary(codegen, state.func_id.func_qualname)
+        state.library = self.library(codegen, state.func_id.func_qualname)
         state.library.enable_object_caching()
         return True
 
 
-class DeferredCompiler(CompilerBase):
-    """The compiler of a function that only compiled functions call: Python must not, for there is no code to call."""
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Defer(_Pass):
+    _name, library = "vibrokit_defer", _DeferredLibrary
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _OptimiseOnce(_Pass):
+    _name, library = "vibrokit_optimise_once", _Library
+
+
+class _Compiler(CompilerBase):
+    choice: type[_Pass]
 
     def define_pipelines(self) -> list[PassManager]:
-        """Numba's own passes, with a library that its callers compile."""
+        """Numba's own passes, with a library of ours."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.add_pass_after(_Defer, AnnotateTypes)
+        passes.add_pass_after(self.choice, AnnotateTypes)
         passes.finalize()
         return [passes]
+
+
+class DeferredCompiler(_Compiler):
+    """The compiler of a function that only compiled functions call: Python must not, for there is no code to call."""
+
+    choice = _Defer
+
+
+class Compiler(_Compiler):
+    """The compiler of a function that is called from Python or by address."""
+
+    choice = _OptimiseOnce

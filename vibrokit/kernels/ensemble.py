@@ -222,9 +222,9 @@ def advance_block(
     region, area, points, metrics = (_plain(array, float) for array in bounds)
     labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
     budget, phases = _plain(budget, np.int64), _plain(phases, np.int64)
-    noise = (streams, np.empty((0, 2)) if normals is None else _plain(normals, float)) if streams.shape[1] else ()
+    given = np.empty((0, 2)) if normals is None else _plain(normals, float)
     kernel.advance(
-        _plain(starts, float), *common, *noise, budget, phases,
+        _plain(starts, float), *common, streams, given, budget, phases,
         stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
         ended.states, ended.intervals, ended.status, ended.label, ended.visits,
     )  # fmt: skip

@@ -31,7 +31,9 @@ class FixedSteps(Stepper):
         Steps from section to section (forcing period, or 2π/ω_n without forcing).
     """
 
+    templates: ClassVar[tuple[str, ...]] = ("drawing", "fixed_steps")
     takes_noise: ClassVar[bool] = False
+    prepared: ClassVar[bool] = False  # whether steps read what `prepare` writes
     nodes: ClassVar[int]  # of a step, at which the forcing is evaluated
 
     steps: int = 256
@@ -73,19 +75,17 @@ class FixedSteps(Stepper):
             )
         step = self.step_part(text)
         # The laws are compiled only if contact times are needed.
-        return [*self.driver_part(text), "WALLS = ()  # steps go across contacts\n", text.forcing, *step, text.stops]
+        return [text.constants, self.facts(text), text.forcing, *step, text.stops]
 
-    def driver_part(self, text: SceneText) -> list[str]:
-        """The sizes: lanes of a block, values of the forcing in a step, and numbers that a step works in."""
-        return [text.constants, f"LANES = {lanes_of(text)}\nNODES = {self.nodes}\nROOM = {self.room(text)}\n"]
+    def facts(self, text: SceneText) -> str:
+        """Lanes of a block, values of the forcing in a step, numbers that a step works in, and what a driver calls."""
+        sizes = f"LANES = {lanes_of(text)}\nNODES = {self.nodes}\nROOM = {self.room(text)}\n"
+        facts = f"FACTS = (LANES, NODES, ROOM, FORCED, {self.prepared})\n"
+        return f"{sizes}{facts}WALLS = ()  # steps go across contacts\n"
 
     def room(self, text: SceneText) -> int:
         """Return how many numbers a step works in; an array cannot be empty."""
         return 1
-
-    def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """The loop over trajectories, and what draws the noise."""
-        return ("drawing", "fixed_steps") if text.flow is Flow.NOISY else ("fixed_steps",)
 
     @abstractmethod
     def step_part(self, text: SceneText) -> list[str]:

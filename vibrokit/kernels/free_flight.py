@@ -26,7 +26,9 @@ class FreeFlight(LocatedStepper):
     """
 
     name: ClassVar[str] = "free_flight"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "free_flight", "sections")
+    templates: ClassVar[tuple[str, ...]] = (
+        "steps", "settling", "landing", "contact", "free_flight", "extrapolation", "attempts", "sections",
+    )  # fmt: skip
 
     def scene_part(self, text: SceneText) -> list[str]:
         """That of a located stepper, and the series of the flight."""

@@ -1,8 +1,8 @@
 """Calls from the driver of a kernel into the code of a scene, by address.
 
-A driver holds what the scenes of a form have in common: the loop over trajectories, and the events. It is compiled once
-for all of them, and finds the code of a scene through addresses that stand before the parameters in memory. Before the
-addresses is what the driver needs to know of the stops, if it locates contacts.
+A driver holds what scenes have in common: the loop over trajectories, the sums of a step, and the events. It compiles
+once for all of them, and finds the code of a scene through addresses that stand before the parameters in memory. Before
+the addresses are facts of the scene, and before these is how far the parameters are.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ _NUMBERS, _SWITCHES = types.CPointer(types.float64), types.CPointer(types.uint8)
 _SIGNATURES = {
     "rhs": types.none(_F8, _NUMBERS, _SWITCHES, _NUMBERS, _NUMBERS),
     "law": _F8(_I8, _F8, _F8, _NUMBERS),
-    "attempt_lanes": types.none(_NUMBERS, _NUMBERS, _SWITCHES, _NUMBERS),
-    "misfit_lanes": types.none(_NUMBERS, _F8, _F8, _NUMBERS),
+    "slopes_lanes": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "flight_rate": _F8(_NUMBERS),
     "taylor": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "tabulate": types.none(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
@@ -43,9 +42,9 @@ def addresses(functions: dict[str, Any]) -> NDArray[np.int64]:
     return found
 
 
-def linked(theta: NDArray[np.float64], links: NDArray[np.int64], stops: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Put what a driver knows of the stops, and the addresses, before the parameters."""
-    return np.concatenate([stops, links.view(np.float64), theta])
+def linked(theta: NDArray[np.float64], links: NDArray[np.int64], facts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put the facts that a driver needs to know, and the addresses, before the parameters."""
+    return np.concatenate([[1.0 + len(facts) + len(links)], facts, links.view(np.float64), theta])
 
 
 def _call(name: str, parameters: int) -> tuple[Any, Any]:
@@ -77,15 +76,9 @@ def law(_context: Any, i: Any, depth: Any, rate: Any, theta: Any) -> Any:
 
 
 @intrinsic
-def attempt_lanes(_context: Any, lanes: Any, theta: Any, pushing: Any, room: Any) -> Any:
-    """Take a step from STATE to TRIAL in each lane, along its course."""
-    return _call("attempt_lanes", 1)
-
-
-@intrinsic
-def misfit_lanes(_context: Any, lanes: Any, tolerance: Any, span: Any, theta: Any) -> Any:
-    """Find the ERROR of each attempt."""
-    return _call("misfit_lanes", 3)
+def slopes_lanes(_context: Any, node: Any, lanes: Any, slopes: Any, theta: Any) -> Any:
+    """Write the slopes of each lane at its point of a stage, along its course."""
+    return _call("slopes_lanes", 3)
 
 
 @intrinsic

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from vibrokit.kernels.deferred import DeferredCompiler
+from vibrokit.kernels.deferred import Compiler, DeferredCompiler
 
 # Each operation rounds by itself, so that the bits do not depend on which functions the compiler inlines.
 _EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
@@ -12,7 +12,7 @@ _CONTRACT = {"fastmath": {"contract", "nsz", "arcp"}}
 _UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 # Called from Python.
-OPTIONS = {**_EXACT, "cache": True}
+OPTIONS = {**_EXACT, "cache": True, "pipeline_class": Compiler}
 CONTRACTED = {**OPTIONS, **_CONTRACT}
 # Called by address: Numba need not wrap them for Python.
 LINKED = {**OPTIONS, **_UNWRAPPED}

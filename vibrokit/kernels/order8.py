@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.template import read_template
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -64,19 +63,15 @@ class LocatedStepper(Stepper):
         return (*self.templates[:place], *_CROSSING[text.flow], *self.templates[place:])
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The right-hand side with switched stops, the stops, and attempts of all lanes."""
+        """The right-hand side with switched stops, the stops, and the slopes of all lanes."""
         writer = AttemptWriter(text)
-        extrapolation = [read_template("extrapolation")] if text.curved else []
-        constants = [text.constants, text.walls, writer.offsets()]
-        return [*constants, text.forcing, text.rhs, text.stops, *extrapolation, *writer.attempt()]
+        constants = [text.constants, text.walls, writer.facts()]
+        return [*constants, text.forcing, text.rhs, text.stops, *writer.slopes()]
 
     def driver_part(self, text: SceneText) -> list[str]:
         """Where the numbers of the lanes are."""
-        return [text.constants, AttemptWriter(text).offsets(), self.series(text)]
-
-    def measure_part(self, text: SceneText) -> list[str]:
-        """The errors of attempts."""
-        return AttemptWriter(text).misfit()
+        writer, stops = AttemptWriter(text), f"STOPS = {text.barriers > 0}\n"
+        return [text.layout, stops, writer.offsets(), self.series(text)]
 
     def series(self, text: SceneText) -> str:
         """Constants of the series of the flight, which has no terms where the flight is stepped."""
@@ -113,4 +108,6 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = ("steps", "settling", "landing", "contact", "order8", "sections")
+    templates: ClassVar[tuple[str, ...]] = (
+        "steps", "settling", "landing", "contact", "order8", "extrapolation", "attempts", "sections",
+    )  # fmt: skip

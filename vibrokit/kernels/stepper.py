@@ -25,7 +25,6 @@ class Emitter(ABC):
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
-    prepared: ClassVar[bool] = False  # whether steps read what `prepare` writes
     called: ClassVar[bool] = False  # whether Python calls functions that are otherwise only inlined
 
     @abstractmethod
@@ -34,10 +33,6 @@ class Emitter(ABC):
 
     def driver_part(self, text: SceneText) -> list[str]:
         """Return the constants that stand above the templates."""
-        return []
-
-    def measure_part(self, text: SceneText) -> list[str]:
-        """Return what measures the error of a step, which flows with the same variables share; or nothing."""
         return []
 
     def templates_for(self, text: SceneText) -> tuple[str, ...]:

@@ -88,20 +88,20 @@ class SceneText:
             "MOMENTA": self.states if self.flow.has_momenta else 0,
             "EQUATIONS": len(self.variables),
             "BARRIERS": len(contacts),
+            "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
+            "CLAMPED": tuple(contact.clamped for contact in contacts),
+            "ROOTED": tuple(contact.rooted for contact in contacts),
+            "JUMPS": tuple(contact.jumps for contact in contacts),
         }
-        if contacts:
-            rows |= {
-                "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
-                "CLAMPED": tuple(contact.clamped for contact in contacts),
-                "ROOTED": tuple(contact.rooted for contact in contacts),
-                "JUMPS": tuple(contact.jumps for contact in contacts),
-            }
         rows["FORCED"] = self.forced
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
-        elif self.breaks and not self.flow.has_momenta:  # where M and the triangle of C begin; 0 for none
-            rows |= {"DERIVATIVES": self._place_of("m_00"), "COVARIANCE": self._place_of("W00")}
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
+
+    @property
+    def layout(self) -> str:
+        """Number of states, and where M and the triangle of C begin, 0 for none: what maps of jumps need."""
+        return f"STATES = {self.states}\nDERIVATIVES, COVARIANCE = {self._place_of('m_00')}, {self._place_of('W00')}\n"
 
     @property
     def walls(self) -> str:

@@ -15,8 +15,8 @@ from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
-from vibrokit.kernels.templates.scene import CLAMPED, COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL
-from vibrokit.kernels.templates.settling import SOME_CLAMPED, push_of, settle
+from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL
+from vibrokit.kernels.templates.settling import push_of, settle
 from vibrokit.kernels.templates.steps import (
     AIM,
     CLOCK,
@@ -44,6 +44,7 @@ from vibrokit.kernels.templates.steps import (
     accept,
     ask,
     face,
+    is_clamped,
     of,
     plan,
     put,
@@ -133,9 +134,8 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
     if length != memory[FIRST]:
         memory[LAST] = 0.0
     memory[FIRST], memory[TAKEN] = length, lanes[FACTOR + lane]
-    if SOME_CLAMPED:
-        if CLAMPED[i]:
-            return turn(i, lane, memory, pushing, theta, settings, lanes, room)
+    if is_clamped(i, theta):
+        return turn(i, lane, memory, pushing, theta, settings, lanes, room)
     return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
 
 

@@ -3,22 +3,11 @@
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.links import rhs
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
-from vibrokit.kernels.templates.scene import (
-    BARRIERS,
-    CLOCK,
-    COURSE,
-    EQUATIONS,
-    LANES,
-    LENGTH,
-    POINT,
-    ROW,
-    SIDE,
-    SIGMA,
-    WALL,
-    rhs,
-)
+from vibrokit.kernels.templates.scene import COURSE, LANES, LENGTH, POINT, ROW, SIDE, SIGMA, WALL
+from vibrokit.kernels.templates.steps import CLOCK, barriers, size_of
 
 # --- scene above, stepper below ---
 
@@ -30,8 +19,9 @@ def extrapolate(node, place, lane, lanes, pushing, theta, room):
     The second derivative of a law is infinite at depth 0 while its product with sigma is not. `place` is where the
     slope begins among the numbers of the lanes.
     """
-    y, near, far, pushed = room, offset_by(room, ROW), offset_by(room, 2 * ROW), offset_by(pushing, lane * BARRIERS)
-    for e in range(CLOCK, EQUATIONS):
+    y, near, far, size = room, offset_by(room, ROW), offset_by(room, 2 * ROW), size_of(lanes)
+    pushed = offset_by(pushing, lane * barriers(theta))
+    for e in range(CLOCK, size):
         y[e] = lanes[POINT + e * LANES + lane]
     wall, side = lanes[WALL + lane], lanes[SIDE + lane]
     sigma, depth, rate = lanes[SIGMA + lane] + node * lanes[LENGTH + lane], side * (y[0] - wall), side * y[1]
@@ -43,6 +33,6 @@ def extrapolate(node, place, lane, lanes, pushing, theta, room):
     second = np.sqrt(side * (y[0] - wall) / along)
     rhs(y[CLOCK], y, pushed, theta, far)
     near[CLOCK] = far[CLOCK] = 1.0
-    for e in range(CLOCK, EQUATIONS):
+    for e in range(CLOCK, size):
         low, high = scale * first * near[e], scale * second * far[e]
         lanes[place + e * LANES] = low + (sigma - first) / (second - first) * (high - low)

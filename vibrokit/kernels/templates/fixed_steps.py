@@ -10,21 +10,23 @@ Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the
 it drives, Milstein's term makes it strong order 1. `given` normals, if any, replace those that a single trajectory
 draws.
 
-Lines marked "forced", "unforced", "noisy" or "noiseless" are kept only for such scenes and flows, and those marked
-"prepared" only for steps that share factors.
+One driver serves all scenes, flows and steps of this kind; it reads from the facts of a scene what these need.
 """
 
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.links import LINKS, prepare, step_lanes, tabulate
+from vibrokit.kernels.links import prepare, step_lanes, tabulate
 from vibrokit.kernels.options import CONTRACTED
 from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
 from vibrokit.kernels.templates.drawing import draw_lanes
-from vibrokit.kernels.templates.scene import EQUATIONS, LANES, NODES, ROOM
 
 # --- scene above, stepper below ---
+
+# Facts, before the parameters of a scene: lanes of a block, values of the forcing in a step, numbers that a step works
+# in, whether the forcing depends on time, and whether steps share factors.
+LANES, NODES, WORK, FORCED, PREPARED = 1, 2, 3, 4, 5
 
 
 @njit(**CONTRACTED)
@@ -34,8 +36,8 @@ def advance(
     start_time,
     interval,
     settings,
-    streams,  # noisy
-    given,  # noisy
+    streams,  # (count, 4), or (count, 0) without noise
+    given,  # (steps, 2): normals that replace those which a single trajectory draws; or (0, 2)
     budget,
     phases,
     every,
@@ -54,76 +56,75 @@ def advance(
     out_label,
     visits,
 ):
-    steps = int(settings[0])
+    count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
+    forced, noisy, steps = parameters[FORCED] > 0.0, streams.shape[1] > 0, int(settings[0])
     # Intervals after which the forcing repeats; 0 if it never does.
-    cycle = int(settings[1])  # forced
+    cycle = int(settings[1]) if forced else 1
     h = interval / steps
-    count = states.shape[0]
-    z = np.zeros((EQUATIONS, LANES))
-    before = np.zeros((EQUATIONS, LANES))
-    work = np.zeros(ROOM)
-    theta, lanes, room = offset_by(pointer_to(parameters), LINKS), pointer_to(z), pointer_to(work)
-    forces = normals = room  # where a scene or a flow has none
-    tabulated = np.zeros(max(cycle, 1) * steps * NODES)  # forced
-    table = pointer_to(tabulated)  # forced
-    prepare(h, theta, room)  # prepared
-    stream = np.zeros((4, LANES), dtype=np.uint64)  # noisy
-    drawn = np.zeros(2 * LANES)  # noisy
-    normals = pointer_to(drawn)  # noisy
-    holder = np.full(LANES, -1, dtype=np.int64)
-    done = np.zeros(LANES, dtype=np.int64)
-    waiting = 0
-    active = 0
-    elapsed = 0  # forced
-    for phase in range(cycle):  # forced
-        tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * NODES))  # forced
+    z, before = np.zeros((equations, lanes)), np.zeros((equations, lanes))
+    work, tabulated = np.zeros(int(parameters[WORK])), np.zeros(max(cycle, 1) * steps * nodes if forced else 1)
+    stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
+    block, room, table, normals = pointer_to(z), pointer_to(work), pointer_to(tabulated), pointer_to(drawn)
+    theta = offset_by(pointer_to(parameters), int(parameters[0]))
+    if parameters[PREPARED] > 0.0:
+        prepare(h, theta, room)
+    holder, done = np.zeros(lanes, dtype=np.int64), np.zeros(lanes, dtype=np.int64)
+    for lane in range(lanes):  # compiles faster than np.full
+        holder[lane] = -1
+    waiting, active, elapsed = 0, 0, 0
+    if forced:
+        for phase in range(cycle):
+            tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * nodes))
     while waiting < count or active > 0:
-        # Lanes that do not share the phase of a newcomer go on first.
-        refill = True  # unforced
-        refill = active == 0 or cycle > 0  # forced
-        if refill:
-            elapsed = elapsed if active > 0 else phases[waiting]  # forced
-            for lane in range(LANES):
+        if active == 0 or cycle > 0:  # otherwise lanes that do not share the phase of a newcomer go on first
+            if active == 0:
+                elapsed = phases[waiting]
+            for lane in range(lanes):
                 while holder[lane] < 0 and waiting < count:
-                    ahead = elapsed - phases[waiting]  # forced
-                    if budget[waiting] > 0 and ahead != 0 and (cycle == 0 or ahead % cycle != 0):  # forced
-                        break  # forced
+                    ahead = elapsed - phases[waiting]
                     if budget[waiting] > 0:
+                        if ahead != 0 and (cycle == 0 or ahead % cycle != 0):
+                            break
                         holder[lane] = waiting
                         done[lane] = 0
                         active += 1
-                        for k in range(4):  # noisy
-                            stream[k, lane] = streams[waiting, k]  # noisy
-                        for e in range(EQUATIONS):
+                        if noisy:
+                            for k in range(4):
+                                stream[k, lane] = streams[waiting, k]
+                        for e in range(equations):
                             z[e, lane] = states[waiting, e]
                     else:
-                        out_states[waiting] = states[waiting]
+                        for e in range(equations):
+                            out_states[waiting, e] = states[waiting, e]
                         out_intervals[waiting] = 0
                         out_status[waiting] = COMPLETED
                         out_label[waiting] = -1
                     waiting += 1
             if active == 0:
                 break
-        row = elapsed % cycle if cycle > 0 else 0  # forced
-        if cycle == 0:  # forced
-            tabulate(start_time + elapsed * interval, h, steps, theta, table)  # forced
-        before[:, :] = z
-        forces = offset_by(table, row * steps * NODES)  # forced
-        step_lanes(lanes, forces, normals, theta, room, h, steps)  # noiseless
-        for step in range(steps):  # noisy
-            draw_lanes(stream, drawn)  # noisy
-            if given.shape[0] > 0:  # noisy
-                drawn[0] = given[done[0] * steps + step, 0]  # noisy
-                drawn[LANES] = given[done[0] * steps + step, 1]  # noisy
-            step_lanes(lanes, forces, normals, theta, room, h, 1)  # noisy
-            forces = offset_by(forces, NODES)  # noisy
-        elapsed += 1  # forced
-        for lane in range(LANES):
+        if cycle == 0:
+            tabulate(start_time + elapsed * interval, h, steps, theta, table)
+        for e in range(equations):
+            for lane in range(lanes):
+                before[e, lane] = z[e, lane]
+        forces = offset_by(table, (elapsed % cycle if cycle > 0 else 0) * steps * nodes)
+        if noisy:
+            for step in range(steps):
+                draw_lanes(stream, drawn, lanes)
+                if given.shape[0] > 0:
+                    drawn[0] = given[done[0] * steps + step, 0]
+                    drawn[lanes] = given[done[0] * steps + step, 1]
+                step_lanes(block, forces, normals, theta, room, h, 1)
+                forces = offset_by(forces, nodes)
+        else:
+            step_lanes(block, forces, normals, theta, room, h, steps)
+        elapsed += 1
+        for lane in range(lanes):
             index = holder[lane]
             if index < 0:
                 continue
             finite = True
-            for e in range(EQUATIONS):
+            for e in range(equations):
                 finite = finite and np.isfinite(z[e, lane])
             label = -1
             if not finite:
@@ -134,7 +135,7 @@ def advance(
                 at_section = passed % every == 0
                 if visits.shape[1] > 0 and passed % keep == 0:
                     visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
-                    for e in range(EQUATIONS):
+                    for e in range(equations):
                         visits[index, visit, e] = z[e, lane]
                 status, label = stop_status(
                     z[0, lane], z[1, lane], at_section, region, area, labels, home, points, point_labels, metrics
@@ -145,17 +146,16 @@ def advance(
                         status = LEFT_REGION
                 if status == COMPLETED and done[lane] < budget[index]:
                     continue
-            for e in range(EQUATIONS):
+            for e in range(equations):
                 out_states[index, e] = z[e, lane] if finite else before[e, lane]
                 z[e, lane] = 0.0
-            for k in range(4):  # noisy
-                streams[index, k] = stream[k, lane]  # noisy
+            if noisy:
+                for k in range(4):
+                    streams[index, k] = stream[k, lane]
             out_intervals[index] = done[lane]
             out_status[index] = status
             out_label[index] = label
             holder[lane] = -1
             active -= 1
     # Numba frees an array after its last use, which must not be before that of the pointers to it.
-    work[0] = 0.0
-    tabulated[0] = 0.0  # forced
-    drawn[0] = 0.0  # noisy
+    work[0], tabulated[0], drawn[0] = 0.0, 0.0, 0.0

@@ -13,7 +13,7 @@ from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, STALLED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import landed
-from vibrokit.kernels.templates.scene import BARRIERS, ORDER, STATE, TERMS
+from vibrokit.kernels.templates.scene import ORDER, STATE, STOPS, TERMS
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     COUNT,
@@ -23,6 +23,7 @@ from vibrokit.kernels.templates.steps import (
     STEPS,
     TASK,
     UNDERWAY,
+    barriers,
     put,
     side_of,
     size_of,
@@ -46,7 +47,7 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
         last = remaining <= 1.01 * reach
         length, touched = remaining if last else reach, -1
         taylor(y[CLOCK], y, theta, series)
-        if BARRIERS > 0:
+        if STOPS:
             touched, length = first_touch(length, theta, series)
         for e in range(size_of(lanes)):
             value = series[e * TERMS + ORDER]
@@ -54,7 +55,7 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
                 value = value * length + series[e * TERMS + k]
             y[e] = value
         y[CLOCK] = memory[END] if last and touched < 0 else y[CLOCK] + length
-        if BARRIERS > 0:
+        if STOPS:
             if touched >= 0:
                 put(y, STATE, lane, lanes)
                 return meet(touched, lane, memory, pushing, theta, settings, lanes, room)
@@ -65,7 +66,7 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
 @njit(**INNER)
 def judge(lane, memory, pushing, theta, settings, lanes, room):
     """Judge an attempt, which is always one in contact: ask for another, or go on from its end."""
-    if BARRIERS > 0:
+    if STOPS:
         if memory[TASK] == STEPS:
             return judge_contact(lane, memory, pushing, theta, settings, lanes, room)
         if landed(lane, memory, pushing, theta, lanes, room):
@@ -85,7 +86,7 @@ def first_touch(length, theta, c):
         third += k * (k - 1) * (k - 2) * term / length
         power *= length
     touched, moment = -1, length
-    for i in range(BARRIERS):
+    for i in range(barriers(theta)):
         s = touch_of(i, moment, size, second, third, theta, c)
         if s < moment:
             touched, moment = i, s

@@ -3,9 +3,9 @@
 from numba import njit
 
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.templates.scene import CLAMPED, JUMPS, STATES
+from vibrokit.kernels.templates.scene import STATES
 from vibrokit.kernels.templates.settling import push_at
-from vibrokit.kernels.templates.steps import EPSILON, stop
+from vibrokit.kernels.templates.steps import EPSILON, is_clamped, jumps_at, stop
 
 # --- scene above, stepper below ---
 
@@ -20,9 +20,9 @@ def grazes(i, y, acceleration, theta, settings):
     tolerance times (a/ω_n)², for the mass has been near to the stop for v/a, out of times of 1/ω_n: below ten times
     that, v is uncertain by more than some 5 %. Nor is it known where x is rounded. Without momentum nothing jumps.
     """
-    if not JUMPS[i] or y[STATES + 1] == 0.0:
+    if not jumps_at(i, theta) or y[STATES + 1] == 0.0:
         return False
-    if CLAMPED[i] and push_at(i, y, theta) < 0.0:
+    if is_clamped(i, theta) and push_at(i, y, theta) < 0.0:
         return False  # a law that would pull is cut: no force
     scale, square = acceleration * settings[3], y[1] * y[1]
     return square <= BLURRED * settings[0] * scale * scale or square <= 8.0 * EPSILON * abs(

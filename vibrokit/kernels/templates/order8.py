@@ -8,7 +8,7 @@ from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, RATE_GOAL, depth_at, land, landed
-from vibrokit.kernels.templates.scene import BARRIERS, ERROR, FACTOR, LANES, LENGTH, ROW, SLOPES, STATE, TRIAL
+from vibrokit.kernels.templates.scene import ERROR, FACTOR, LANES, LENGTH, ROW, SLOPES, STATE, STOPS, TRIAL
 from vibrokit.kernels.templates.steps import (
     AIM,
     CLOCK,
@@ -30,6 +30,7 @@ from vibrokit.kernels.templates.steps import (
     WHOLE,
     accept,
     ask,
+    barriers,
     of,
     plan,
     shortened,
@@ -37,8 +38,6 @@ from vibrokit.kernels.templates.steps import (
 )
 
 # --- scene above, stepper below ---
-
-CLEAR = -1  # no stop
 
 
 @njit(**INNER)
@@ -53,7 +52,7 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
 @njit(**INNER)
 def judge(lane, memory, pushing, theta, settings, lanes, room):
     """Judge an attempt: ask for another, or go on from its end."""
-    if BARRIERS > 0:
+    if STOPS:
         if memory[TASK] != STEPS:
             if not landed(lane, memory, pushing, theta, lanes, room):
                 return UNDERWAY
@@ -70,7 +69,7 @@ def judge(lane, memory, pushing, theta, settings, lanes, room):
     if not np.isfinite(error):
         return DIVERGED
     memory[TAKEN] = lanes[FACTOR + lane]
-    if BARRIERS > 0:
+    if STOPS:
         return watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room)
     return free(length, length, lane, memory, lanes)
 
@@ -119,7 +118,7 @@ def flown_to(lane, memory, pushing, theta, settings, lanes, room):
 @njit(**INNER)
 def watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room):
     """Find a touch within the attempt, and shorten the step to end on it."""
-    for i in range(BARRIERS):
+    for i in range(barriers(theta)):
         side = side_of(i, theta)
         before, after = depth_at(STATE, i, lane, lanes, theta), depth_at(TRIAL, i, lane, lanes, theta)
         turns, up = turns_of(side, lane, lanes)

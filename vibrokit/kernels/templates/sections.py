@@ -3,13 +3,13 @@
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.links import LINKS, attempt_lanes, misfit_lanes
 from vibrokit.kernels.options import INNER, OPTIONS
 from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
+from vibrokit.kernels.templates.attempts import attempt, misfit
 from vibrokit.kernels.templates.contact import press
 from vibrokit.kernels.templates.order8 import fly, judge
-from vibrokit.kernels.templates.scene import BARRIERS, LANES, NUMBERS, ROW, STATE
+from vibrokit.kernels.templates.scene import LANES, NUMBERS, ROW, STATE, STOPS
 from vibrokit.kernels.templates.settling import settle
 from vibrokit.kernels.templates.steps import (
     CLOCK,
@@ -28,6 +28,7 @@ from vibrokit.kernels.templates.steps import (
     TOUCHED,
     UNDERWAY,
     WORK,
+    barriers,
     face,
     keep_alive,
     of,
@@ -49,7 +50,7 @@ def begin(y, interval, lane, memory, pushing, theta, settings, lanes, room):
     memory[FIRST_STEP] = memory[FREE_STEP] / 64.0
     memory[CONTACT_STEP] = memory[FIRST_STEP]
     memory[TOUCHED], memory[DEEP] = -1.0, 0.0
-    if BARRIERS > 0:
+    if STOPS:
         settle(y, memory, pushing, theta, offset_by(room, ROW))
         face(lane, memory, pushing, theta, lanes)
     put(y, STATE, lane, lanes)
@@ -65,7 +66,7 @@ def travel(end, memory):
 def proceed(status, lane, memory, pushing, theta, settings, lanes, room):
     """Ask for the next step of a lane; return its status, `UNDERWAY` before the end time."""
     while status == COMPLETED and of(STATE, CLOCK, lane, lanes) < memory[END]:
-        if BARRIERS > 0 and memory[TOUCHED] >= 0.0:
+        if STOPS and memory[TOUCHED] >= 0.0:
             status = press(int(memory[TOUCHED]), lane, memory, pushing, theta, settings, lanes, room)
         else:
             status = fly(lane, memory, pushing, theta, settings, lanes, room)
@@ -77,9 +78,9 @@ def proceed(status, lane, memory, pushing, theta, settings, lanes, room):
 
 
 @njit(**INNER)
-def clear(lane, lanes):
+def clear(lane, stops, lanes):
     """Leave numbers in an idle lane that attempts can work with."""
-    for number in range(lane, NUMBERS, LANES):
+    for number in range(lane - stops * LANES, NUMBERS, LANES):
         lanes[number] = 0.0
 
 
@@ -90,6 +91,8 @@ def advance(
     start_time,
     interval,
     options,
+    streams,  # none: a random force has no order 8
+    given,
     budget,
     phases,
     every,
@@ -108,9 +111,11 @@ def advance(
     out_label,
     visits,
 ):
-    numbers, switches = np.zeros(ROOM), np.zeros(LANES * max(BARRIERS, 1), dtype=np.uint8)
-    lanes, room, pushing = pointer_to(numbers), pointer_to(numbers[WORK:]), pointer_to(switches)
-    theta, settings = offset_by(pointer_to(parameters), 3 * BARRIERS + LINKS), pointer_to(options)
+    facts, theta = offset_by(pointer_to(parameters), 1), offset_by(pointer_to(parameters), int(parameters[0]))
+    settings, stops = pointer_to(options), barriers(theta)
+    numbers, switches = np.zeros(stops * LANES + ROOM), np.zeros(LANES * max(stops, 1), dtype=np.uint8)
+    lanes, pushing = offset_by(pointer_to(numbers), stops * LANES), pointer_to(switches)
+    room = offset_by(lanes, WORK)
     y, equations = room, states.shape[1]
     lanes[SIZE] = equations
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
@@ -122,7 +127,7 @@ def advance(
         holder[lane] = -1
     while waiting < count or active > 0:
         for lane in range(LANES):
-            own, pushed = offset_by(room, MEMORIES + lane * MEMORY), offset_by(pushing, lane * max(BARRIERS, 1))
+            own, pushed = offset_by(room, MEMORIES + lane * MEMORY), offset_by(pushing, lane * max(stops, 1))
             status = UNDERWAY
             if holder[lane] >= 0:
                 status = judge(lane, own, pushed, theta, settings, lanes, room)
@@ -152,7 +157,7 @@ def advance(
                         out_intervals[index], out_status[index], out_label[index] = done[lane], status, label
                         holder[lane], status = -1, UNDERWAY
                         active -= 1
-                        clear(lane, lanes)
+                        clear(lane, stops, lanes)
                         continue
                 else:
                     index, waiting = waiting, waiting + 1
@@ -174,6 +179,6 @@ def advance(
                 travel(start + interval, own)
                 status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
         if active > 0:
-            attempt_lanes(lanes, theta, pushing, room)
-            misfit_lanes(lanes, settings[0], abs(span), theta)
+            attempt(lanes, pushing, theta, room, facts)
+            misfit(lanes, settings[0], abs(span), facts)
     keep_alive(numbers, switches)

@@ -5,7 +5,6 @@ from numba import njit
 
 from vibrokit.kernels.links import law, rhs
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.templates.scene import BARRIERS, CLAMPED
 from vibrokit.kernels.templates.steps import (
     CLOCK,
     CONTACT_STEP,
@@ -16,6 +15,8 @@ from vibrokit.kernels.templates.steps import (
     SPAN,
     TIMED,
     TOUCHED,
+    barriers,
+    is_clamped,
     is_rooted,
     side_of,
     stop,
@@ -23,20 +24,18 @@ from vibrokit.kernels.templates.steps import (
 
 # --- scene above, stepper below ---
 
-SOME_CLAMPED = BARRIERS > 0 and True in CLAMPED
-
 
 @njit(**INNER)
 def settle(y, memory, pushing, theta, slope):
     """Find the stop that is touched at y: by depth; at depth 0 by rate; at rest there by acceleration."""
     memory[TOUCHED], memory[SINCE], memory[PULLED], memory[TIMED] = -1.0, np.nan, 0.0, 0.0
-    switch_off(pushing)
-    for i in range(BARRIERS):
+    switch_off(pushing, theta)
+    for i in range(barriers(theta)):
         wall, rate = stop(i, theta), side_of(i, theta) * y[1]
         depth = side_of(i, theta) * (y[0] - wall)
         touched = depth > 0.0
         if depth == 0.0:
-            switch_off(pushing)
+            switch_off(pushing, theta)
             rhs(y[CLOCK], y, pushing, theta, slope)
             acceleration = side_of(i, theta) * slope[1]
             # A contact too shallow for x to represent does not count.
@@ -48,16 +47,14 @@ def settle(y, memory, pushing, theta, slope):
         if touched:
             memory[TOUCHED] = i
             memory[CONTACT_STEP] = memory[FIRST_STEP]
-            memory[PULLED] = 0.0
-            if SOME_CLAMPED:
-                memory[PULLED] = 1.0 if CLAMPED[i] and push_at(i, y, theta) < 0.0 else 0.0
+            memory[PULLED] = 1.0 if is_clamped(i, theta) and push_at(i, y, theta) < 0.0 else 0.0
             pushing[i] = memory[PULLED] == 0.0
             return
 
 
 @njit(**INNER)
-def switch_off(pushing):
-    for i in range(BARRIERS):
+def switch_off(pushing, theta):
+    for i in range(barriers(theta)):
         pushing[i] = False
 
 

@@ -16,7 +16,6 @@ from vibrokit.kernels.links import LINKS
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import STALLED
 from vibrokit.kernels.templates.scene import (
-    BARRIERS,
     CLOCK,
     COURSE,
     DEPTH,
@@ -29,6 +28,7 @@ from vibrokit.kernels.templates.scene import (
     SIDE,
     SIGMA,
     STATE,
+    STOPS,
     TERMS,
     TRIAL,
     WALL,
@@ -71,21 +71,39 @@ def keep_alive(numbers, switches):
 
 
 @njit(**INNER)
+def barriers(theta):
+    """Number of stops. Before it are five facts of each stop, and after it the links and the parameters."""
+    return int(theta[-1 - LINKS])
+
+
+@njit(**INNER)
 def stop(i, theta):
-    """Position of a stop. What is known of the stops stands before the links and the parameters."""
-    return theta[i - (BARRIERS + LINKS)]
+    """Position of a stop."""
+    return theta[-2 - LINKS - 5 * i]
 
 
 @njit(**INNER)
 def side_of(i, theta):
     """1 for a stop on the right, −1 for one on the left."""
-    return theta[i - (2 * BARRIERS + LINKS)]
+    return theta[-3 - LINKS - 5 * i]
 
 
 @njit(**INNER)
 def is_rooted(i, theta):
     """Whether the law of a stop is smooth in the root of the depth only."""
-    return theta[i - (3 * BARRIERS + LINKS)] > 0.0
+    return theta[-4 - LINKS - 5 * i] > 0.0
+
+
+@njit(**INNER)
+def is_clamped(i, theta):
+    """Whether the law of a stop is cut at zero where it would pull."""
+    return theta[-5 - LINKS - 5 * i] > 0.0
+
+
+@njit(**INNER)
+def jumps_at(i, theta):
+    """Whether the force of a stop jumps at first touch."""
+    return theta[-6 - LINKS - 5 * i] > 0.0
 
 
 @njit(**INNER)
@@ -138,7 +156,7 @@ def plan(course, sigma, length, last, grain, depth, lane, memory, settings, lane
     """
     memory[TASK], memory[LAST] = STEPS, 1.0 if last else 0.0
     memory[FIRST], memory[BEFORE], memory[MISSES] = length, np.inf, 0.0
-    if BARRIERS > 0:
+    if STOPS:
         lanes[COURSE + lane], lanes[SIGMA + lane] = course, sigma
         lanes[GRAIN + lane], lanes[DEPTH + lane] = grain, depth
     return ask(length, lane, memory, settings, lanes)
@@ -165,7 +183,7 @@ def shortened(error, factor, tiny, lane, memory, settings, lanes):
 def face(lane, memory, pushing, theta, lanes):
     """Tell the attempts which stop is touched, and whether it pushes."""
     touched = int(memory[TOUCHED])
-    for i in range(BARRIERS):
-        lanes[PUSHES + i * LANES + lane] = 1.0 if pushing[i] else 0.0
+    for i in range(barriers(theta)):
+        lanes[PUSHES - i * LANES + lane] = 1.0 if pushing[i] else 0.0
     lanes[WALL + lane] = stop(touched, theta) if touched >= 0 else 0.0
     lanes[SIDE + lane] = side_of(touched, theta) if touched >= 0 else 1.0

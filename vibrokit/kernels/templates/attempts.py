@@ -1,0 +1,136 @@
+"""Attempts: a step of order 8 of every lane, each of its own length and along its own course, and its error."""
+
+from math import sqrt
+
+import numpy as np
+from numba import njit
+
+from vibrokit.kernels.links import slopes_lanes
+from vibrokit.kernels.options import INNER_LANES
+from vibrokit.kernels.pointers import offset_by
+from vibrokit.kernels.registers import keep_apart, use_widest_registers
+from vibrokit.kernels.rows import add_estimates, add_stage, compare_rows, join_rows
+from vibrokit.kernels.tableau import NODES, STAGES
+from vibrokit.kernels.templates.extrapolation import extrapolate
+from vibrokit.kernels.templates.scene import (
+    ALLOWED,
+    COURSE,
+    DEPTH,
+    ERROR,
+    FACTOR,
+    FIFTHS,
+    GRAIN,
+    HAZE,
+    LANES,
+    LENGTH,
+    MOST,
+    NEAR,
+    POINT,
+    ROW,
+    SIDE,
+    SIGMA,
+    SIZES,
+    SLOPES,
+    STATE,
+    STOPS,
+    THIRDS,
+    TRIAL,
+    WALL,
+)
+from vibrokit.kernels.templates.steps import CLOCK, EPSILON, ROOT_DEPTH, size_of
+
+# --- scene above, stepper below ---
+
+# Facts of a flow: whether it may need `extrapolate`; and, with rows counted from that of the time, the first row that
+# holds derivatives of momenta, and of each row the first row of its block. The rows of a block have one scale.
+CURVED, HAZY, BLOCKS = 0, 1, 2
+
+
+@njit(**INNER_LANES)
+def attempt(lanes, pushing, theta, room, facts):
+    """Take a step from STATE to TRIAL in each lane, along its course."""
+    keep_apart(), use_widest_registers()
+    curved, rows = facts[CURVED] > 0.0, size_of(lanes) - CLOCK
+    start, length = offset_by(lanes, STATE + CLOCK * LANES), offset_by(lanes, LENGTH)
+    point, end = offset_by(lanes, POINT + CLOCK * LANES), offset_by(lanes, TRIAL + CLOCK * LANES)
+    slopes, stride = offset_by(lanes, SLOPES + CLOCK * LANES), ROW * LANES
+    for stage in range(STAGES):
+        add_stage(stage, point, start, length, slopes, stride, rows)
+        slopes_lanes(NODES[stage], lanes, offset_by(lanes, SLOPES + stage * stride), theta)
+        if STOPS and curved:
+            for lane in range(LANES):
+                if lanes[NEAR + lane] > 0.5:
+                    extrapolate(NODES[stage], SLOPES + stage * stride + lane, lane, lanes, pushing, theta, room)
+    add_stage(STAGES, end, start, length, slopes, stride, rows)
+    if STOPS:
+        for lane in range(LANES):
+            if lanes[COURSE + lane] == ROOT_DEPTH:
+                sigma = lanes[SIGMA + lane] + lanes[LENGTH + lane]
+                lanes[TRIAL + lane] = lanes[WALL + lane] + lanes[SIDE + lane] * sigma * sigma
+
+
+@njit(**INNER_LANES)
+def misfit(lanes, tolerance, span, facts):
+    """Find the ERROR of each attempt in units of the tolerance, and the FACTOR by which to lengthen the next.
+
+    The error is the largest over the blocks of rows, each measured by its own size; a velocity near 0 by a hundredth of
+    x over `span`, the time to integrate over.
+    """
+    keep_apart(), use_widest_registers()
+    rows, stride = size_of(lanes) - CLOCK, ROW * LANES
+    start, end = offset_by(lanes, STATE + CLOCK * LANES), offset_by(lanes, TRIAL + CLOCK * LANES)
+    slopes, sizes = offset_by(lanes, SLOPES + CLOCK * LANES), offset_by(lanes, SIZES + CLOCK * LANES)
+    fifths, thirds = offset_by(lanes, FIFTHS + CLOCK * LANES), offset_by(lanes, THIRDS + CLOCK * LANES)
+    most, haze, blocks = offset_by(lanes, MOST), offset_by(lanes, HAZE), offset_by(facts, BLOCKS)
+    add_estimates(sizes, fifths, thirds, start, end, offset_by(lanes, LENGTH), slopes, stride, rows)
+    join_rows(sizes, blocks, rows)
+    choose_units(tolerance, span, lanes)
+    compare_rows(most, sizes, haze, fifths, thirds, end, blocks, int(facts[HAZY]), rows)
+    conclude_errors(lanes)
+
+
+@njit(**INNER_LANES)
+def choose_units(tolerance, span, lanes):
+    """Replace the sizes of t and v by the units of their errors; write the tolerance and the haze of each lane.
+
+    No step must be more accurate than the rounding of x allows: GRAIN is the uncertainty of the acceleration from it.
+    So is that of the second derivative of a law, which affects only derivatives of the momenta.
+    """
+    for lane in range(LANES):
+        clock, reach, speed = CLOCK * LANES + lane, lanes[SIZES + lane], lanes[SIZES + LANES + lane]
+        least = 0.01 * reach / span
+        speed = speed if speed > least else least
+        allowed, haze = tolerance, 1.0
+        if STOPS:
+            blur = lanes[GRAIN + lane] * abs(lanes[TRIAL + clock] - lanes[STATE + clock])
+            allowed = blur / speed if blur > tolerance * speed else tolerance
+            depth = lanes[SIDE + lane] * (lanes[TRIAL + lane] - lanes[WALL + lane])
+            depth = depth if depth > lanes[DEPTH + lane] else lanes[DEPTH + lane]
+            haze = 4.0 * EPSILON * abs(lanes[STATE + lane]) / depth
+            haze = haze / allowed if haze > allowed else 1.0
+        lapse = reach / (abs(lanes[TRIAL + LANES + lane]) + reach / span)
+        lanes[SIZES + clock] = lapse if lapse < span else span
+        lanes[SIZES + LANES + lane] = speed
+        lanes[ALLOWED + lane], lanes[HAZE + lane] = allowed, haze
+
+
+@njit(**INNER_LANES)
+def conclude_errors(lanes):
+    """Find the errors of all lanes from the two largest estimates.
+
+    The fifth-order estimate can vanish by chance. In a step that is short enough the error is 0.02 to 0.1 times the
+    square of the third-order one, which is a lower bound.
+    """
+    for lane in range(LANES):
+        length = lanes[LENGTH + lane]
+        fifth, third, broken = lanes[MOST + lane], lanes[MOST + LANES + lane], lanes[MOST + 2 * LANES + lane]
+        error = abs(length) * fifth * fifth / sqrt(fifth * fifth + 0.01 * third * third)
+        least = length * third
+        least = 0.01 * least * least
+        error = (error if error > least else least) / lanes[ALLOWED + lane] if third > 0.0 else 0.0
+        error = error if broken == 0.0 else np.inf
+        lanes[ERROR + lane] = error
+        error = error if error > 1e-12 else 1e-12
+        factor = 0.9 / sqrt(sqrt(sqrt(error)))
+        factor = factor if factor < 5.0 else 5.0
+        lanes[FACTOR + lane] = factor if factor > 0.15 else (0.15 if broken == 0.0 else 0.1)
