@@ -39,7 +39,7 @@ free = vk.Oscillator(
     noise=vk.WhiteNoise(intensity=1e-4),
 )
 widest = Flow.HAMILTONIAN_VARIATIONAL  # for one of each kind of driver
-cases = [(smooth, vk.RK4(128), [Flow.NOISY]), (smooth, vk.RK8(64), [Flow.STATE]), (free, vk.RKN12(16), [widest])]
+cases = [(smooth, vk.RK4(128), [Flow.NOISY]), (free, vk.RKN12(16), [Flow.STATE])]
 cases += [(jumping, vk.Order8(1e-8), [widest, Flow.COVARIANCE_REVERSED]), (jumping, vk.FreeFlight(1e-8), [Flow.STATE])]
 digests = {}
 for osc, stepper, flows in cases:
@@ -74,7 +74,7 @@ def printed_by_two_processes(script, cache):
 
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     compiled, loaded = (json.loads(printed) for printed in printed_by_two_processes(DIGESTS, tmp_path))
-    assert len(compiled) == 6
+    assert len(compiled) == 5
     assert compiled == loaded
 
 

@@ -54,9 +54,9 @@ def test_direct_rates_are_those_of_kramers(scene_and_structure):
 
 def test_rates_by_splitting_are_those_of_kramers(scene_and_structure):
     osc, structure = scene_and_structure
-    rate = rate_at(osc, structure, 30.0, splitting=True, target_error=0.15)
+    rate = rate_at(osc, structure, 30.0, splitting=True, target_error=0.2)
     expected, formula_error = kramers_rate(osc.damping_ratio, rate.intensity)
-    assert rate.log_error < 0.2
+    assert rate.log_error < 0.25
     assert abs(rate.log_value - expected) <= 3 * rate.log_error + formula_error + 0.01
 
 
@@ -68,12 +68,13 @@ def test_direct_and_splitting_agree(scene_and_structure):
 
 
 def test_intervals_of_splitting_cover_the_truth():
-    """Of 100 intervals of 95 %, each from 16 replicas, as many contain the rate as their number's error allows."""
+    """Of intervals of 95 %, each from 16 replicas, as many contain the rate as their number's error allows."""
+    count = 60
     osc = well(0.2)
     structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
     problem = ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
     covariances = {a.label: covariances_of(problem, a) for a in structure.attractors}
-    walks = [Walk(problem, 0.2 / 5.0, seed, vk.RK4(64), covariances) for seed in range(100)]
+    walks = [Walk(problem, 0.2 / 5.0, seed, vk.RK4(64), covariances) for seed in range(count)]
     importance, estimates = dataclasses.replace(from_distances(walks[0]), depth=5.0), []
     for walk in walks:
         run = SplittingRun(walk, importance, 1e-3, 16, Checkpoint(None, {}).slot("one"))
@@ -83,7 +84,7 @@ def test_intervals_of_splitting_cover_the_truth():
     truth = np.logaddexp.reduce(together) - math.log(len(together))  # of all, a tenth of one's error away
     rates = [rate_around(one.log_mean, one.error, len(one.log_values)) for one in estimates]
     covered = sum(rate.log_lower <= truth <= rate.log_upper for rate in rates)
-    assert covered >= 95 - 3 * math.sqrt(100 * 0.95 * 0.05)
+    assert covered >= 0.95 * count - 3 * math.sqrt(count * 0.95 * 0.05)
 
 
 # ln of the mean time core to core in periods, from 50 000 to 200 000 trajectories by RK4(512), in a program of its own

@@ -1,4 +1,4 @@
-"""What a scene lacks leaves no trace in the code that is generated for it."""
+"""What a scene lacks leaves no trace in the code that is generated for it; the driver knows no scene."""
 
 import ast
 import re
@@ -17,7 +17,7 @@ LEFT = vk.Barrier(vk.Hertz(40.0), -0.5, "left")
 
 
 def source(scene, flow=Flow.STATE):
-    return kernel_for(scene, flow, vk.RK4()).source
+    return kernel_for(scene, flow, vk.RK4()).scene.source
 
 
 def words(text):
@@ -38,7 +38,7 @@ def test_the_whole_scene_has_it_all(flow):
     """So that the absences below mean something."""
     found = words(source(everything(), flow))
     assert {"k_r", "k_l", "b_r", "b_l", "forcing", "tabulate", "cos", "phi"} <= found
-    assert ("normal_pair" in found) == (flow is Flow.NOISY)
+    assert ("amplitude" in found) == (flow is Flow.NOISY)
     assert ("p_1" in found) == (flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL))
 
 
@@ -77,18 +77,15 @@ def test_unforced_has_no_time(flow, excitations):
 @pytest.mark.parametrize("noise", [None, vk.WhiteNoise(1e-3)], ids=["no noise", "noise"])
 def test_flows_without_noise_have_no_momenta_and_draw_nothing(flow, noise):
     found = words(source(scene(RIGHT, excitations=(vk.Harmonic(0.1, 0.5),), noise=noise), flow))
-    assert not found & {
-        "p_1",
-        "p_2",
-        "S",
-        "seed",
-        "stream",
-        "normal_pair",
-        "draw_lanes",
-        "seed_lane",
-        "amplitude",
-        "drawn",
-    }
+    assert not found & {"p_1", "p_2", "S", "amplitude"}
+
+
+@pytest.mark.parametrize("stepper", [vk.RK4(), vk.Order8(), vk.FreeFlight()], ids=lambda stepper: stepper.name)
+def test_one_driver_serves_scenes_and_flows_with_as_many_states(stepper):
+    scenes = (everything(), scene(RIGHT, noise=vk.WhiteNoise(1e-3)))
+    flows = [flow for flow in Flow if flow is not Flow.NOISY or stepper == vk.RK4()]
+    drivers = {kernel_for(osc, flow, stepper).driver for osc in scenes for flow in flows}
+    assert len(drivers) == 1
 
 
 def test_noiseless_parameters_have_no_intensity():

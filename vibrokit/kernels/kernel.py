@@ -107,9 +107,11 @@ def _facts(module: types.ModuleType, theta: NDArray[np.float64]) -> NDArray[np.f
 
     The number of these stops is last, so that each fact is as far from the parameters for any number of them.
     """
-    stops = zip(theta[list(module.WALLS)], module.SIDES, module.ROOTED, module.CLAMPED, module.JUMPS, strict=False)
-    rows = [fact for stop in stops for fact in stop]
-    return np.array([*module.FACTS, *reversed(rows), len(module.WALLS)], dtype=float)
+    facts, places = list(module.FACTS), list(module.WALLS)
+    if places:
+        rows = zip(theta[places], module.SIDES, module.ROOTED, module.CLAMPED, module.JUMPS, strict=True)
+        facts += reversed([fact for row in rows for fact in row])
+    return np.array([*facts, len(places)], dtype=float)
 
 
 def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:

@@ -88,11 +88,14 @@ class SceneText:
             "MOMENTA": self.states if self.flow.has_momenta else 0,
             "EQUATIONS": len(self.variables),
             "BARRIERS": len(contacts),
-            "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
-            "CLAMPED": tuple(contact.clamped for contact in contacts),
-            "ROOTED": tuple(contact.rooted for contact in contacts),
-            "JUMPS": tuple(contact.jumps for contact in contacts),
         }
+        if contacts:
+            rows |= {
+                "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
+                "CLAMPED": tuple(contact.clamped for contact in contacts),
+                "ROOTED": tuple(contact.rooted for contact in contacts),
+                "JUMPS": tuple(contact.jumps for contact in contacts),
+            }
         rows["FORCED"] = self.forced
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
