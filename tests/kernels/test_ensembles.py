@@ -11,7 +11,6 @@ from vibrokit.kernels import ensemble
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, LEFT_REGION, REACHED
 from vibrokit.kernels.streams import streams_of
-from vibrokit.kernels.template import fitting
 from vibrokit.symbolic.flow_kind import Flow
 
 # Tests compare one rounding with another, not with the true motion.
@@ -337,16 +336,6 @@ class TestBetween:
         expected = np.where(amplitude > 1.0, np.minimum(np.maximum(first_outside, 1), turn), TESTS)
         assert ended.intervals.tolist() == expected.tolist()
         assert 10 < (amplitude > 1.0).sum() < 90
-
-
-# --- lines of templates
-
-
-def test_a_misspelt_condition_is_refused():
-    text = "x = 1  # forced\ny = 2  # of two words\nz = 3  # noisy\n"
-    assert fitting(text, {"forced": True, "noisy": False}) == "x = 1\ny = 2  # of two words\n"
-    with pytest.raises(ValueError, match="z = 3  # noisi"):
-        fitting(text.replace("noisy", "noisi"), {"forced": True, "noisy": False})
 
 
 @pytest.mark.parametrize("flow", [Flow.STATE, Flow.HAMILTONIAN_VARIATIONAL], ids=lambda flow: flow.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
-from vibrokit.kernels.order8 import LocatedStepper
+from vibrokit.kernels.order8 import CONTACT, LocatedStepper
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -26,9 +26,7 @@ class FreeFlight(LocatedStepper):
     """
 
     name: ClassVar[str] = "free_flight"
-    templates: ClassVar[tuple[str, ...]] = (
-        "steps", "settling", "landing", "contact", "free_flight", "extrapolation", "attempts", "sections",
-    )  # fmt: skip
+    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "free_flight", "extrapolation", "attempts", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
         """That of a located stepper, and the series of the flight."""

@@ -20,7 +20,7 @@ from vibrokit.kernels import store
 from vibrokit.kernels.fingerprint import environment, scene_fingerprint
 from vibrokit.kernels.links import addresses, linked
 from vibrokit.kernels.stepper import Emitter
-from vibrokit.kernels.template import fitting, read_template, with_needed_constants, with_needed_imports
+from vibrokit.kernels.template import read_template, with_needed_imports
 from vibrokit.parts.scene import Scene
 from vibrokit.progress import compiling
 from vibrokit.symbolic.flow_kind import Flow
@@ -105,12 +105,14 @@ def _addresses(kernel: Kernel) -> NDArray[np.int64]:
 def _facts(module: types.ModuleType, theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """What a driver knows of a scene: the facts of its module, and those of the stops that it locates, the last first.
 
-    The number of these stops is last, so that each fact is as far from the parameters for any number of them.
+    Then comes what jumps at a touch, and the number of stops, so that each fact is as far from the parameters for any
+    number of them.
     """
     facts, places = list(module.FACTS), list(module.WALLS)
     if places:
         rows = zip(theta[places], module.SIDES, module.ROOTED, module.CLAMPED, module.JUMPS, strict=True)
         facts += reversed([fact for row in rows for fact in row])
+        facts += reversed(module.CROSSING)
     return np.array([*facts, len(places)], dtype=float)
 
 
@@ -200,13 +202,11 @@ def write_sources(scene: Scene, flow: Flow, stepper: Emitter) -> Sources:
     if stepper.called:
         source = source.replace("(**INLINED)", "(**INLINED_AND_CALLED)")
     source = with_needed_imports(source)
-    templates = "\n\n".join(read_template(name) for name in stepper.templates_for(text))
+    templates = "\n\n".join(read_template(name) for name in stepper.templates)
     if not templates:
         return Sources(source)
-    bends = text.breaks and flow is Flow.HAMILTONIAN_VARIATIONAL
-    conditions = {"breaking": text.breaks, "unbroken": not text.breaks, "bending": bends, "unbent": not bends}
-    driver = _pasted([_TITLE, *stepper.driver_part(text), fitting(templates, conditions)])
-    return Sources(source, with_needed_imports(with_needed_constants(driver)))
+    driver = _pasted([_TITLE, *stepper.driver_part(text), templates])
+    return Sources(source, with_needed_imports(driver))
 
 
 def _pasted(pieces: Sequence[str]) -> str:

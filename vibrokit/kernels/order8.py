@@ -17,14 +17,16 @@ if TYPE_CHECKING:
 
 FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0
-# Templates that map derivatives, covariances and momenta across an event.
-_CROSSING: Mapping[Flow, tuple[str, ...]] = {
-    Flow.STATE_VARIATIONAL: ("crossing_linear",),
-    Flow.LINEARISED: ("crossing_linear",),
-    Flow.COVARIANCE_REVERSED: ("crossing_linear",),
-    Flow.HAMILTONIAN: ("grazing", "crossing_momenta"),
-    Flow.HAMILTONIAN_VARIATIONAL: ("grazing", "crossing_extremals"),
+# What jumps at a touch, by its number in the template `crossing`.
+_CROSSING: Mapping[Flow, int] = {
+    Flow.STATE_VARIATIONAL: 1,
+    Flow.LINEARISED: 1,
+    Flow.COVARIANCE_REVERSED: 1,
+    Flow.HAMILTONIAN: 2,
+    Flow.HAMILTONIAN_VARIATIONAL: 3,
 }
+_CROSSINGS = ("crossing_linear", "grazing", "crossing_momenta", "crossing_extremals", "crossing")
+CONTACT = ("settling", *_CROSSINGS, "landing", "contact")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,23 +57,17 @@ class LocatedStepper(Stepper):
         """The same, under a forcing that never repeats, and the time over which the motion goes on."""
         return float(self.tolerance), _MOST_STEPS, 0.0, 1.0 / scene.natural_frequency, spacing * samples
 
-    def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """The templates, with those for jumps at events before those that locate events."""
-        if not text.breaks:
-            return self.templates
-        place = self.templates.index("landing")
-        return (*self.templates[:place], *_CROSSING[text.flow], *self.templates[place:])
-
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes."""
         writer = AttemptWriter(text)
-        constants = [text.constants, text.walls, writer.facts()]
+        crossing = f"CROSSING = {(_CROSSING[text.flow] if text.breaks else 0, *text.places)!r}\n"
+        constants = [text.constants, text.walls, writer.facts(), crossing]
         return [*constants, text.forcing, text.rhs, text.stops, *writer.slopes()]
 
     def driver_part(self, text: SceneText) -> list[str]:
         """Where the numbers of the lanes are."""
-        writer, stops = AttemptWriter(text), f"STOPS = {text.barriers > 0}\n"
-        return [text.layout, stops, writer.offsets(), self.series(text)]
+        sizes = f"STATES = {text.states}\nSTOPS = {text.barriers > 0}\n"
+        return [sizes, AttemptWriter(text).offsets(), self.series(text)]
 
     def series(self, text: SceneText) -> str:
         """Constants of the series of the flight, which has no terms where the flight is stepped."""
@@ -108,6 +104,4 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = (
-        "steps", "settling", "landing", "contact", "order8", "extrapolation", "attempts", "sections",
-    )  # fmt: skip
+    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "order8", "extrapolation", "attempts", "sections")

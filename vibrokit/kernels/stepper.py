@@ -35,10 +35,6 @@ class Emitter(ABC):
         """Return the constants that stand above the templates."""
         return []
 
-    def templates_for(self, text: SceneText) -> tuple[str, ...]:
-        """Return the names of the templates of the driver, in the order in which they are pasted; none without one."""
-        return self.templates
-
     def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most take every scene
         """Raise StepperError if the modules cannot be made for this flow of this scene."""
 

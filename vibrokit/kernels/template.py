@@ -9,7 +9,6 @@ from pathlib import Path
 
 _TEMPLATES = Path(__file__).parent / "templates"
 _MARKER = "# --- scene above, stepper below ---\n"
-_CONDITION = re.compile(r"  # (\w+)\n$")  # a comment of one word at the end of a line of code
 
 
 def read_template(name: str) -> str:
@@ -18,20 +17,6 @@ def read_template(name: str) -> str:
     imports = [node for node in ast.parse(head).body if isinstance(node, ast.Import | ast.ImportFrom)]
     kept = [node for node in imports if ".templates" not in (getattr(node, "module", None) or "")]
     return "\n".join([*(ast.unparse(node) for node in kept), body.strip("\n"), ""])
-
-
-def fitting(text: str, conditions: dict[str, bool]) -> str:
-    """Keep the lines of a template whose condition holds, so that a scene has no trace of what it lacks."""
-    kept = []
-    for line in text.splitlines(keepends=True):
-        condition = _CONDITION.search(line)
-        if condition is None:
-            kept.append(line)
-        elif condition[1] not in conditions:
-            raise ValueError(f"the line {line.strip()!r} of a template has an unknown condition.")
-        elif conditions[condition[1]]:
-            kept.append(line[: condition.start()] + "\n")
-    return "".join(kept)
 
 
 def with_needed_imports(text: str) -> str:
@@ -48,20 +33,8 @@ def with_needed_imports(text: str) -> str:
     return re.sub(r"\n{4,}", "\n\n\n", "\n".join(line for line in body if line is not None))
 
 
-def with_needed_constants(text: str) -> str:
-    """Leave out constants that nothing uses, so that scenes which differ in these only have the same driver."""
-    tree = ast.parse(text)
-    used = _used(tree)
-    nodes = [node for node in tree.body if isinstance(node, ast.Assign) and used.isdisjoint(_targets(node))]
-    return "\n".join(line for line in _without(text, nodes) if line is not None)
-
-
 def _used(tree: ast.Module) -> set[str]:
     return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-
-
-def _targets(node: ast.Assign) -> set[str]:
-    return {name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
 
 
 def _without(text: str, nodes: Sequence[ast.stmt]) -> list[str | None]:

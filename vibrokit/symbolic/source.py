@@ -102,9 +102,9 @@ class SceneText:
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
 
     @property
-    def layout(self) -> str:
-        """Number of states, and where M and the triangle of C begin, 0 for none: what maps of jumps need."""
-        return f"STATES = {self.states}\nDERIVATIVES, COVARIANCE = {self._place_of('m_00')}, {self._place_of('W00')}\n"
+    def places(self) -> tuple[int, int]:
+        """Where M and the triangle of C begin among the variables; 0 for none."""
+        return self._place_of("m_00"), self._place_of("W00")
 
     @property
     def walls(self) -> str:

@@ -1,8 +1,7 @@
 """The stops: a contact is followed to its end.
 
 Inside a step the set of pushing stops is fixed, so the right-hand side is smooth; it changes only between steps. At
-most one stop is touched at a time. Lines marked "breaking" or "unbroken" are kept only for scenes and flows in which
-something jumps at the touch of a stop, or nothing does; "bending" or "unbent", where a law is cut at zero.
+most one stop is touched at a time.
 """
 
 import numpy as np
@@ -13,10 +12,11 @@ from vibrokit.kernels.links import law, rhs
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
-from vibrokit.kernels.templates.crossing_extremals import cross, turn_law
+from vibrokit.kernels.templates.crossing import EXTREMALS, cross
+from vibrokit.kernels.templates.crossing_extremals import turn_law
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
 from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL
-from vibrokit.kernels.templates.settling import push_of, settle
+from vibrokit.kernels.templates.settling import push_of
 from vibrokit.kernels.templates.steps import (
     AIM,
     CLOCK,
@@ -53,6 +53,7 @@ from vibrokit.kernels.templates.steps import (
     size_of,
     stop,
     take,
+    what_jumps,
 )
 
 # --- scene above, stepper below ---
@@ -206,8 +207,10 @@ def conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, r
         take(STATE, lane, lanes, y)
         memory[PULLED] = 1.0 - memory[PULLED]
         memory[SINCE] = np.nan
-        pushing[i] = not pushing[i]  # unbent
-        turn_law(i, y, pushing, theta, offset_by(room, ROW))  # bending
+        if what_jumps(theta) == EXTREMALS:
+            turn_law(i, y, pushing, theta, offset_by(room, ROW))
+        else:
+            pushing[i] = not pushing[i]
         put(y, STATE, lane, lanes)
         face(lane, memory, pushing, theta, lanes)
     elif (course == ROOT_DEPTH and sigma + length == 0.0) or depth_at(STATE, i, lane, lanes, theta) <= 0.0:
@@ -221,9 +224,7 @@ def meet(i, lane, memory, pushing, theta, settings, lanes, room):
     y = room
     take(STATE, lane, lanes, y)
     y[0] = stop(i, theta)
-    settle(y, memory, pushing, theta, offset_by(room, ROW))  # unbroken
-    status = COMPLETED  # unbroken
-    status = cross(i, y, memory, pushing, theta, settings, offset_by(room, ROW))  # breaking
+    status = cross(i, y, memory, pushing, theta, settings, offset_by(room, ROW))
     put(y, STATE, lane, lanes)
     face(lane, memory, pushing, theta, lanes)
     return status

@@ -23,7 +23,7 @@ MATRIX = PHASE + 1
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, room):
+def cross_extremals(i, y, memory, pushing, theta, settings, room):
     """Settle at an event, and map the momenta and all derivatives across it."""
     before, after = room, offset_by(room, ROW)  # the slopes of the last step are no longer needed
     pushed = pushing[i]

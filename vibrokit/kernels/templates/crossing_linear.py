@@ -10,15 +10,15 @@ from numba import njit
 from vibrokit.kernels.links import rhs
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED
-from vibrokit.kernels.templates.scene import COVARIANCE, DERIVATIVES, STATES
+from vibrokit.kernels.templates.scene import STATES
 from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import CLOCK
+from vibrokit.kernels.templates.steps import CLOCK, covariance, derivatives
 
 # --- scene above, stepper below ---
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, slope):
+def cross_linear(i, y, memory, pushing, theta, settings, slope):
     """Settle at an event, and map the derivatives and the covariance across it."""
     rhs(y[CLOCK], y, pushing, theta, slope)
     before = slope[1]
@@ -27,11 +27,13 @@ def cross(i, y, memory, pushing, theta, settings, slope):
     leap = slope[1] - before
     if leap != 0.0:
         leap /= y[1]
-        if DERIVATIVES > 0:
-            for e in range(DERIVATIVES, DERIVATIVES + STATES):
+        first = derivatives(theta)
+        if first > 0:
+            for e in range(first, first + STATES):
                 y[e + STATES] += leap * y[e]
-        if COVARIANCE > 0:
-            of_x, of_v = COVARIANCE, COVARIANCE + STATES  # where the rows of the triangle begin
+        of_x = covariance(theta)
+        if of_x > 0:
+            of_v = of_x + STATES  # where the second row of the triangle begins
             y[of_v] += leap * (2.0 * y[of_x + 1] + leap * y[of_x])
             y[of_x + 1] += leap * y[of_x]
             for e in range(2, STATES):

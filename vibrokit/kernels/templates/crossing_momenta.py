@@ -18,7 +18,7 @@ from vibrokit.kernels.templates.steps import CLOCK, TOUCHED
 
 
 @njit(**INNER)
-def cross(i, y, memory, pushing, theta, settings, slope):
+def cross_momenta(i, y, memory, pushing, theta, settings, slope):
     """Settle at an event, and map the momenta across it."""
     involved = memory[TOUCHED] < 0.0 or pushing[i]
     rhs(y[CLOCK], y, pushing, theta, slope)

@@ -7,8 +7,6 @@ The sizes are those of flows of a scene with two states and stops. What the driv
 STATES = 2
 STOPS = True
 ORDER, TERMS = 22, 23
-DERIVATIVES = 0
-COVARIANCE = 0
 
 LANES = 8
 # Numbers of a block of lanes, each in a row of lanes. Of a state (t, z), these are the places of z; so are those of the

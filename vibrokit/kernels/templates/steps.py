@@ -72,38 +72,56 @@ def keep_alive(numbers, switches):
 
 @njit(**INNER)
 def barriers(theta):
-    """Number of stops. Before it are five facts of each stop, and after it the links and the parameters."""
+    """Number of stops. Before it is what jumps at them, and before that are five facts of each stop."""
     return int(theta[-1 - LINKS])
+
+
+@njit(**INNER)
+def what_jumps(theta):
+    """What jumps at the touch of a stop; see the template `crossing`."""
+    return theta[-2 - LINKS]
+
+
+@njit(**INNER)
+def derivatives(theta):
+    """Where the derivatives M begin among the variables; 0 for none."""
+    return int(theta[-3 - LINKS])
+
+
+@njit(**INNER)
+def covariance(theta):
+    """Where the triangle of the covariance begins among the variables; 0 for none."""
+    return int(theta[-4 - LINKS])
 
 
 @njit(**INNER)
 def stop(i, theta):
     """Position of a stop."""
-    return theta[-2 - LINKS - 5 * i]
+    return theta[-5 - LINKS - 5 * i]
 
 
 @njit(**INNER)
 def side_of(i, theta):
     """1 for a stop on the right, −1 for one on the left."""
-    return theta[-3 - LINKS - 5 * i]
+    return theta[-6 - LINKS - 5 * i]
 
 
 @njit(**INNER)
 def is_rooted(i, theta):
     """Whether the law of a stop is smooth in the root of the depth only."""
-    return theta[-4 - LINKS - 5 * i] > 0.0
+    return theta[-7 - LINKS - 5 * i] > 0.0
 
 
 @njit(**INNER)
 def is_clamped(i, theta):
     """Whether the law of a stop is cut at zero where it would pull."""
-    return theta[-5 - LINKS - 5 * i] > 0.0
+    return theta[-8 - LINKS - 5 * i] > 0.0
 
 
 @njit(**INNER)
 def jumps_at(i, theta):
     """Whether the force of a stop jumps at first touch."""
-    return theta[-6 - LINKS - 5 * i] > 0.0
+    return theta[-9 - LINKS - 5 * i] > 0.0
 
 
 @njit(**INNER)

@@ -1,0 +1,28 @@
+"""What jumps at an event: nothing, derivatives and covariances, momenta, or momenta and their derivatives."""
+
+from numba import njit
+
+from vibrokit.kernels.options import INNER
+from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.templates.crossing_extremals import cross_extremals
+from vibrokit.kernels.templates.crossing_linear import cross_linear
+from vibrokit.kernels.templates.crossing_momenta import cross_momenta
+from vibrokit.kernels.templates.settling import settle
+from vibrokit.kernels.templates.steps import what_jumps
+
+# --- scene above, stepper below ---
+
+LINEAR, MOMENTA, EXTREMALS = 1.0, 2.0, 3.0
+
+
+@njit(**INNER)
+def cross(i, y, memory, pushing, theta, settings, room):
+    """Settle at an event, and map across it what jumps there."""
+    if what_jumps(theta) == LINEAR:
+        return cross_linear(i, y, memory, pushing, theta, settings, room)
+    if what_jumps(theta) == MOMENTA:
+        return cross_momenta(i, y, memory, pushing, theta, settings, room)
+    if what_jumps(theta) == EXTREMALS:
+        return cross_extremals(i, y, memory, pushing, theta, settings, room)
+    settle(y, memory, pushing, theta, room)
+    return COMPLETED
