@@ -1,6 +1,7 @@
 # make demo   the main job on a bundled scene, in a virtual environment of its own
 # make test   style, types, layers and the tests of seconds
 # make test-slow   the tests that take longer; CI runs them too
+# make test-long   slow tests of half a minute each that CI leaves out: before a release, and after changes near to them
 # make docs   the manual, in docs/_build/html
 # make clean  remove what these made
 
@@ -10,7 +11,7 @@ PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-slow docs clean
+.PHONY: demo test test-slow test-long docs clean
 
 demo: .venv/demo.stamp
 	$(BIN)/vibrokit run hertz-0.570
@@ -23,7 +24,10 @@ test: .venv/test.stamp
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not slow'
 
 test-slow: .venv/test.stamp
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m slow
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'slow and not long'
+
+test-long: .venv/test.stamp
+	$(BIN)/python -m pytest --numprocesses auto --dist load -m long
 
 docs: .venv/docs.stamp
 	$(BIN)/python -m sphinx -b html docs docs/_build/html

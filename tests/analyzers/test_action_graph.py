@@ -428,6 +428,7 @@ def test_a_saddle_at_the_tip_of_a_basin_is_reached():
         assert abs(escape.value - value) <= escape.numerical_error < 0.5 * value
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_steps_become_shorter_than_a_stiff_contact():
     """Hertz stops of k = 1e4: 8 steps in a period give a quarter of the energy.

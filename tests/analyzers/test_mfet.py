@@ -177,7 +177,7 @@ def test_matrix_of_rates_and_occupancies(structure):
 @pytest.mark.parametrize("splitting", [False, True])
 def test_any_executor_gives_the_same_bits(splitting, structure):
     analyzer = vk.MFET(
-        intensities=(0.05,), source=0, target_error=0.3, splitting=splitting, replicas=8, escapes=2, seed=5
+        intensities=(0.05,), source=0, target_error=0.3, splitting=splitting, replicas=16, escapes=2, seed=5
     )
     alone = analyzer.run(WELL, structure)
     for pool in (futures.ThreadPoolExecutor, futures.ProcessPoolExecutor):

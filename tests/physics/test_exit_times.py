@@ -67,6 +67,7 @@ def test_direct_and_splitting_agree(scene_and_structure):
     assert abs(one.log_value - other.log_value) <= 3 * math.hypot(one.log_error, other.log_error)
 
 
+@pytest.mark.long
 def test_intervals_of_splitting_cover_the_truth():
     """Of intervals of 95 %, each from 16 replicas, as many contain the rate as their number's error allows."""
     count = 60

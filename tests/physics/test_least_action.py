@@ -252,6 +252,7 @@ def test_the_bounds_contain_a_path_that_a_coarse_graph_misses(paper):
     assert finding.values["path"] == energy.value
 
 
+@pytest.mark.long
 def test_both_wells_of_a_symmetric_scene_have_one_energy():
     """Half a period later the scene is its own mirror image. Few steps gave the graph no path out of one well."""
     wells = vk.CubicSpring(linear=-1.0, cubic=1.0)
@@ -267,6 +268,7 @@ def test_both_wells_of_a_symmetric_scene_have_one_energy():
     assert left.value == pytest.approx(right.value, rel=1e-8)
 
 
+@pytest.mark.long
 def test_the_graph_resolves_small_islands_around_an_orbit_of_period_3():
     """They lie apart: one grid around all three covers several times the area, and its error was as large as V.
 

@@ -100,6 +100,7 @@ def test_least_action_certifies_both(source):
     assert energy.value == pytest.approx(exact, rel=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_first_contact_from_the_cycle():
     osc, structure = self_excited(stops=True)
@@ -114,6 +115,7 @@ def test_shots_from_rest_reach_the_cycle_although_they_pass_its_boundary_slowly(
     assert energy.value == pytest.approx(cost(0, INNER), rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_energy_is_followed_along_a_parameter():
     osc, _ = self_excited()

@@ -50,6 +50,7 @@ def test_each_state_is_certified_and_its_action_is_least(name, label):
     assert found.action == pytest.approx(energy.value, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_graph_covers_a_scene_from_which_motion_escapes():
     """Of the softening spring a quarter of the region leads to infinity, which is no place for nodes.
 

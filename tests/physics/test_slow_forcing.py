@@ -74,6 +74,7 @@ def test_exponents_of_the_saddle(frequency):
     assert saddle.multipliers[0].real == pytest.approx(math.exp(growth * saddle.duration), rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_slower_forcing_costs_as_much_as_the_lowest_barrier():
     """4 ζ ω_n ΔV, with the barrier of the greatest force; both wells are mirror images half a period apart."""

@@ -18,6 +18,7 @@ def trade():
     return measure_exit_times(well, structure, source=0, errors=(0.3, 0.1))
 
 
+@pytest.mark.long
 def test_every_error_is_of_the_size_that_is_estimated(trade):
     """The chance of more than four standard errors is 6e-5."""
     for row in trade.rows:
