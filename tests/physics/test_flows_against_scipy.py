@@ -70,7 +70,7 @@ def long_reference():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stepper", FINEST, ids=lambda s: s.name)
+@pytest.mark.parametrize("stepper", [pytest.param(FINEST[0], marks=pytest.mark.long), FINEST[1]], ids=lambda s: s.name)
 def test_state_over_twenty_periods(stepper, long_reference):
     osc = vk.load_scene("hertz-0.570")
     ends = osc.section_map(starts()[:, :2], PERIODS, stepper=stepper)

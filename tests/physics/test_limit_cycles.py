@@ -91,7 +91,7 @@ def test_sensitivities_are_the_derivatives_of_the_closed_form():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", [0, 1])
+@pytest.mark.parametrize("source", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_least_action_certifies_both(source):
     osc, structure = self_excited()
     (energy,) = vk.LeastAction(source=source, **QUICK).run(osc, structure).energies

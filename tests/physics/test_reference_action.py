@@ -47,7 +47,7 @@ def test_clear_states(frequency):
     check(reference.followed_in(guess, model.period / COARSE / 40), reference.ENERGIES[frequency, "clear"])
 
 
-@pytest.mark.parametrize(("frequency", "before"), [(0.570, 24), (0.525, 16)])
+@pytest.mark.parametrize(("frequency", "before"), [(0.570, 24), pytest.param(0.525, 16, marks=pytest.mark.long)])
 def test_hammering_states(frequency, before):
     model, source, target = (reference.paper(frequency), *ends(frequency, "hammering"))
     guess = pieced(model, source, target, known_sections(frequency), COARSE, before, 6)

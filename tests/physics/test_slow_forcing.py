@@ -129,6 +129,7 @@ def test_minimized_directly_it_is_the_same(frequency):
     assert energy.value == pytest.approx(fine + (fine - coarse) / 3, rel=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_graph_certifies_it():
     (energy,) = vk.LeastAction(source="left").run(scene(0.05), structure(0.05)).energies

@@ -349,6 +349,7 @@ def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
     assert set(saddle.leads_to) == {periods[2], periods[6]}
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_strip():
     """Nothing settles near a symmetric orbit with a multiplier of 1.008, so that the boundary cannot be followed."""
