@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
+from vibrokit.kernels.jumps import EXTREMALS, LINEARIZED, MOMENTA, NOTHING
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
@@ -17,13 +18,12 @@ if TYPE_CHECKING:
 
 FINEST, COARSEST = 1e-15, 1e-2
 _MOST_STEPS = 200_000.0
-# What jumps at a touch, by its number in the template `crossing`.
-_CROSSING: Mapping[Flow, int] = {
-    Flow.STATE_VARIATIONAL: 1,
-    Flow.LINEARISED: 1,
-    Flow.COVARIANCE_REVERSED: 1,
-    Flow.HAMILTONIAN: 2,
-    Flow.HAMILTONIAN_VARIATIONAL: 3,
+_JUMPING: Mapping[Flow, float] = {
+    Flow.STATE_VARIATIONAL: LINEARIZED,
+    Flow.LINEARISED: LINEARIZED,
+    Flow.COVARIANCE_REVERSED: LINEARIZED,
+    Flow.HAMILTONIAN: MOMENTA,
+    Flow.HAMILTONIAN_VARIATIONAL: EXTREMALS,
 }
 _CROSSINGS = ("crossing_linear", "grazing", "crossing_momenta", "crossing_extremals", "crossing")
 CONTACT = ("settling", *_CROSSINGS, "landing", "contact")
@@ -60,7 +60,7 @@ class LocatedStepper(Stepper):
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes."""
         writer = AttemptWriter(text)
-        crossing = f"CROSSING = {(_CROSSING[text.flow] if text.breaks else 0, *text.places)!r}\n"
+        crossing = f"CROSSING = {(_JUMPING[text.flow] if text.breaks else NOTHING, *text.places)!r}\n"
         constants = [text.constants, text.walls, writer.facts(), crossing]
         return [*constants, text.forcing, text.rhs, text.stops, *writer.slopes()]
 

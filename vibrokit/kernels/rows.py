@@ -109,22 +109,21 @@ def compare_rows(
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         most, sizes, haze, fifths, thirds, end, blocks, hazy, rows = arguments
-        found = [cgutils.alloca_once_value(builder, _splat(0.0)) for _ in range(3)]
+        fifth, third, broken = found = [cgutils.alloca_once_value(builder, _splat(0.0)) for _ in range(3)]
         blurred = _load(builder, haze)
         with cgutils.for_range(builder, rows) as loop:
             place = _first_of(builder, loop.index)
-            block = builder.fptosi(builder.load(builder.gep(blocks, [loop.index])), loop.index.type)
-            unit = _load(builder, sizes, _first_of(builder, block))
+            unit = _load(builder, sizes, _block_of(builder, blocks, loop.index))
             more = builder.select(builder.icmp_signed("<", loop.index, hazy), _splat(1.0), blurred)
             unit = builder.fmul(unit, more, flags=_CONTRACT)
             per = builder.select(
                 builder.fcmp_ordered(">", unit, _splat(0.0)), builder.fdiv(_splat(1.0), unit), _splat(0.0)
             )
-            for largest, estimates in zip(found, (fifths, thirds), strict=False):
+            for largest, estimates in ((fifth, fifths), (third, thirds)):
                 own = builder.fmul(_load(builder, estimates, place), per, flags=_CONTRACT)
                 builder.store(_larger(builder, own, builder.load(largest)), largest)
             value = _load(builder, end, place)
-            builder.store(builder.fadd(builder.load(found[2]), builder.fsub(value, value)), found[2])
+            builder.store(builder.fadd(builder.load(broken), builder.fsub(value, value)), broken)
         for row, number in enumerate(found):
             _store(builder, builder.load(number), most, ir.Constant(ir.IntType(64), row * LANES))
 
@@ -138,12 +137,10 @@ def join_rows(_context: Any, sizes: Any, blocks: Any, rows: Any) -> Any:
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         sizes, blocks, rows = arguments
         with cgutils.for_range(builder, rows) as loop:
-            block = builder.fptosi(builder.load(builder.gep(blocks, [loop.index])), loop.index.type)
-            first, own = (_first_of(builder, row) for row in (block, loop.index))
+            first, own = _block_of(builder, blocks, loop.index), _first_of(builder, loop.index)
             with builder.if_then(builder.icmp_signed("!=", first, own)):
-                _store(
-                    builder, _larger(builder, _load(builder, sizes, first), _load(builder, sizes, own)), sizes, first
-                )
+                largest = _larger(builder, _load(builder, sizes, first), _load(builder, sizes, own))
+                _store(builder, largest, sizes, first)
 
     return types.void(sizes, sizes, types.int64), generate
 
@@ -157,6 +154,11 @@ def _each(builder: Any, rows: Any) -> Iterator[Any]:
 
 def _first_of(builder: Any, row: Any) -> Any:
     return builder.mul(row, ir.Constant(row.type, LANES))
+
+
+def _block_of(builder: Any, blocks: Any, row: Any) -> Any:
+    """The place of the first number of the block that a row belongs to."""
+    return _first_of(builder, builder.fptosi(builder.load(builder.gep(blocks, [row])), row.type))
 
 
 def _weighted(builder: Any, weights: Weights, slopes: Any, stride: Any, place: Any) -> Any:

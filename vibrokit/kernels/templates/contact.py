@@ -8,11 +8,12 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
+from vibrokit.kernels.jumps import EXTREMALS
 from vibrokit.kernels.links import law, rhs
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
-from vibrokit.kernels.templates.crossing import EXTREMALS, cross
+from vibrokit.kernels.templates.crossing import cross
 from vibrokit.kernels.templates.crossing_extremals import turn_law
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
 from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL

@@ -1,7 +1,8 @@
-"""What jumps at an event: nothing, derivatives and covariances, momenta, or momenta and their derivatives."""
+"""An event at a stop: it settles which stop pushes, and maps across it what jumps there."""
 
 from numba import njit
 
+from vibrokit.kernels.jumps import EXTREMALS, LINEARIZED, MOMENTA
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.templates.crossing_extremals import cross_extremals
@@ -12,13 +13,11 @@ from vibrokit.kernels.templates.steps import what_jumps
 
 # --- scene above, stepper below ---
 
-LINEAR, MOMENTA, EXTREMALS = 1.0, 2.0, 3.0
-
 
 @njit(**INNER)
 def cross(i, y, memory, pushing, theta, settings, room):
     """Settle at an event, and map across it what jumps there."""
-    if what_jumps(theta) == LINEAR:
+    if what_jumps(theta) == LINEARIZED:
         return cross_linear(i, y, memory, pushing, theta, settings, room)
     if what_jumps(theta) == MOMENTA:
         return cross_momenta(i, y, memory, pushing, theta, settings, room)

@@ -78,7 +78,7 @@ def barriers(theta):
 
 @njit(**INNER)
 def what_jumps(theta):
-    """What jumps at the touch of a stop; see the template `crossing`."""
+    """What jumps at the touch of a stop; see `vibrokit.kernels.jumps`."""
     return theta[-2 - LINKS]
 
 
