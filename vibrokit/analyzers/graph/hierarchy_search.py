@@ -45,6 +45,7 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: Mapping[Shape, tuple[int, ...]]  # to be tried in turn, by number of nodes; the finest is the last
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
+    _areas: dict[frozenset[float], float] = dataclasses.field(default_factory=dict)  # by the actions of the paths around
     _embedded: dict[int, ExitTarget] = dataclasses.field(default_factory=dict)  # by number of the saddle
 
     def estimates(
@@ -52,17 +53,14 @@ class HierarchySearch:
     ) -> tuple[dict[ExitTarget, TargetEstimate], Potential]:
         """Return what some targets cost, and the potential on the finest grid that covers them.
 
-        Saddles inside chaotic sets that known paths end at are targets as well. Raises StructureError if no target was
-        reached, or if the attractor is not hyperbolic.
+        Raises StructureError if no target was reached, or if the attractor is not hyperbolic.
         """
         with stage("graph", subject=self.problem.attractor.name, unit="sweeps"):
-            before = self._before(frozenset(targets), shape)
-            coverage = self._coverage(targets, before, known or KnownPaths())
-            alike = before is not None and isinstance(before.coverage, type(coverage))
-            hierarchy = self._hierarchy(coverage, shape, before if alike else None)
+            coverage, before = self._coverage(targets, shape, known or KnownPaths())
+            hierarchy = self._hierarchy(coverage, shape, before)
             if shape != list(self.steps_per_period)[-1]:
                 self._solved_before[shape, frozenset(targets)] = hierarchy
-            return {target: hierarchy.estimate(target) for target in coverage.targets}, hierarchy.fine.potential
+            return {target: hierarchy.estimate(target) for target in targets}, hierarchy.fine.potential
 
     def within(self, potential: Potential, target: ExitTarget, shape: Shape) -> list[Candidate]:
         """Return paths to a target that a known potential covers, from a grid around what lies below the target.
@@ -76,37 +74,90 @@ class HierarchySearch:
             solved = coverage.solved(grids, ROOM * coverage.highest(known), known)
             return [path.candidate for path in solved.paths(target)]
 
-    def _coverage(self, targets: Sequence[ExitTarget], before: GridHierarchy | None, known: KnownPaths) -> Coverage:
-        """Around known paths to all targets, if grids there are far smaller and V on those before was too high."""
-        paths = known.to(targets)
-        whole = WholeRegion(self.problem, self.model, targets, paths)
-        if before is None or not known.leads_to_all(targets) or not self.problem.attractor.is_fixed:
-            return whole
-        around = AroundPaths(self.problem, self.model, (*targets, *self._ends(paths, targets)), paths)
-        if isinstance(before.coverage, AroundPaths):
-            return around
-        if before.coverage.highest(before.fine) <= LOOSE * around.scale:
-            return whole
-        grids = before.fine.potential.grids
-        closer = around.first(grids.steps, grids.shape, before.intervals)
-        return around if closer.area < _FAR_SMALLER * grids.area else whole
-
-    def _ends(self, paths: Sequence[ActivationEnergy], targets: Sequence[ExitTarget]) -> list[ExitTarget]:
-        """Targets at the saddles that known paths end at, where these are not among the others."""
-        wanted = {path.saddle for path in paths} - {target.saddle for target in targets}
+    def ends(self, known: KnownPaths) -> list[ExitTarget]:
+        """Return targets at the saddles inside chaotic sets that known paths to unsettled exits end at."""
+        if not self.problem.attractor.is_fixed:
+            return []
+        wanted = {path.saddle for path in known.unsettled}
         for end in self.problem.path_ends:
             if isinstance(end, AtSaddle) and end.embedded and end.number in wanted - self._embedded.keys():
                 self._embedded[end.number] = at_saddle(end, self.problem, self.model)
         return [self._embedded[number] for number in sorted(wanted & self._embedded.keys())]
 
-    def _before(self, targets: frozenset[ExitTarget], shape: Shape) -> GridHierarchy | None:
-        """The finest hierarchy on fewer nodes that was solved for the fewest other targets."""
-        known = [(len(others), -nodes[0], nodes, others) for nodes, others in self._solved_before if targets <= others]
-        earlier = [entry for entry in known if entry[2] != shape]
+    def groups(self, targets: Sequence[ExitTarget], known: KnownPaths) -> list[tuple[list[ExitTarget], KnownPaths]]:
+        """Divide targets into groups that get grids of their own, those with the cheapest known paths first.
+
+        A group ends where grids around one more path would be far larger. Those that grids for all resolve stay
+        together, with those that no path is known to.
+        """
+        groups, rest = list[tuple[list[ExitTarget], KnownPaths]](), list(targets)
+        priced = sorted((target for target in rest if np.isfinite(known.cost(target))), key=known.cost)
+        while self._solved_before and len(rest) > 1 and priced:
+            group, others = [priced[0]], priced[1:]
+            while others and not self._far_smaller(group, [*group, others[0]], known):
+                group.append(others.pop(0))
+            if len(group) == len(rest):
+                break
+            if self._apart(group, known):
+                groups.append((group, known))
+                known = known.leaving_out({path.target for path in known.to(group)})
+                rest = [target for target in rest if target not in group and known.needs(target)]
+            priced = [target for target in others if target in rest]
+        return [*groups, (rest, known)] if rest else groups
+
+    def _apart(self, group: Sequence[ExitTarget], known: KnownPaths) -> bool:
+        """Whether targets were solved apart from others before, or V on the grids for all is far above their paths."""
+        targets = frozenset(group)
+        before, _ = self._before(targets, None)
+        if before is None or any(targets == others for _, others in self._solved_before):
+            return True
+        return any(before.fine.arrival(target).value > LOOSE * known.cost(target) for target in group)
+
+    def _far_smaller(self, few: Sequence[ExitTarget], more: Sequence[ExitTarget], known: KnownPaths) -> bool:
+        """Whether grids around the paths to a few targets are far smaller than around those to more."""
+        return self._area(known.to(few)) < _FAR_SMALLER * self._area(known.to(more))
+
+    def _area(self, paths: Sequence[ActivationEnergy]) -> float:
+        """The area of the first grids around some paths."""
+        shape, steps = next(iter(self.steps_per_period.items()))
+        key = frozenset(path.value for path in paths)
+        if key not in self._areas:
+            self._areas[key] = AroundPaths(self.problem, self.model, (), paths).first(steps[0], shape, 1).area
+        return self._areas[key]
+
+    def _coverage(
+        self, targets: Sequence[ExitTarget], shape: Shape, known: KnownPaths
+    ) -> tuple[Coverage, GridHierarchy | None]:
+        """What grids have to cover, and the hierarchy on fewer nodes that they go on from.
+
+        They begin anew around known paths if grids there are far smaller and V on those before was too high.
+        """
+        paths = known.to(targets)
+        whole = WholeRegion(self.problem, self.model, targets, paths)
+        before, covers = self._before(frozenset(targets), shape)
+        if before is None:
+            return whole, None
+        from_whole = covers and isinstance(before.coverage, WholeRegion)
+        if not (paths and known.leads_to_all(targets) and self.problem.attractor.is_fixed):
+            return whole, before if from_whole else None
+        around = AroundPaths(self.problem, self.model, targets, paths)
+        if around.highest(before.fine) > LOOSE * around.scale:
+            grids = before.fine.potential.grids
+            closer = around.first(grids.steps, grids.shape, before.intervals)
+            if closer.area < _FAR_SMALLER * grids.area:
+                return around, None
+        if covers and not from_whole:
+            return around, before
+        return whole, before if covers else None
+
+    def _before(self, targets: frozenset[ExitTarget], shape: Shape | None) -> tuple[GridHierarchy | None, bool]:
+        """The finest hierarchy of another shape that was solved for the fewest other targets, and if it covers all."""
+        earlier = [(nodes, others) for nodes, others in self._solved_before if nodes != shape]
+        covering = [(nodes, others) for nodes, others in earlier if targets <= others]
         if not earlier:
-            return None
-        *_, nodes, others = min(earlier, key=lambda entry: entry[:2])
-        return self._solved_before[nodes, others]
+            return None, False
+        best = min(covering or earlier, key=lambda entry: (len(entry[1] - targets), -entry[0][0]))
+        return self._solved_before[best], bool(covering)
 
     def _hierarchy(self, coverage: Coverage, shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence, Set
+from functools import cached_property
 
 import numpy as np
 
@@ -19,20 +20,23 @@ class KnownPaths:
     branches: Sequence[ActivationEnergy] = ()  # with their paths
     settled: Set[int] = frozenset()  # labels of the attractors whose energies need no more
 
+    @property
+    def unsettled(self) -> list[ActivationEnergy]:
+        """The cheapest known path to each attractor that is not settled."""
+        return [branch for label, branch in self._cheapest.items() if label not in self.settled]
+
     def to(self, targets: Sequence[ExitTarget]) -> list[ActivationEnergy]:
-        """Return the cheapest known path to each attractor that is reached from some targets."""
+        """Return the cheapest known path to each attractor that is reached from some targets, unless it is settled."""
         labels = {label for target in targets for label in target.labels}
-        cheapest: dict[int, ActivationEnergy] = {}
-        for branch in self.branches:
-            label = branch.target
-            usable = label in labels and branch.path is not None and len(branch.path.section)
-            if usable and (label not in cheapest or branch.value < cheapest[label].value):
-                cheapest[label] = branch
-        return list(cheapest.values())
+        return [branch for branch in self.unsettled if branch.target in labels]
+
+    def leaving_out(self, labels: Set[int]) -> KnownPaths:
+        """Return the same paths, where some more attractors need no graph."""
+        return dataclasses.replace(self, settled=self.settled | labels)
 
     def leads_to_all(self, targets: Sequence[ExitTarget]) -> bool:
         """Return whether a path is known to each attractor that is reached from some targets."""
-        return bool(np.isfinite([self.cost(target) for target in targets]).all())
+        return all(np.isfinite(self.cost(target)) for target in targets)
 
     def needs(self, target: ExitTarget) -> bool:
         """Return whether an exit that needs the graph may lead there.
@@ -52,5 +56,15 @@ class KnownPaths:
 
         Infinite if a path to one of them is not known.
         """
-        known = {branch.target: branch.value for branch in self.to((target,))}
-        return max((known.get(label, np.inf) for label in target.labels), default=np.inf)
+        known = self._cheapest
+        return max((known[label].value if label in known else np.inf for label in target.labels), default=np.inf)
+
+    @cached_property
+    def _cheapest(self) -> dict[int, ActivationEnergy]:
+        """By label: the cheapest path whose states are known."""
+        found: dict[int, ActivationEnergy] = {}
+        for branch in self.branches:
+            label, usable = branch.target, branch.path is not None and len(branch.path.section)
+            if usable and (label not in found or branch.value < found[label].value):
+                found[label] = branch
+        return found

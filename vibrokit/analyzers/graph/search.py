@@ -128,13 +128,13 @@ class GraphSearch:
         for number, nodes in enumerate(shapes, start=1):
             costs.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
             costs.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
-            unsettled = [target for target in targets if paths.needs(target)]
+            unsettled = [target for target in (*targets, *search.ends(paths)) if paths.needs(target)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
-            groups = [group for group in both if group]
-            for group in groups:
+            groups = [group for targets_of_kind in both for group in search.groups(targets_of_kind, paths)]
+            for group, leading in groups:
                 try:
-                    yield from costs.refined(group, nodes, paths)
+                    yield from costs.refined(group, nodes, leading)
                 except StructureError:  # on few nodes, no exit may be reached
                     if costs.last_for_all and not costs.estimates:
                         raise
