@@ -45,7 +45,7 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: Mapping[Shape, tuple[int, ...]]  # to be tried in turn, by number of nodes; the finest is the last
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
-    _areas: dict[frozenset[float], float] = dataclasses.field(default_factory=dict)  # by the actions of the paths around
+    _areas: dict[frozenset[float], float] = dataclasses.field(default_factory=dict)  # by actions of the paths
     _embedded: dict[int, ExitTarget] = dataclasses.field(default_factory=dict)  # by number of the saddle
 
     def estimates(
@@ -151,9 +151,13 @@ class HierarchySearch:
         return whole, before if covers else None
 
     def _before(self, targets: frozenset[ExitTarget], shape: Shape | None) -> tuple[GridHierarchy | None, bool]:
-        """The finest hierarchy of another shape that was solved for the fewest other targets, and if it covers all."""
+        """The finest hierarchy of another shape that was solved for the fewest other targets, and if it covers all.
+
+        Saddles inside chaotic sets lie on the boundary that it covers.
+        """
+        own = targets - set(self._embedded.values())
         earlier = [(nodes, others) for nodes, others in self._solved_before if nodes != shape]
-        covering = [(nodes, others) for nodes, others in earlier if targets <= others]
+        covering = [(nodes, others) for nodes, others in earlier if own <= others]
         if not earlier:
             return None, False
         best = min(covering or earlier, key=lambda entry: (len(entry[1] - targets), -entry[0][0]))

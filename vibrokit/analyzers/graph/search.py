@@ -132,7 +132,9 @@ class GraphSearch:
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [group for targets_of_kind in both for group in search.groups(targets_of_kind, paths)]
-            for group, leading in groups:
+            for count, (group, leading) in enumerate(groups):
+                if count and costs.estimates:
+                    yield costs.solution(nodes, last=False)
                 try:
                     yield from costs.refined(group, nodes, leading)
                 except StructureError:  # on few nodes, no exit may be reached
