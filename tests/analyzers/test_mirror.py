@@ -38,7 +38,9 @@ def both(kind):
     return LEAST.run(*wells(kind))
 
 
-@pytest.mark.parametrize("kind", ["forced", "unforced", pytest.param("third harmonic", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind", ["forced", "unforced", pytest.param("third harmonic", marks=[pytest.mark.slow, pytest.mark.long])]
+)
 def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     osc, structure = wells(kind)
     first, second = both(kind).energies

@@ -37,7 +37,7 @@ def rate_at(osc, structure, ratio, **settings):
     return rate
 
 
-@pytest.fixture(scope="module", params=[0.2, 1.0])
+@pytest.fixture(scope="module", params=[0.2, pytest.param(1.0, marks=pytest.mark.long)])
 def scene_and_structure(request):
     osc = well(request.param)
     return osc, vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)

@@ -35,8 +35,10 @@ def minimized(osc, structure, energy):
     return reference.least(guess.extended(source, 4, saddle, 4, SAMPLES))
 
 
-@pytest.mark.parametrize("label", [0, 1])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [(name, 0) for name in NAMES] + [pytest.param(name, 1, marks=pytest.mark.long) for name in NAMES],
+)
 def test_each_state_is_certified_and_its_action_is_least(name, label):
     osc, structure = SCENES[name], structure_of(name)
     result = vk.LeastAction(source=label, graph=None).run(osc, structure)

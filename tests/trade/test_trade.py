@@ -119,7 +119,10 @@ def test_command(linear, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
     monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
     monkeypatch.setattr("vibrokit.trade.densities.measure_densities", lambda osc, source: "densities")
+    monkeypatch.setattr("vibrokit.trade.exit_times.measure_exit_times", lambda osc, source: "exit times")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
-    assert str(linear) in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert str(linear) in printed
+    assert all(f"\n{name}\n" in printed for name in ("basins", "energies", "densities", "exit times"))
     assert picture.read_bytes().startswith(b"\x89PNG")

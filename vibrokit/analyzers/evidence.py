@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.graph.around_paths import LOOSE
 from vibrokit.analyzers.graph.coverage import BELOW
-from vibrokit.analyzers.graph.hierarchy_search import LOOSE
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.problem import ExitProblem

@@ -9,9 +9,11 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.graph.around_paths import AroundPaths
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
@@ -129,21 +131,94 @@ def test_a_saddle_is_left_out_if_known_paths_to_its_attractors_cost_far_less_or_
     assert KnownPaths([branch(1, 0.1, 3)], {2}).needs(target)  # no path over this saddle is known
 
 
+ANY_PATH = ExitPath(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 2)), np.array([0.0, 1.0]), np.array([0]))
+
+
+def to(label, value, saddle):
+    return ActivationEnergy(0, label, value, value, value, "", Bound.UPPER, path=ANY_PATH, saddle=saddle)
+
+
+def over(saddle, *labels):
+    return StateTarget(labels, saddle, 1.0, np.zeros((1, 2)))
+
+
+NEAR, FAR, UNKNOWN = over(0, 1), over(1, 2), over(2, 3)
+PATHS = KnownPaths([to(1, 1.0, 0), to(2, 10.0, 1)])
+
+
+def searched(targets, values):
+    """A search that has solved these targets together, with these V; without targets, one that has solved nothing."""
+    search = HierarchySearch(problem(), coverage().model, {NODES: (STEPS,)})
+    fine = SimpleNamespace(arrival=lambda target: SimpleNamespace(value=values[target]))
+    if targets:
+        search._solved_before[NODES, frozenset(targets)] = SimpleNamespace(fine=fine)
+    return search
+
+
+@pytest.fixture
+def areas(monkeypatch):
+    """Grids around a path that are as large as its action."""
+    monkeypatch.setattr(HierarchySearch, "_area", lambda _, paths: max(path.value for path in paths))
+
+
+@pytest.mark.usefixtures("areas")
+def test_cheap_exits_that_the_grids_for_all_do_not_resolve_come_first_on_their_own():
+    together = [FAR, NEAR, UNKNOWN]
+    (first, known), (rest, others) = searched(together, {NEAR: 5.0}).groups(together, PATHS)
+    assert (first, rest) == ([NEAR], [FAR, UNKNOWN])
+    assert [path.value for path in known.to(first)] == [1.0]
+    assert [path.target for path in others.to([over(1, 1, 2)])] == [2]  # what leads to both is there for the other
+
+
+@pytest.mark.usefixtures("areas")
+@pytest.mark.parametrize(
+    ("solved", "values"), [((), {}), ((NEAR, FAR), {NEAR: 1.2})], ids=["nothing is solved yet", "V is near the action"]
+)
+def test_exits_stay_together_otherwise(solved, values):
+    (group,) = searched(solved, values).groups([NEAR, FAR], PATHS)
+    assert group == ([NEAR, FAR], PATHS)
+
+
+@pytest.mark.usefixtures("areas")
+def test_exits_solved_apart_stay_apart_even_if_their_group_has_changed():
+    more = over(3, 4)
+    search = searched([NEAR, FAR, more], {NEAR: 5.0})
+    search._solved_before.update(searched([NEAR, more], {NEAR: 1.0})._solved_before)
+    assert [group for group, _ in search.groups([NEAR, FAR], PATHS)] == [[NEAR], [FAR]]
+
+
+@pytest.mark.parametrize(("value", "goes_on"), [(3.0, True), (np.inf, False)])
+def test_a_saddle_inside_a_chaotic_set_goes_on_from_grids_that_reach_it(value, goes_on):
+    inside = over(7, 1)
+    search = searched([NEAR], {inside: value})
+    search._embedded[7] = inside
+    assert (search._before(frozenset([inside]), None) is not None) == goes_on
+    assert search._before(frozenset([FAR, inside]), None) is None  # the other target is not on those grids
+
+
+@pytest.mark.usefixtures("areas")
+def test_exits_of_about_one_cost_share_their_grids():
+    alike = over(3, 4)
+    known = KnownPaths([*PATHS.branches, to(4, 1.5, 3)])
+    groups = searched([NEAR, FAR, alike], {NEAR: 5.0, alike: 5.0}).groups([NEAR, FAR, alike], known)
+    assert [group for group, _ in groups] == [[NEAR, alike], [FAR]]
+
+
 @pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=False,
-    reason="rounding decides which paths are known when the graph begins; grids that hold a costly one are too coarse",
-)
-def test_small_islands_in_a_wide_region_are_resolved():
-    """An orbit of period 2 in a forced double well is left for 9.129e-5, and other exits cost 30 times as much."""
+@pytest.mark.parametrize("leaves", [vk.LeaveBasin(), vk.LeaveBasin(to=0)], ids=["to any", "to one"])
+def test_small_islands_in_a_wide_region_are_resolved(leaves):
+    """An orbit of period 2 in a forced double well is left for 9.129e-5, and other exits cost up to 30 times as much.
+
+    The cheapest path ends at a saddle inside the chaotic basin boundary.
+    """
     osc = vk.Oscillator(
         natural_frequency=1.0, damping_ratio=0.03, spring=vk.CubicSpring(-1.0, 1.0),
         excitations=(vk.Harmonic(0.3, 2.4),), noise=vk.WhiteNoise(1e-4),
     )  # fmt: skip
     structure = vk.find_structure(osc, rng=0)
     (source,) = (each.label for each in structure.attractors if each.name == "right-oscillation-period-2")
-    result = vk.LeastAction(source=source).run(osc, structure)
+    result = vk.LeastAction(source=source, exit=leaves).run(osc, structure)
     first = min(result.energies, key=lambda energy: energy.value)
     assert first.value == pytest.approx(9.129105167e-5, rel=1e-6)
     assert first.lower > 0.8 * first.value

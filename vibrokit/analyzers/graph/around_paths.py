@@ -14,6 +14,7 @@ from vibrokit.analyzers.graph.seeds import orbit_visits
 from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.errors import StructureError
 
+LOOSE = 1.5  # V on a grid in units of a known path's action, above which that grid is too large for the path
 _EXTENSIONS = 3  # of grids that turn out too small on more nodes
 # V on a quarter of the nodes along each side, in units of the action: twice as many divided it by 1.7 to 3.5 on scenes
 # where the graph was of use.
@@ -92,6 +93,10 @@ class AroundPaths(Coverage):
     def ratios(self, solved: SolvedGrid) -> list[float]:
         """By the known paths."""
         return self.known_ratios(solved, self.branches)
+
+    def far_above(self, solved: SolvedGrid) -> bool:
+        """Return whether V at an exit is so far above the action of its path that the grids are too large for it."""
+        return max(self.ratios(solved)) > LOOSE
 
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Than that of a known path."""

@@ -52,7 +52,7 @@ class Coverage(ABC):
     problem: ExitProblem
     model: StepModel
     targets: Sequence[ExitTarget]
-    branches: Sequence[ActivationEnergy]  # known paths to the targets, one for each label that any is known for
+    branches: Sequence[ActivationEnergy]  # the cheapest known path to each label that is not settled
 
     @abstractmethod
     def first(self, steps: int, shape: Shape, intervals: int) -> Grids:

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from vibrokit.analyzers.graph.around_paths import LOOSE
 from vibrokit.analyzers.graph.coverage import FAR_LESS, STEP_TOLERANCE
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import TargetEstimate
-from vibrokit.analyzers.graph.hierarchy_search import LOOSE, HierarchySearch
+from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.solution import GraphSolution
@@ -57,11 +58,8 @@ class ExitCosts:
                 closer, _ = self.search.estimates(targets, nodes, known)
             except StructureError:  # too close to the attractor for any grid
                 break
-            better = [
-                target for target in closer if target not in estimates or closer[target].error < estimates[target].error
-            ]
-            targets = [target for target in targets if target in better]
-            estimates |= {target: closer[target] for target in better}
+            targets = [target for target in targets if closer[target].error < estimates[target].error]
+            estimates |= {target: closer[target] for target in targets}
 
     def solution(self, nodes: Shape, *, last: bool) -> GraphSolution:
         """What is known of the targets, put together."""

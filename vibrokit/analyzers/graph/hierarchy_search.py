@@ -25,7 +25,6 @@ from vibrokit.errors import StructureError
 from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 
-LOOSE = 1.5  # V on a grid in units of a known path's action, above which that grid is too large for the path
 _FAR_SMALLER = 0.5  # of the area: grids around known paths, which grow, that are worth beginning anew
 # Along a side where several section intervals have grids: half as many found the islands around an orbit of period 3 of
 # a weakly damped Duffing oscillator, and 26 did not.
@@ -45,7 +44,9 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: Mapping[Shape, tuple[int, ...]]  # to be tried in turn, by number of nodes; the finest is the last
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
-    _areas: dict[frozenset[float], float] = dataclasses.field(default_factory=dict)  # by actions of the paths
+    _areas: dict[frozenset[tuple[int, float]], float] = dataclasses.field(
+        default_factory=dict
+    )  # by actions of the paths
     _embedded: dict[int, ExitTarget] = dataclasses.field(default_factory=dict)  # by number of the saddle
 
     def estimates(
@@ -74,11 +75,11 @@ class HierarchySearch:
             solved = coverage.solved(grids, ROOM * coverage.highest(known), known)
             return [path.candidate for path in solved.paths(target)]
 
-    def ends(self, known: KnownPaths) -> list[ExitTarget]:
+    def embedded_targets(self, known: KnownPaths) -> list[ExitTarget]:
         """Return targets at the saddles inside chaotic sets that known paths to unsettled exits end at."""
         if not self.problem.attractor.is_fixed:
             return []
-        wanted = {path.saddle for path in known.unsettled}
+        wanted = {path.saddle for path in known.unsettled_paths}
         for end in self.problem.path_ends:
             if isinstance(end, AtSaddle) and end.embedded and end.number in wanted - self._embedded.keys():
                 self._embedded[end.number] = at_saddle(end, self.problem, self.model)
@@ -87,31 +88,29 @@ class HierarchySearch:
     def groups(self, targets: Sequence[ExitTarget], known: KnownPaths) -> list[tuple[list[ExitTarget], KnownPaths]]:
         """Divide targets into groups that get grids of their own, those with the cheapest known paths first.
 
-        A group ends where grids around one more path would be far larger. Those that grids for all resolve stay
-        together, with those that no path is known to.
+        A group ends where grids around one more path would be far larger. Exits that the grids for all resolve stay in
+        the last group, with the costliest exits and those without a known path. Each group has the paths that its grids
+        are for.
         """
         groups, rest = list[tuple[list[ExitTarget], KnownPaths]](), list(targets)
         priced = sorted((target for target in rest if np.isfinite(known.cost(target))), key=known.cost)
-        while self._solved_before and len(rest) > 1 and priced:
+        while self._solved_before and priced and self.problem.attractor.is_fixed:
             group, others = [priced[0]], priced[1:]
             while others and not self._far_smaller(group, [*group, others[0]], known):
                 group.append(others.pop(0))
-            if len(group) == len(rest):
+            if not others:
                 break
-            if self._apart(group, known):
+            if self._unresolved(group, rest, known):
                 groups.append((group, known))
-                known = known.leaving_out({path.target for path in known.to(group)})
+                known = known.with_settled({path.target for path in known.to(group)})
                 rest = [target for target in rest if target not in group and known.needs(target)]
             priced = [target for target in others if target in rest]
         return [*groups, (rest, known)] if rest else groups
 
-    def _apart(self, group: Sequence[ExitTarget], known: KnownPaths) -> bool:
-        """Whether targets were solved apart from others before, or V on the grids for all is far above their paths."""
-        targets = frozenset(group)
-        before, _ = self._before(targets, None)
-        if before is None or any(targets == others for _, others in self._solved_before):
-            return True
-        return any(before.fine.arrival(target).value > LOOSE * known.cost(target) for target in group)
+    def _unresolved(self, group: Sequence[ExitTarget], rest: Sequence[ExitTarget], known: KnownPaths) -> bool:
+        """Whether V on the grids before, for a group and all others together, is far above the paths to the group."""
+        before = self._before(frozenset(rest), None)
+        return before is None or self._around(group, known).far_above(before.fine)
 
     def _far_smaller(self, few: Sequence[ExitTarget], more: Sequence[ExitTarget], known: KnownPaths) -> bool:
         """Whether grids around the paths to a few targets are far smaller than around those to more."""
@@ -120,48 +119,49 @@ class HierarchySearch:
     def _area(self, paths: Sequence[ActivationEnergy]) -> float:
         """The area of the first grids around some paths."""
         shape, steps = next(iter(self.steps_per_period.items()))
-        key = frozenset(path.value for path in paths)
+        key = frozenset((path.target, path.value) for path in paths)
         if key not in self._areas:
-            self._areas[key] = AroundPaths(self.problem, self.model, (), paths).first(steps[0], shape, 1).area
+            around = AroundPaths(self.problem, self.model, (), paths)
+            self._areas[key] = around.first(steps[0], shape, max(self._intervals())).area
         return self._areas[key]
+
+    def _around(self, targets: Sequence[ExitTarget], known: KnownPaths) -> AroundPaths:
+        return AroundPaths(self.problem, self.model, targets, known.to(targets))
 
     def _coverage(
         self, targets: Sequence[ExitTarget], shape: Shape, known: KnownPaths
     ) -> tuple[Coverage, GridHierarchy | None]:
-        """What grids have to cover, and the hierarchy on fewer nodes that they go on from.
+        """Choose what grids have to cover, and the hierarchy on fewer nodes to go on from; None to begin anew.
 
-        They begin anew around known paths if grids there are far smaller and V on those before was too high.
+        Grids begin anew around known paths if they are far smaller there and V on those before was too high.
         """
-        paths = known.to(targets)
-        whole = WholeRegion(self.problem, self.model, targets, paths)
-        before, covers = self._before(frozenset(targets), shape)
-        if before is None:
-            return whole, None
-        from_whole = covers and isinstance(before.coverage, WholeRegion)
-        if not (paths and known.leads_to_all(targets) and self.problem.attractor.is_fixed):
-            return whole, before if from_whole else None
-        around = AroundPaths(self.problem, self.model, targets, paths)
-        if around.highest(before.fine) > LOOSE * around.scale:
+        before = self._before(frozenset(targets), shape)
+        whole, around = WholeRegion(self.problem, self.model, targets, known.to(targets)), self._around(targets, known)
+        from_whole = before if before is not None and isinstance(before.coverage, WholeRegion) else None
+        if before is None or not (around.branches and known.leads_to_all(targets) and self.problem.attractor.is_fixed):
+            return whole, from_whole
+        if from_whole is None and frozenset(before.coverage.targets) == frozenset(targets):
+            return around, before
+        if around.far_above(before.fine):
             grids = before.fine.potential.grids
             closer = around.first(grids.steps, grids.shape, before.intervals)
             if closer.area < _FAR_SMALLER * grids.area:
                 return around, None
-        if covers and not from_whole:
-            return around, before
-        return whole, before if covers else None
+        return (around, before) if from_whole is None else (whole, before)
 
-    def _before(self, targets: frozenset[ExitTarget], shape: Shape | None) -> tuple[GridHierarchy | None, bool]:
-        """The finest hierarchy of another shape that was solved for the fewest other targets, and if it covers all.
+    def _before(self, targets: frozenset[ExitTarget], shape: Shape | None) -> GridHierarchy | None:
+        """The hierarchy, of another shape than that given, that was solved for some targets and the fewest others.
 
-        Saddles inside chaotic sets lie on the boundary that it covers.
+        Of several, that with the most nodes. Saddles inside chaotic sets need only be reached on its grids.
         """
-        own = targets - set(self._embedded.values())
-        earlier = [(nodes, others) for nodes, others in self._solved_before if nodes != shape]
-        covering = [(nodes, others) for nodes, others in earlier if own <= others]
-        if not earlier:
-            return None, False
-        best = min(covering or earlier, key=lambda entry: (len(entry[1] - targets), -entry[0][0]))
-        return self._solved_before[best], bool(covering)
+        own, embedded = targets - set(self._embedded.values()), targets & set(self._embedded.values())
+        earlier = [
+            (len(others - targets), -nodes[0], hierarchy)
+            for (nodes, others), hierarchy in self._solved_before.items()
+            if nodes != shape and own <= others
+            and all(np.isfinite(hierarchy.fine.arrival(target).value) for target in embedded - others)
+        ]  # fmt: skip
+        return min(earlier, key=lambda entry: entry[:2])[-1] if earlier else None
 
     def _hierarchy(self, coverage: Coverage, shape: Shape, before: GridHierarchy | None) -> GridHierarchy:
         """Shorten the steps until linearization over a step changes no cost by much, then solve on all nodes.
@@ -172,7 +172,7 @@ class HierarchySearch:
         may be right where a contact is much shorter than all of them.
         """
         if before is not None and before.fine.potential.grids.shape == _shared(shape, before.intervals):
-            return before
+            return dataclasses.replace(before, coverage=coverage)
         first, *shorter = self._steps(shape, before)
         whole, rougher, coarse = self._begun(coverage, first, shape, before)
         for count in shorter:

@@ -21,17 +21,17 @@ class KnownPaths:
     settled: Set[int] = frozenset()  # labels of the attractors whose energies need no more
 
     @property
-    def unsettled(self) -> list[ActivationEnergy]:
+    def unsettled_paths(self) -> list[ActivationEnergy]:
         """The cheapest known path to each attractor that is not settled."""
         return [branch for label, branch in self._cheapest.items() if label not in self.settled]
 
     def to(self, targets: Sequence[ExitTarget]) -> list[ActivationEnergy]:
         """Return the cheapest known path to each attractor that is reached from some targets, unless it is settled."""
         labels = {label for target in targets for label in target.labels}
-        return [branch for branch in self.unsettled if branch.target in labels]
+        return [branch for branch in self.unsettled_paths if branch.target in labels]
 
-    def leaving_out(self, labels: Set[int]) -> KnownPaths:
-        """Return the same paths, where some more attractors need no graph."""
+    def with_settled(self, labels: Set[int]) -> KnownPaths:
+        """Return the same paths, with more attractors settled."""
         return dataclasses.replace(self, settled=self.settled | labels)
 
     def leads_to_all(self, targets: Sequence[ExitTarget]) -> bool:

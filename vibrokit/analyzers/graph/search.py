@@ -103,8 +103,9 @@ class GraphSearch:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
-        exit has few nodes for one that costs far less. So those that do are solved again without the others. `known` is
-        called before each number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to
+        exit has few nodes for one that costs far less. So those that do are solved again without the others, or before
+        them if paths to them are known; what is known by then is yielded in between. `known` is called before each
+        number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to
         exits that are not settled then.
         """
         noise, attractor = problem.osc.noise, problem.attractor
@@ -128,15 +129,15 @@ class GraphSearch:
         for number, nodes in enumerate(shapes, start=1):
             costs.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
             costs.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
-            unsettled = [target for target in (*targets, *search.ends(paths)) if paths.needs(target)]
+            unsettled = [target for target in (*targets, *search.embedded_targets(paths)) if paths.needs(target)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
-            groups = [group for targets_of_kind in both for group in search.groups(targets_of_kind, paths)]
-            for count, (group, leading) in enumerate(groups):
-                if count and costs.estimates:
+            groups = [pair for together in both for pair in search.groups(together, paths)]
+            for number_of_group, (group, paths_of_group) in enumerate(groups):
+                if number_of_group and costs.estimates:  # what the groups before have shown
                     yield costs.solution(nodes, last=False)
                 try:
-                    yield from costs.refined(group, nodes, leading)
+                    yield from costs.refined(group, nodes, paths_of_group)
                 except StructureError:  # on few nodes, no exit may be reached
                     if costs.last_for_all and not costs.estimates:
                         raise
