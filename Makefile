@@ -24,7 +24,7 @@ test: .venv/test.stamp
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not slow'
 
 test-slow: .venv/test.stamp
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'slow and not long'
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal -m 'slow and not long'
 
 test-long: .venv/test.stamp
 	$(BIN)/python -m pytest --numprocesses auto --dist load -m long

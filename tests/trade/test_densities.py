@@ -19,7 +19,6 @@ def trade():
     return measure_densities(well, structure, source=0, nodes=(0.6, 1.0), steps=(0.5,), samples=(20,))
 
 
-@pytest.mark.long
 def test_more_nodes_take_longer_and_err_less(trade):
     coarse, fine = (row for row in trade.rows if "samples" not in row.setting and "steps" not in row.setting)
     assert fine.error < coarse.error
