@@ -102,14 +102,20 @@ def test_grids_that_would_be_too_coarse_on_all_nodes_are_given_up_early():
         coverage(0.01).coarser(steps(), NODES, 1, 2 * EXACT)
 
 
+ANY_PATH = ExitPath(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 2)), np.array([0.0, 1.0]), np.array([0]))
+
+
+def to(label, value, saddle=-1, path=ANY_PATH):
+    return ActivationEnergy(0, label, value, value, value, "", Bound.UPPER, path=path, saddle=saddle)
+
+
+def over(saddle, *labels):
+    return StateTarget(labels, saddle, 1.0, np.zeros((1, 2)))
+
+
 def test_what_is_known_is_the_cheapest_path_to_each_attractor():
-    path = ExitPath(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 2)), np.array([0.0, 1.0]), np.array([0]))
-
-    def branch(target, value, path=path):
-        return ActivationEnergy(0, target, value, value, value, "", Bound.UPPER, path=path)
-
     (one, *_), label = exit_targets(problem(), coverage().model), problem().targets[0].label
-    known = KnownPaths([branch(label, 2.0), branch(label, 1.0), branch(7, 0.1), branch(label, 0.5, None)])
+    known = KnownPaths([to(label, 2.0), to(label, 1.0), to(7, 0.1), to(label, 0.5, path=None)])
     assert [found.value for found in known.to([one])] == [1.0]
     assert known.cost(one) == 1.0
     assert KnownPaths().cost(one) == np.inf
@@ -117,29 +123,14 @@ def test_what_is_known_is_the_cheapest_path_to_each_attractor():
 
 def test_a_saddle_is_left_out_if_known_paths_to_its_attractors_cost_far_less_or_need_no_graph():
     """A saddle that leads to two attractors; one of them is reached far cheaper by another saddle."""
-    target = SimpleNamespace(labels=(1, 2), saddle=0)
-
-    def branch(label, value, saddle):
-        return ActivationEnergy(0, label, value, value, value, "", Bound.UPPER, saddle=saddle)
-
-    over = [branch(1, 1.0, 0), branch(2, 1.0, 0)]
-    cheaper = [*over, branch(1, 0.1, 3)]
-    assert KnownPaths(over, {2}).needs(target)
+    target = over(0, 1, 2)
+    paths = [to(1, 1.0, 0), to(2, 1.0, 0)]
+    cheaper = [*paths, to(1, 0.1, 3)]
+    assert KnownPaths(paths, {2}).needs(target)
     assert KnownPaths(cheaper).needs(target)
     assert not KnownPaths(cheaper, {2}).needs(target)
     assert not KnownPaths((), {1, 2}).needs(target)
-    assert KnownPaths([branch(1, 0.1, 3)], {2}).needs(target)  # no path over this saddle is known
-
-
-ANY_PATH = ExitPath(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 2)), np.array([0.0, 1.0]), np.array([0]))
-
-
-def to(label, value, saddle):
-    return ActivationEnergy(0, label, value, value, value, "", Bound.UPPER, path=ANY_PATH, saddle=saddle)
-
-
-def over(saddle, *labels):
-    return StateTarget(labels, saddle, 1.0, np.zeros((1, 2)))
+    assert KnownPaths([to(1, 0.1, 3)], {2}).needs(target)  # no path over this saddle is known
 
 
 NEAR, FAR, UNKNOWN = over(0, 1), over(1, 2), over(2, 3)

@@ -44,9 +44,8 @@ class HierarchySearch:
     model: StepModel
     steps_per_period: Mapping[Shape, tuple[int, ...]]  # to be tried in turn, by number of nodes; the finest is the last
     _solved_before: dict[tuple[Shape, frozenset[ExitTarget]], GridHierarchy] = dataclasses.field(default_factory=dict)
-    _areas: dict[frozenset[tuple[int, float]], float] = dataclasses.field(
-        default_factory=dict
-    )  # by actions of the paths
+    # Of the first grids around known paths, by their targets and actions.
+    _areas: dict[frozenset[tuple[int, float]], float] = dataclasses.field(default_factory=dict)
     _embedded: dict[int, ExitTarget] = dataclasses.field(default_factory=dict)  # by number of the saddle
 
     def estimates(
@@ -154,11 +153,11 @@ class HierarchySearch:
 
         Of several, that with the most nodes. Saddles inside chaotic sets need only be reached on its grids.
         """
-        own, embedded = targets - set(self._embedded.values()), targets & set(self._embedded.values())
+        embedded = targets & set(self._embedded.values())
         earlier = [
             (len(others - targets), -nodes[0], hierarchy)
             for (nodes, others), hierarchy in self._solved_before.items()
-            if nodes != shape and own <= others
+            if nodes != shape and targets - embedded <= others
             and all(np.isfinite(hierarchy.fine.arrival(target).value) for target in embedded - others)
         ]  # fmt: skip
         return min(earlier, key=lambda entry: entry[:2])[-1] if earlier else None

@@ -105,8 +105,8 @@ class GraphSearch:
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
         exit has few nodes for one that costs far less. So those that do are solved again without the others, or before
         them if paths to them are known; what is known by then is yielded in between. `known` is called before each
-        number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to
-        exits that are not settled then.
+        number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to exits that are not
+        settled then.
         """
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
@@ -133,8 +133,8 @@ class GraphSearch:
             # Grids for targets that are no farther than the own basin cover that basin alone.
             both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
             groups = [pair for together in both for pair in search.groups(together, paths)]
-            for number_of_group, (group, paths_of_group) in enumerate(groups):
-                if number_of_group and costs.estimates:  # what the groups before have shown
+            for before, (group, paths_of_group) in enumerate(groups):
+                if before and costs.estimates:  # tell what the groups before have shown
                     yield costs.solution(nodes, last=False)
                 try:
                     yield from costs.refined(group, nodes, paths_of_group)
