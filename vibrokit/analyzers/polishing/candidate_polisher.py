@@ -106,7 +106,7 @@ class CandidatePolisher:
                     break
         return found
 
-    def reach(self, end: PathEnd, ranked: Sequence[Candidate]) -> None:
+    def reach(self, end: PathEnd, ranked: Sequence[Candidate], *, quick: bool = False) -> None:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
@@ -115,10 +115,13 @@ class CandidatePolisher:
             if not self._is_wanted(end, candidate):
                 return
             try:
-                self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
+                if quick:
+                    self._add(self._solve(end, candidate, PathSolver.solve_near, _QUICKLY))
+                else:
+                    self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
                 return
             except StructureError:
-                self._failures[end].append(candidate.action)
+                self._failures[end] += [] if quick else [candidate.action]
 
     def _add(self, one: SolvedPath) -> bool:
         """Whether a path is new; it is added then."""

@@ -74,7 +74,7 @@ class Ending(ABC):
 
     @abstractmethod
     def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """End a candidate there, in each of the ways that are worth trying."""
+        """End a candidate there, in each of the ways that are worth trying; at the time nearest to its own first."""
 
     @abstractmethod
     def misfit(self, point: Array, time: float, scale: Array) -> Array:

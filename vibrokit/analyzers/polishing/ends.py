@@ -44,7 +44,7 @@ class FaceEnding(Ending):
         return max(0.0, float(self._gaps(candidate.candidate.states).min()))
 
     def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """End on the face, at the time of the first state beyond it or of the nearest one, or up to half a period off.
+        """End on the face, at the time of the first state beyond it or of the nearest one, and up to half a period off.
 
         With forcing the time matters, and a candidate that comes too fast may have the wrong one.
         """
@@ -59,7 +59,8 @@ class FaceEnding(Ending):
         if not self.free_time:
             return [self._cut(candidate, count, 0, piece)]
         last, half = reached - (count - 1) * piece, self.propagator.pieces // 2
-        return [self._cut(candidate, count, shift, last) for shift in range(max(-half, 1 - count), half)]
+        shifts = sorted(range(max(-half, 1 - count), half), key=abs)
+        return [self._cut(candidate, count, shift, last) for shift in shifts]
 
     def misfit(self, point: Array, time: float, scale: Array) -> Array:
         goal = np.zeros_like(point)

@@ -98,28 +98,22 @@ class PathSolver:
         return self._once(found, fallback, final=from_orbit)
 
     def solve_at_once(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
-        """Polish a candidate with momenta by multiple shooting alone, by the first way to cut it that converges.
+        """Polish a candidate with momenta by multiple shooting alone, cut where it ends itself.
 
         It stays at the candidate, while descent may end at a cheaper path; between stiff stops descent often fails.
-        Raises StructureError if no way converges.
+        Raises StructureError if that does not converge.
         """
-        return self._at_once(cuts, _FROM_NEAR)
+        return self._at_once(cuts[0], _FROM_NEAR)
 
     def solve_exact(self, cuts: Sequence[Cut], worth: float = np.inf) -> ExtremalPath:
         """Polish, as `solve_at_once` does, a candidate that is a path but for its ends: in few evaluations or not."""
-        return self._at_once(cuts, _FROM_EXACT, nearly=0.0)
+        return self._at_once(cuts[0], _FROM_EXACT, nearly=0.0)
 
-    def _at_once(self, cuts: Sequence[Cut], evaluations: int, nearly: float = _NEARLY) -> ExtremalPath:
-        for cut in cuts:
-            assert cut.momenta is not None
-            source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
-            points = np.hstack([cut.states, cut.momenta])
-            try:
-                found = self._shot(source, first, points, cut, evaluations, nearly)
-                return self._once(found, _give_up)
-            except StructureError as error:
-                failure = error
-        raise failure
+    def _at_once(self, cut: Cut, evaluations: int, nearly: float = _NEARLY) -> ExtremalPath:
+        assert cut.momenta is not None
+        source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
+        points = np.hstack([cut.states, cut.momenta])
+        return self._once(self._shot(source, first, points, cut, evaluations, nearly), _give_up)
 
     def _once(self, found: ExtremalPath, fallback: Fallback, *, final: bool = True) -> ExtremalPath:
         """Complete a path, unless that was done, or failed for good, before."""

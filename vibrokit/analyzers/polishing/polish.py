@@ -123,10 +123,9 @@ class Polishing:
                     advance()
                 self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
                 if not quick:
+                    self._reach_all(quick=True)  # so that candidates that cost more need no costly polishing
                     self._polisher.polish_the_rest()
-                    for end in self._ends:
-                        if self._shared.wants(end, self._number):
-                            self._polisher.reach(end, self._waiting)
+                    self._reach_all()
                     self._waiting = []
         except KeyboardInterrupt as error:
             self._findings.append(Finding.stopped("polishing", error, self._problem.source))
@@ -143,6 +142,12 @@ class Polishing:
             for solved in found[certified:]:
                 self._findings += _remarks(self._problem, solved)
                 self._branches += _energies(self._problem, solved)
+
+    def _reach_all(self, *, quick: bool = False) -> None:
+        """Look for paths to the ends that no candidate led to."""
+        for end in self._ends:
+            if self._shared.wants(end, self._number):
+                self._polisher.reach(end, self._waiting, quick=quick)
 
     def _new(self) -> list[SolvedPath]:
         """The paths that were solved for since the last call, without those that another orbit has led to."""
