@@ -12,7 +12,7 @@ import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
-STARTS, PERIODS = 50, 20
+STARTS, PERIODS = 30, 20
 OMEGA, STOP, STIFFNESS = 0.57, 0.5, 50.0
 FINEST = [vk.FreeFlight(tolerance=1e-14), vk.Order8(tolerance=1e-14)]
 
@@ -64,9 +64,20 @@ def spread(states, periods):
         return np.array(list(pool.map(reference, states, [periods] * len(states), chunksize=10)))
 
 
+def starts_with_momenta():
+    states = starts()
+    states[:, 2:4] = np.random.default_rng(1).normal(0, 1e-3, (STARTS, 2))
+    return states
+
+
 @pytest.fixture(scope="module")
 def long_reference():
     return spread(starts(), PERIODS)
+
+
+@pytest.fixture(scope="module")
+def reference_with_momenta():
+    return spread(starts_with_momenta(), 2)
 
 
 @pytest.mark.slow
@@ -81,12 +92,9 @@ def test_state_over_twenty_periods(stepper, long_reference):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", FINEST, ids=lambda s: s.name)
-def test_momenta_and_action(stepper):
-    osc = vk.load_scene("hertz-0.570")
-    states = starts()[:40]
-    states[:, 2:4] = np.random.default_rng(1).normal(0, 1e-3, (40, 2))
-    exact = spread(states, 2)
-    ends = run_ensemble(osc, Flow.HAMILTONIAN, stepper, states, 2).states
+def test_momenta_and_action(stepper, reference_with_momenta):
+    osc, exact = vk.load_scene("hertz-0.570"), reference_with_momenta
+    ends = run_ensemble(osc, Flow.HAMILTONIAN, stepper, starts_with_momenta(), 2).states
     scale = np.abs(exact)
     scale[:, 2:4] = np.linalg.norm(exact[:, 2:4], axis=1, keepdims=True)
     scale[:, :2] = 1.0

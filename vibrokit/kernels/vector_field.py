@@ -32,13 +32,13 @@ class _Rates(Emitter):
 
 
 def _rates_function(text: SceneText) -> str:
-    """Function `rates(t, z, theta, out)`: the right-hand sides of states z (count, EQUATIONS) at one time."""
+    """Function `rates(t, z, theta, out)`: the right-hand sides of states z (count, EQUATIONS) at times t (count,)."""
     places = range(len(text.variables))
     values = [*(f"z[lane, {place}]" for place in places), *(["f"] if text.forced else []), *text.parameters]
     lines = ["@njit(**OPTIONS)", "def rates(t, z, theta, out):"]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    f = forcing(t, theta)"] if text.forced else []
     lines += ["    for lane in range(z.shape[0]):"]
+    lines += ["        f = forcing(t[lane], theta)"] if text.forced else []
     lines += [f"        {', '.join(f'out[lane, {place}]' for place in places)} = derivative({', '.join(values)})"]
     return "\n".join([*lines, ""])
 
@@ -59,13 +59,13 @@ class VectorField:
         self._theta = theta_of(scene)
         self._modules: dict[Flow, types.ModuleType] = {}
 
-    def rate(self, states: Array, time: float = 0.0) -> Array:
+    def rate(self, states: Array, time: float | Array = 0.0) -> Array:
         """Return b(q, t).
 
         Parameters
         ----------
         states : array (…, n)
-        time : float
+        time : float or array (…)
             In s.
 
         Returns
@@ -74,12 +74,12 @@ class VectorField:
         """
         return self._variational(states, time)[..., : np.shape(states)[-1]]
 
-    def jacobian(self, states: Array, time: float = 0.0) -> Array:
+    def jacobian(self, states: Array, time: float | Array = 0.0) -> Array:
         """Return ∂b/∂q, shape (…, n, n), at states of shape (…, n)."""
         size = np.shape(states)[-1]
         return self._variational(states, time)[..., size:].reshape(*np.shape(states), size)
 
-    def hamiltonian_rate(self, states: Array, momenta: Array, time: float = 0.0) -> Array:
+    def hamiltonian_rate(self, states: Array, momenta: Array, time: float | Array = 0.0) -> Array:
         """Return (q′, p′) of Hamilton's equations, shape (…, 2n), at states and momenta of shape (…, n).
 
         Raises
@@ -94,18 +94,19 @@ class VectorField:
         """Return the force of one excitation (m s⁻²)."""
         return float(self._module(Flow.STATE_VARIATIONAL).excitation(index, time, self._theta))
 
-    def _variational(self, states: Array, time: float) -> Array:
+    def _variational(self, states: Array, time: float | Array) -> Array:
         """b, and ∂b/∂q row by row: the rates of the variational equations where the matrix is the identity."""
         shape = np.shape(states)
         identity = np.broadcast_to(np.eye(shape[-1]).ravel(), (*shape[:-1], shape[-1] ** 2))
         return self._rates(Flow.STATE_VARIATIONAL, np.concatenate([states, identity], axis=-1), time)
 
-    def _rates(self, flow: Flow, variables: Array, time: float) -> Array:
+    def _rates(self, flow: Flow, variables: Array, time: float | Array) -> Array:
         flat = np.ascontiguousarray(variables.reshape(-1, variables.shape[-1]))
+        times = np.broadcast_to(time, variables.shape[:-1]).astype(float).ravel()
         out = np.empty_like(flat)
         rates = self._module(flow).rates
         with first_call(rates):
-            rates(float(time), flat, self._theta, out)
+            rates(times, flat, self._theta, out)
         return out.reshape(variables.shape)
 
     def _module(self, flow: Flow) -> types.ModuleType:

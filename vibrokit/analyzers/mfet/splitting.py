@@ -61,7 +61,9 @@ class Estimates:
         return float(ratios.std(ddof=1) / math.sqrt(len(ratios)))
 
     def shares(self) -> dict[int, tuple[float, float]]:
-        """Return the share of each target, and its standard error."""
+        """Return the share of each target, and its standard error; empty if no excursion left."""
+        if not math.isfinite(self.log_mean):
+            return {}
         weights = np.exp(self.log_values - self.log_values.max())
         found = {}
         for target in np.unique(self.targets[self.targets != NOT_OUT]).tolist():

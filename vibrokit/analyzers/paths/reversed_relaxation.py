@@ -25,7 +25,7 @@ from vibrokit.symbolic.flow_kind import Flow
 FINDER = "reversed relaxation"
 _NEAR = 1e-4  # of the distance between both ends: so far from them it begins and ends
 _BENT = 1e-3  # of the linearized rates: so little others are where the path begins
-_AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
+AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
 _CHUNK, _LASTING, _MOST_SAMPLES = 256, 64, 2**20  # samples: recorded at first, to be linear for, in all
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def _starts(end: PathEnd, problem: ExitProblem) -> Iterator[Array]:
 
 def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, goal: Array) -> Array | None:
     """The motion from a start to where it is linear about the equilibrium; None if it does not come there."""
-    around = Region.around(problem.structure.basins.region.bounds.T, _AROUND)
+    around = Region.around(problem.structure.basins.region.bounds.T, AROUND)
     osc, units, field = problem.scene, _units(problem), VectorField(problem.scene)
     wanted, jacobian = _NEAR * np.linalg.norm((start - goal) / units), field.jacobian(goal)
     recorded, samples = [start[None]], _CHUNK
@@ -101,8 +101,8 @@ def _units(problem: ExitProblem) -> Array:
     return np.array([1.0, problem.scene.natural_frequency])
 
 
-def momenta_of(field: VectorField, path: Array, flipped: Array, time: float = 0.0) -> tuple[Array, Array]:
-    """Momenta along a motion run backwards, at a time (s), and the rate at which it costs action.
+def momenta_of(field: VectorField, path: Array, flipped: Array, time: float | Array = 0.0) -> tuple[Array, Array]:
+    """Momenta along a motion run backwards, at a time or at times (s), and the rates at which it costs action.
 
     The damping acts twice, and noise makes up for it: p₂ = (b₂(x, −v) − b₂(x, v)) / g², the difference of the rates of
     v at the flipped states and at those of the path; p₁ follows from Hamilton's equation for p₂, where the change of g

@@ -6,8 +6,9 @@ the saddle to the attractor, run backwards, under the forces at that time. It en
 
 from __future__ import annotations
 
-import functools
+import itertools
 import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,12 @@ from scipy.interpolate import CubicSpline
 
 from vibrokit.analyzers.path_ends import AtSaddle
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.reversed_relaxation import FINDER, momenta_of
+from vibrokit.analyzers.paths.reversed_relaxation import AROUND, FINDER, momenta_of
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.progress import TRAJECTORIES, advance
+from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
 from vibrokit.structure.scales import doublings_of
@@ -31,8 +33,13 @@ _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from 
 _ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
 _PRECISION, _LEAST = 1e-5, 1e-6  # of guesses: relative error of a step, and relative to the size of the motion
 _MOST = 2  # for each saddle, the cheapest
+_MOST_EVALUATIONS = 40_000  # of the rates of all motions at once: some ten seconds, where contacts are short
 
 Array = NDArray[np.float64]
+
+
+class _TooManyError(Exception):
+    """More evaluations than guesses are worth."""
 
 
 def slow_relaxations(problem: ExitProblem, propagator: SegmentPropagator) -> list[Candidate]:
@@ -57,24 +64,26 @@ def _cheapest(problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle
     Newton's method cannot shift a path in time by more than a fraction of 1/ω_n.
     """
     saddle, step = problem.structure.saddles[end.number], propagator.pieces // _PHASES
-    between, pieces = _Between(problem, propagator, saddle), saddle.period * propagator.pieces
-
-    @functools.cache
-    def ending(phase: int) -> Candidate | None:
-        return _backwards(problem, propagator, end, between, phase)
+    relaxations, pieces = _Relaxations(problem, propagator, end), saddle.period * propagator.pieces
+    known: dict[int, Candidate | None] = {}
 
     def cost(phase: int) -> float:
-        path = ending(phase % pieces)
+        path = known[phase % pieces]
         return math.inf if path is None else path.action
 
+    def find(phases: Iterable[int]) -> None:
+        new = sorted({phase % pieces for phase in phases} - known.keys())
+        known.update(zip(new, relaxations.ending(new), strict=True))
+
+    find(range(0, pieces, step))
     costs = [cost(phase) for phase in range(0, pieces, step)]
     minima = [at for at, here in enumerate(costs) if here <= costs[at - 1] and here < costs[(at + 1) % len(costs)]]
-    found = []
-    for at in sorted(minima, key=costs.__getitem__)[:_MOST]:
-        phase, change = at * step, step
-        while (change := change // 2) >= 1:
-            phase = min((phase, phase - change, phase + change), key=cost)
-        found.append(ending(phase % pieces))
+    best, change = [at * step for at in sorted(minima, key=costs.__getitem__)[:_MOST]], step
+    while best and (change := change // 2) >= 1:
+        near = [(phase, phase - change, phase + change) for phase in best]
+        find(phase for three in near for phase in three)
+        best = [min(three, key=cost) for three in near]
+    found = [known[phase % pieces] for phase in best]
     return [path for path in found if path is not None]
 
 
@@ -103,68 +112,105 @@ class _Between:
         state: Array = self.orbits(time)[2:]
         return state
 
-    def flipped(self, time: float, state: Array) -> Array:
-        """Return a state with its velocity against the slow one reversed.
+    def flipped(self, times: Array, states: Array) -> Array:
+        """Return states (count, 2) with their velocities against the slow one reversed.
 
         On either orbit the slow velocity is that of the orbit, which is then left as it is; between them it depends
         linearly on x. Where the saddle's orbit crosses that of the attractor, it is that of the attractor.
         """
-        (x, v), (own_x, own_v, other_x, other_v) = state, self.orbits(time)
+        (x, v), (own_x, own_v, other_x, other_v) = states.T, self.orbits(times).T
         share = (x - own_x) / (other_x - own_x) if self.beside else 0.0
-        return np.array([x, 2 * (own_v + share * (other_v - own_v)) - v])
+        return np.column_stack([x, 2 * (own_v + share * (other_v - own_v)) - v])
 
-    def rate(self, time: float, state: Array) -> Array:
-        """Return the rate of a motion whose damping is reversed."""
-        return np.array([state[1], self.field.rate(self.flipped(time, state), time)[1]])
-
-
-def _backwards(
-    problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle, between: _Between, phase: int
-) -> Candidate | None:
-    """The cheaper of two motions from beside the saddle to the attractor, run backwards; None if neither comes there.
-
-    It begins on the section.
-    """
-    attractor, piece, pieces = problem.attractor, propagator.piece, propagator.pieces
-    time = phase * piece
-    there = between.saddle(time)
-    values, vectors = np.linalg.eig(between.field.jacobian(there, time))
-    if np.iscomplexobj(values) or values.max() <= 0:
-        return None
-    decay = -float(attractor.exponents.real.max())
-    least = (_DECAY / decay - math.log(_BESIDE) / float(values.max())) / piece
-    count = phase + pieces * math.ceil(max(0.0, least - phase) / pieces)  # pieces, from a section on
-    away = float(np.linalg.norm((between.attractor(time) - there) / propagator.units))
-    beside = vectors[:, np.argmax(values)] * np.array([1.0, -1.0])
-    beside *= _BESIDE * away / np.linalg.norm(beside / propagator.units)
-    times = time - piece * np.arange(count, -1, -1, dtype=np.float64)
-    found = []
-    for start in (there + beside, there - beside):
-        path = _carried(between, start, times, propagator.units)
-        if path is None or problem.is_out(path[:-1]).any():
-            continue
-        if np.linalg.norm((path[0] - between.attractor(times[0])) / propagator.units) <= _ARRIVED * away:
-            found.append(_candidate(problem, end, between, times, path))
-    return min(found, key=lambda candidate: candidate.action, default=None)
+    def rate(self, times: Array, states: Array) -> Array:
+        """Return the rates of motion whose damping is reversed."""
+        return np.column_stack([states[:, 1], self.field.rate(self.flipped(times, states), times)[:, 1]])
 
 
-def _carried(between: _Between, start: Array, times: Array, units: Array) -> Array | None:
-    """The states at times (count,) of a motion that ends at a start, followed backwards; None if it diverges."""
-    advance(unit=TRAJECTORIES)
-    goes = {"method": "LSODA", "t_eval": times[::-1], "rtol": _PRECISION, "atol": _LEAST * units}
-    with np.errstate(all="ignore"):
-        solved = solve_ivp(between.rate, (times[-1], times[0]), start, **goes)
-    if not solved.success or not np.isfinite(solved.y).all():
-        return None
-    path: Array = solved.y.T[::-1]
-    return path
+class _Relaxations:
+    """Motion from beside a saddle to the attractor, run backwards, to ends at various times: all followed at once."""
 
+    def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> None:
+        self._problem, self._propagator, self._end = problem, propagator, end
+        self._between = _Between(problem, propagator, problem.structure.saddles[end.number])
+        self._around = Region.around(problem.structure.basins.region.bounds.T, AROUND)
 
-def _candidate(problem: ExitProblem, end: AtSaddle, between: _Between, times: Array, path: Array) -> Candidate:
-    parts = [
-        momenta_of(between.field, state[None], between.flipped(time, state)[None], time)
-        for state, time in zip(path, times, strict=True)
-    ]
-    momenta, rates = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    action = float(np.trapezoid(rates, times)) if np.isfinite(momenta).all() else math.inf
-    return Candidate(problem.source, end.targets[0], times - times[0], path, action, FINDER, momenta)
+    def ending(self, phases: Sequence[int]) -> list[Candidate | None]:
+        """Return the cheaper of both motions for each phase of its end (pieces); None where neither arrives."""
+        starts, longest = list[tuple[int, Array, int]](), 0
+        for phase in phases:
+            beside = self._beside(phase)
+            if beside is not None:
+                offset, count = beside
+                longest = max(longest, count)
+                starts += [(phase, offset, count), (phase, -offset, count)]
+        found: dict[int, Candidate] = {}
+        for (phase, _, count), path in zip(starts, self._carried(starts, longest), strict=True):
+            candidate = self._candidate(phase, path[: count + 1][::-1])
+            if candidate is not None and (phase not in found or candidate.action < found[phase].action):
+                found[phase] = candidate
+        return [found.get(phase) for phase in phases]
+
+    def _beside(self, phase: int) -> tuple[Array, int] | None:
+        """Where the motion ends, from the saddle, and how many pieces it takes from a section on; None if it cannot."""
+        propagator, time = self._propagator, phase * self._propagator.piece
+        there = self._between.saddle(time)
+        values, vectors = np.linalg.eig(self._between.field.jacobian(there, time))
+        if np.iscomplexobj(values) or values.max() <= 0:
+            return None
+        decay = -float(self._problem.attractor.exponents.real.max())
+        least = (_DECAY / decay - math.log(_BESIDE) / float(values.max())) / propagator.piece
+        beside = vectors[:, np.argmax(values)] * np.array([1.0, -1.0])
+        beside *= _BESIDE * self._distance(time) / np.linalg.norm(beside / propagator.units)
+        return beside, phase + propagator.pieces * math.ceil(max(0.0, least - phase) / propagator.pieces)
+
+    def _distance(self, time: float) -> float:
+        """The distance from the saddle to the attractor."""
+        between = self._between
+        return float(np.linalg.norm((between.attractor(time) - between.saddle(time)) / self._propagator.units))
+
+    def _carried(self, starts: Sequence[tuple[int, Array, int]], count: int) -> list[Array]:
+        """States (count + 1, 2) of each motion, from its end on backwards; NaN where that takes too many steps.
+
+        A motion that has gone far from the region is not followed, since it may diverge.
+        """
+        if not starts:
+            return []
+        between, units, piece = self._between, self._propagator.units, self._propagator.piece
+        ends = piece * np.array([phase for phase, _, _ in starts], dtype=np.float64)
+        first = np.array([between.saddle(time) + offset for time, (_, offset, _) in zip(ends, starts, strict=True)])
+        evaluations = itertools.count(1)
+
+        def backwards(elapsed: float, flat: Array) -> Array:
+            if next(evaluations) > _MOST_EVALUATIONS:
+                raise _TooManyError
+            states = flat.reshape(-1, 2)
+            rates = np.where(self._around.contains(states)[:, None], between.rate(ends - elapsed, states), 0.0)
+            return -rates.ravel()
+
+        nothing = np.full((len(starts), count + 1, 2), np.nan)
+        goes = {"rtol": _PRECISION, "atol": _LEAST * np.tile(units, len(starts))}
+        try:
+            with np.errstate(all="ignore"):
+                solved = solve_ivp(
+                    backwards, (0.0, piece * count), first.ravel(), method="DOP853",
+                    t_eval=piece * np.arange(count + 1, dtype=np.float64), **goes,
+                )  # fmt: skip
+        except _TooManyError:
+            return list(nothing)
+        finally:
+            advance(len(starts), unit=TRAJECTORIES)
+        return list(solved.y.T.reshape(count + 1, -1, 2).transpose(1, 0, 2) if solved.success else nothing)
+
+    def _candidate(self, phase: int, path: Array) -> Candidate | None:
+        """A path as a candidate; None if it does not begin near the attractor, or is out before its end."""
+        problem, between, piece = self._problem, self._between, self._propagator.piece
+        times = piece * np.arange(phase + 1 - len(path), phase + 1, dtype=np.float64)
+        if not self._around.contains(path).all() or problem.is_out(path[:-1]).any():
+            return None
+        away = np.linalg.norm((path[0] - between.attractor(times[0])) / self._propagator.units)
+        if away > _ARRIVED * self._distance(phase * piece):
+            return None
+        momenta, rates = momenta_of(between.field, path, between.flipped(times, path), times)
+        action = float(np.trapezoid(rates, times)) if np.isfinite(momenta).all() else math.inf
+        return Candidate(problem.source, self._end.targets[0], times - times[0], path, action, FINDER, momenta)

@@ -23,7 +23,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _SAME = 1e-9  # of a section interval
 _MEMORY = 2.0  # GiB
-_NODES = (200, 200)  # enough for an importance function, if they resolve the density; otherwise as many as needed
+_NODES = (120, 120)  # for an importance function, if they resolve the density; otherwise as many as needed
 _BELOW = 20.0  # in ln: values so far below the least of the core are not computed
 
 Array = NDArray[np.float64]
