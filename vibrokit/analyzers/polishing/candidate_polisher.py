@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -46,6 +47,7 @@ class CandidatePolisher:
         self._passing = PassingSearch(self.nodes)
         self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
         self._unsolved: list[Candidate] = []  # that led nowhere quickly
+        self._beside: list[tuple[PathEnd, Candidate]] = []  # shots that led to a path; descent may find a cheaper one
         self._overpricing: dict[int, float] = {}  # by target: action of the first shot that led to a path, over its
 
     def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
@@ -81,44 +83,45 @@ class CandidatePolisher:
             )  # fmt: skip
 
     def polish_the_rest(self) -> None:
-        """Polish what was left, unless paths are known that cost as little."""
+        """Polish what was left, unless paths are known that cost as little; then descend from shots that led to one."""
         unsolved, self._unsolved = self._unsolved, []
-        for candidate in unsolved:
+        for candidate in sorted(unsolved, key=lambda each: each.action):
             if candidate.action < self._known(candidate):
                 self.polish(candidate)
+        beside, self._beside = self._beside, []
+        for end, candidate in beside:
+            with contextlib.suppress(StructureError):
+                self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
 
     def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
         """Whether a path to an end is found; by multiple shooting first where momenta are known."""
-        found, at_once = False, PathSolver.solve_exact if candidate.exact else PathSolver.solve_at_once
-        first = () if candidate.momenta is None else (at_once,)
-        ways = (first or (PathSolver.solve_near,)) if quick else (*first, PathSolver.solve)
-        for way in ways:
+        at_once = PathSolver.solve_exact if candidate.exact else PathSolver.solve_at_once
+        near = PathSolver.solve_near if quick else PathSolver.solve
+        for way in (near,) if candidate.momenta is None else (at_once,) if quick else (at_once, near):
             try:
                 one = self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,)))
             except StructureError as error:
                 failures.append(str(error))
                 self._failures[end] += [] if quick else [candidate.action]
-            else:
-                found = True
-                if candidate.momenta is not None:
-                    self._overpricing.setdefault(candidate.target, max(1.0, candidate.action / one.action))
-                if not self._add(one):  # another candidate has led there, and to where the other way leads
-                    break
-        return found
+                continue
+            if candidate.momenta is not None:
+                self._overpricing.setdefault(candidate.target, max(1.0, candidate.action / one.action))
+            if self._add(one) and way is at_once:
+                self._beside.append((end, candidate))
+            return True
+        return False
 
     def reach(self, end: PathEnd, ranked: Sequence[Candidate], *, quick: bool = False) -> None:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
+        way, least = (PathSolver.solve_near, _QUICKLY) if quick else (PathSolver.solve, self._least((end,)))
         near = list(itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES))
         for candidate in (*near, *(each for each in ranked[:1] if each not in near)):
             if not self._is_wanted(end, candidate):
                 return
             try:
-                if quick:
-                    self._add(self._solve(end, candidate, PathSolver.solve_near, _QUICKLY))
-                else:
-                    self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
+                self._add(self._solve(end, candidate, way, least))
                 return
             except StructureError:
                 self._failures[end] += [] if quick else [candidate.action]

@@ -113,7 +113,9 @@ class PathSolver:
         assert cut.momenta is not None
         source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
         points = np.hstack([cut.states, cut.momenta])
-        return self._once(self._shot(source, first, points, cut, evaluations, nearly), _give_up)
+        begun = "at once", first, evaluations, cut.last, points.tobytes()
+        found = self._attempted(begun, lambda: self._shot(source, first, points, cut, evaluations, nearly))
+        return self._once(found, _give_up)
 
     def _once(self, found: ExtremalPath, fallback: Fallback, *, final: bool = True) -> ExtremalPath:
         """Complete a path, unless that was done, or failed for good, before."""

@@ -106,8 +106,8 @@ class Polishing:
     def add(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
         """Polish candidates, the cheapest first, and certify the paths that they lead to.
 
-        Those that came before are left out: finer graphs give some paths again. Those that lead to no path quickly are
-        left for the next call, after the candidates of that one.
+        Those that came before are left out: finer graphs give some paths again. Shots are polished quickly first. What
+        leads to no path quickly is polished at the end, or left for the next call, after the candidates of that one.
         """
         new = {_key(each): each for each in candidates}
         ranked = sorted((new[key] for key in new if key not in self._seen), key=lambda each: each.action)
@@ -118,7 +118,7 @@ class Polishing:
                 for candidate in ranked:
                     if _key(candidate) not in self._shared.fruitless:
                         before = len(self._polisher.solved)
-                        self._polisher.polish(candidate, quick=quick)
+                        self._polisher.polish(candidate, quick=quick or candidate.momenta is not None)
                         self._shared.note(candidate, self._polisher.solved[before:], self._number)
                     advance()
                 self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
@@ -144,9 +144,9 @@ class Polishing:
                 self._branches += _energies(self._problem, solved)
 
     def _reach_all(self, *, quick: bool = False) -> None:
-        """Look for paths to the ends that no candidate led to."""
+        """Look for paths to the ends that no candidate led to; quickly for those that are not one of many in a set."""
         for end in self._ends:
-            if self._shared.wants(end, self._number):
+            if self._shared.wants(end, self._number) and not (quick and end.one_of_many):
                 self._polisher.reach(end, self._waiting, quick=quick)
 
     def _new(self) -> list[SolvedPath]:
