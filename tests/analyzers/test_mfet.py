@@ -18,6 +18,8 @@ import vibrokit as vk
 from tests.scenes import Coloured, double_well, scene
 from vibrokit.analyzers.mfet.direct import Exits
 from vibrokit.analyzers.mfet.estimates import exponential_p_value, mean_tests, rate_of
+from vibrokit.analyzers.mfet.excursions import NOT_OUT
+from vibrokit.analyzers.mfet.splitting import Estimates
 from vibrokit.errors import CheckpointError, SceneError, StructureError
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.codes import Code
@@ -168,6 +170,13 @@ def test_matrix_of_rates_and_occupancies(structure):
     assert float(share[0]) == pytest.approx(0.5, abs=4 * 0.5 * 0.5 * math.sqrt(2) * 0.1)  # by symmetry
     with pytest.raises(StructureError):
         vk.occupancies(vk.LeastAction())
+
+
+def test_no_excursion_leaves():
+    nobody = Estimates(np.full(16, -np.inf), np.full((16, 4), NOT_OUT))
+    with np.errstate(all="raise"):
+        assert nobody.shares() == {}
+        assert nobody.error == math.inf
 
 
 # --- the same bits

@@ -32,6 +32,7 @@ from vibrokit.results.energy import Bound
 from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
 
+solve = PathSolver.solve
 DAMPING = 0.3
 PIECE = 2 * np.pi / 8  # of a candidate; ω_n = 1
 BARRIER = 0.25
@@ -116,6 +117,24 @@ def test_a_guess_far_costlier_than_a_known_path_is_skipped_and_counted(problem):
     (finding,) = found.findings
     assert finding.code is Code.CANDIDATES_SKIPPED
     assert finding.values == {"skipped": 1, "total": 2, "factor": 1.25}
+
+
+def shot(path, momentum, action):
+    """A candidate of an action plot, with one momentum at all its states."""
+    states = np.asarray(path, dtype=float)
+    return dataclasses.replace(guess(states, action), momenta=np.full_like(states, momentum))
+
+
+def test_shots_that_cost_more_than_a_known_path_are_tried_quickly_only(problem, monkeypatch):
+    """The first shot leads nowhere; the second one, a path that costs less, comes first all the same."""
+    path = only(polish(problem, (guess(straight()),))).path
+    good = Candidate(0, 1, path.t, path.q, 0.31, "guess", path.p)
+    descents = []
+    monkeypatch.setattr(PathSolver, "solve", lambda *given: descents.append(given) or solve(*given))
+    found = polish(problem, (shot(straight(), 5.0, 0.305), good))
+    assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
+    assert len(descents) == 1  # from the second shot, whose path was new
+    assert len(polish(problem, (shot(straight(), 5.0, 0.305),)).branches) == 1  # alone, it is polished by descent
 
 
 NO_PATH = [[-1.0, 0.0], [np.nan, 0.0], [0.5, 0.0]]

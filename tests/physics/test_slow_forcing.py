@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 import scipy.sparse
 from scipy.integrate import quad, solve_bvp
+from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import spsolve
 
 import vibrokit as vk
+from vibrokit.analyzers.paths import slow_relaxation
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.leg import pieces_of
+from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.energy import Bound
+from vibrokit.symbolic.flow_kind import Flow
 
 ZETA, TILT = 0.1, 0.15
 SLOW = (0.3, 0.1, 0.05)
@@ -72,6 +78,33 @@ def test_exponents_of_the_saddle(frequency):
     mean = quad(of_the_moment, 0, 2 * math.pi)[0] / (2 * math.pi)
     assert growth == pytest.approx(mean, abs=0.1 * frequency**2)
     assert saddle.multipliers[0].real == pytest.approx(math.exp(growth * saddle.duration), rel=1e-9)
+
+
+def relaxations():
+    slow = structure(0.3)
+    problem = ExitProblem(scene(0.3), slow, slow.attractors[0], vk.LeaveBasin())
+    stepper = problem.single_stepper(Flow.STATE)
+    return slow_relaxation.slow_relaxations(problem, SegmentPropagator(scene(0.3), stepper, max(pieces_of(scene(0.3)))))
+
+
+def test_guesses_cost_what_their_motion_costs():
+    """½ ∫ (x″ + 2ζ x′ − x + x³ − f)² dt, by splines; they lead from the well at −1 to the hilltop.
+
+    Samples are 0.65 apart, and the guess's action is that of the trapezoidal rule: h²/12 = 0.035 of the curvature.
+    """
+    guesses = relaxations()
+    assert guesses
+    for guess in guesses:
+        t, (x, v) = guess.times, guess.states.T
+        force = CubicSpline(t, v)(t, 1) + 2 * ZETA * v - x + x**3 - TILT * np.cos(0.3 * t)
+        assert guess.action == pytest.approx(0.5 * CubicSpline(t, force**2).integrate(t[0], t[-1]), rel=0.02)
+        np.testing.assert_allclose(CubicSpline(t, x)(t, 1)[1:-1], v[1:-1], atol=0.02)
+        assert x[0] < -0.8 < -0.4 < x[-1] < 0.4
+
+
+def test_where_they_take_too_many_steps_there_are_no_guesses(monkeypatch):
+    monkeypatch.setattr(slow_relaxation, "_MOST_EVALUATIONS", 100)
+    assert relaxations() == []
 
 
 @pytest.mark.long

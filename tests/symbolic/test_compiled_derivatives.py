@@ -293,7 +293,7 @@ def test_located(name, tmp_path):
 
 @pytest.mark.parametrize("name", CASES)
 def test_vector_field(name):
-    """b, its Jacobian and Hamilton's equations, at many states and one time."""
+    """b, its Jacobian and Hamilton's equations, at many states and one time; then at a time for each."""
     case, time = CASES[name], 7.7
     field, states = VectorField(case.scene), np.array(case.points)
     momenta = np.tile(MOMENTA, (len(states), 1))
@@ -311,6 +311,9 @@ def test_vector_field(name):
                 assert abs(mpf(value) - target) <= TOLERANCE * max(1, abs(target))
     np.testing.assert_array_equal(field.rate(states[0], time), rates[0])
     np.testing.assert_array_equal(field.jacobian(states[None], time), jacobians[None])
+    times = np.linspace(0.0, 5.0, len(states))
+    alone = [field.hamiltonian_rate(*each) for each in zip(states, momenta, times, strict=True)]
+    np.testing.assert_array_equal(field.hamiltonian_rate(states, momenta, times), alone)
 
 
 def test_the_force_of_each_excitation():
