@@ -8,3 +8,8 @@ def paper():
     """The paper's scene at ω = 0.570 and its structure."""
     osc = vk.load_scene("hertz-0.570")
     return osc, vk.find_structure(osc, cells=(100, 100))
+
+
+def pytest_collection_modifyitems(items):
+    """Put tutorials first: workers take the last tests from each other, and would run tutorials twice."""
+    items.sort(key=lambda item: item.path.name != "test_tutorials.py")

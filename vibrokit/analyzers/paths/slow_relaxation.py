@@ -21,7 +21,7 @@ from vibrokit.analyzers.paths.reversed_relaxation import AROUND, FINDER, momenta
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
-from vibrokit.progress import TRAJECTORIES, advance
+from vibrokit.progress import TRAJECTORIES, advance, current
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
@@ -179,9 +179,10 @@ class _Relaxations:
         between, units, piece = self._between, self._propagator.units, self._propagator.piece
         ends = piece * np.array([phase for phase, _, _ in starts], dtype=np.float64)
         first = np.array([between.saddle(time) + offset for time, (_, offset, _) in zip(ends, starts, strict=True)])
-        evaluations = itertools.count(1)
+        evaluations, work = itertools.count(1), current()
 
         def backwards(elapsed: float, flat: Array) -> Array:
+            work.check()
             if next(evaluations) > _MOST_EVALUATIONS:
                 raise _TooManyError
             states = flat.reshape(-1, 2)
@@ -198,8 +199,7 @@ class _Relaxations:
                 )  # fmt: skip
         except _TooManyError:
             return list(nothing)
-        finally:
-            advance(len(starts), unit=TRAJECTORIES)
+        advance(len(starts), unit=TRAJECTORIES)
         return list(solved.y.T.reshape(count + 1, -1, 2).transpose(1, 0, 2) if solved.success else nothing)
 
     def _candidate(self, phase: int, path: Array) -> Candidate | None:
