@@ -1,6 +1,7 @@
 """What LeastAction keeps when it is stopped, and attractors that have left already."""
 
 import dataclasses
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,8 +100,8 @@ def estimate(target, value, error):
     return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
 
-def graph_of(estimates, finer=0, side=180.0, steps=64):
-    cheapest = {each.target: SimpleNamespace(side=side, steps=steps) for each in estimates}
+def graph_of(estimates, finer=0, side=180.0, steps=64, known=math.inf):
+    cheapest = {each.target: SimpleNamespace(side=side, steps=steps, known=known) for each in estimates}
     return SimpleNamespace(estimates=estimates, finer=finer, cheapest=cheapest, most_steps=64)
 
 
@@ -141,10 +142,13 @@ def test_the_gain_of_a_finer_graph_is_that_of_twice_the_nodes(side, useless):
     assert Evidence(NEVER_REPEATS, (estimate(1, 1.0, 0.0),), graph, rougher).unresolvable == useless
 
 
-@pytest.mark.parametrize(("finer", "useless"), [(0, {1}), (1, set())])
-def test_a_first_graph_on_grids_far_too_large_for_a_path_tells_nothing_of_finer_ones(finer, useless):
-    graph = graph_of([estimate(1, 1.0, 2.0)], finer)
-    assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph).unresolvable == useless
+@pytest.mark.parametrize("rougher", [None, graph_of([estimate(1, 1.0, 2.0)], side=90.0)], ids=["first", "second"])
+@pytest.mark.parametrize(
+    ("finer", "known", "useless"), [(0, math.inf, {1}), (1, math.inf, set()), (1, 0.5, set()), (1, 1e-3, {1})]
+)
+def test_grids_far_too_large_for_a_path_found_since_tell_nothing_of_finer_ones(finer, known, useless, rougher):
+    graph = graph_of([estimate(1, 1.0, 2.0)], finer, known=known)
+    assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph, rougher).unresolvable == useless
 
 
 @pytest.mark.parametrize(

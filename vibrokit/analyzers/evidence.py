@@ -95,11 +95,12 @@ class Evidence:
         return found
 
     def _will_differ(self, estimate: ActivationEnergy, path: ActivationEnergy) -> bool:
-        """Whether the next grids are far smaller, around the path, or have shorter steps, and so tell more."""
+        """Whether the next grids are for a far cheaper path, found since, or have shorter steps: they tell more."""
         assert self.graph is not None
-        smaller = self.rougher is None and estimate.value > LOOSE * path.value
-        shorter = self.graph.cheapest[estimate.target].steps < self.graph.most_steps
-        return smaller or (shorter and estimate.value < BELOW * path.value)
+        solved = self.graph.cheapest[estimate.target]
+        cheaper = LOOSE * path.value < solved.known and path.value < estimate.value
+        shorter = solved.steps < self.graph.most_steps
+        return cheaper or (shorter and estimate.value < BELOW * path.value)
 
     def _gain(self, estimate: ActivationEnergy) -> float:
         """By which the error of an estimate of the graph is expected to fall when the nodes along a side double."""

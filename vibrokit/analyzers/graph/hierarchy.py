@@ -28,6 +28,7 @@ class TargetEstimate:
     unsettled: float  # the part of the value by which more sweeps may change it
     side: float  # nodes along a side of the grid, the geometric mean of both
     steps: int  # in a section interval
+    known: float  # least action of the paths there that were known before; infinite for none
     candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
 
 
@@ -77,7 +78,8 @@ class GridHierarchy:
             value = error = self._value(self.whole, target)
         candidates = tuple(path.candidate for path in paths)
         side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
-        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, candidates)
+        known = min((path.value for path in self.coverage.branches if path.target in target.labels), default=np.inf)
+        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, known, candidates)
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""
