@@ -231,6 +231,7 @@ def test_the_defaults_find_the_cheapest_path_known(polished, source):
     assert 0.9 * energy.value < energy.lower <= CHEAPEST[source] * (1 + 1e-6)
 
 
+@pytest.mark.long
 def test_the_bounds_contain_a_path_that_a_coarse_graph_misses(paper):
     """On 40 × 40 and 80 × 80 nodes the only path polished from the hammering state is 4 % above the cheapest."""
     osc, structure = paper
