@@ -32,7 +32,7 @@ from vibrokit.results.energy import Bound
 from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
 
-solve = PathSolver.solve
+solve, solve_at_once = PathSolver.solve, PathSolver.solve_at_once
 DAMPING = 0.3
 PIECE = 2 * np.pi / 8  # of a candidate; ω_n = 1
 BARRIER = 0.25
@@ -125,16 +125,17 @@ def shot(path, momentum, action):
     return dataclasses.replace(guess(states, action), momenta=np.full_like(states, momentum))
 
 
-def test_shots_that_cost_more_than_a_known_path_are_tried_quickly_only(problem, monkeypatch):
-    """The first shot leads nowhere; the second one, a path that costs less, comes first all the same."""
+def test_all_shots_are_tried_quickly_before_one_is_polished_with_all_means(problem, monkeypatch):
+    """The first shot leads nowhere; the second one is a path."""
     path = only(polish(problem, (guess(straight()),))).path
     good = Candidate(0, 1, path.t, path.q, 0.31, "guess", path.p)
-    descents = []
-    monkeypatch.setattr(PathSolver, "solve", lambda *given: descents.append(given) or solve(*given))
+    tried = []
+    monkeypatch.setattr(PathSolver, "solve_at_once", lambda *given: tried.append("quickly") or solve_at_once(*given))
+    monkeypatch.setattr(PathSolver, "solve", lambda *given: tried.append("by descent") or solve(*given))
     found = polish(problem, (shot(straight(), 5.0, 0.305), good))
     assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
-    assert len(descents) == 1  # from the second shot, whose path was new
-    assert len(polish(problem, (shot(straight(), 5.0, 0.305),)).branches) == 1  # alone, it is polished by descent
+    assert tried[:2] == ["quickly", "quickly"]
+    assert tried.count("by descent") == 2  # from each: from the path that was new, too
 
 
 NO_PATH = [[-1.0, 0.0], [np.nan, 0.0], [0.5, 0.0]]

@@ -83,10 +83,14 @@ class CandidatePolisher:
             )  # fmt: skip
 
     def polish_the_rest(self) -> None:
-        """Polish what was left, unless paths are known that cost as little; then descend from shots that led to one."""
+        """Polish what was left, then descend from shots that led to a path.
+
+        A shot costs more than the path near it, a candidate of a grid may cost less: of these, only those that cost
+        less than a known path.
+        """
         unsolved, self._unsolved = self._unsolved, []
         for candidate in sorted(unsolved, key=lambda each: each.action):
-            if candidate.action < self._known(candidate):
+            if candidate.momenta is not None or candidate.action < self._known(candidate):
                 self.polish(candidate)
         beside, self._beside = self._beside, []
         for end, candidate in beside:
