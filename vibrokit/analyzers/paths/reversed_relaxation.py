@@ -25,7 +25,7 @@ from vibrokit.symbolic.flow_kind import Flow
 FINDER = "reversed relaxation"
 _NEAR = 1e-4  # of the distance between both ends: so far from them it begins and ends
 _BENT = 1e-3  # of the linearized rates: so little others are where the path begins
-AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
+_AROUND = 2.0  # widths of the region, on each side, within which the motion is followed
 _CHUNK, _LASTING, _MOST_SAMPLES = 256, 64, 2**20  # samples: recorded at first, to be linear for, in all
 
 Array = NDArray[np.float64]
@@ -69,8 +69,7 @@ def _starts(end: PathEnd, problem: ExitProblem) -> Iterator[Array]:
 
 def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, goal: Array) -> Array | None:
     """The motion from a start to where it is linear about the equilibrium; None if it does not come there."""
-    around = Region.around(problem.structure.basins.region.bounds.T, AROUND)
-    osc, units, field = problem.scene, _units(problem), VectorField(problem.scene)
+    around, osc, units, field = followed_within(problem), problem.scene, _units(problem), VectorField(problem.scene)
     wanted, jacobian = _NEAR * np.linalg.norm((start - goal) / units), field.jacobian(goal)
     recorded, samples = [start[None]], _CHUNK
     while samples < _MOST_SAMPLES:
@@ -99,6 +98,11 @@ def _is_equilibrium(saddle: Saddle) -> bool:
 
 def _units(problem: ExitProblem) -> Array:
     return np.array([1.0, problem.scene.natural_frequency])
+
+
+def followed_within(problem: ExitProblem) -> Region:
+    """Return the region within which motion is followed; farther off it may never come to rest."""
+    return Region.around(problem.structure.basins.region.bounds.T, _AROUND)
 
 
 def momenta_of(field: VectorField, path: Array, flipped: Array, time: float | Array = 0.0) -> tuple[Array, Array]:

@@ -17,12 +17,11 @@ from scipy.interpolate import CubicSpline
 
 from vibrokit.analyzers.path_ends import AtSaddle
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.reversed_relaxation import AROUND, FINDER, momenta_of
+from vibrokit.analyzers.paths.reversed_relaxation import FINDER, followed_within, momenta_of
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.progress import TRAJECTORIES, advance, current
-from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
 from vibrokit.structure.scales import doublings_of
@@ -133,7 +132,7 @@ class _Relaxations:
     def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> None:
         self._problem, self._propagator, self._end = problem, propagator, end
         self._between = _Between(problem, propagator, problem.structure.saddles[end.number])
-        self._around = Region.around(problem.structure.basins.region.bounds.T, AROUND)
+        self._around = followed_within(problem)
 
     def ending(self, phases: Sequence[int]) -> list[Candidate | None]:
         """Return the cheaper of both motions for each phase of its end (pieces); None where neither arrives."""

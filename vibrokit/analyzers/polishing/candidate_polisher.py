@@ -100,8 +100,11 @@ class CandidatePolisher:
     def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
         """Whether a path to an end is found; by multiple shooting first where momenta are known."""
         at_once = PathSolver.solve_exact if candidate.exact else PathSolver.solve_at_once
-        near = PathSolver.solve_near if quick else PathSolver.solve
-        for way in (near,) if candidate.momenta is None else (at_once,) if quick else (at_once, near):
+        if candidate.momenta is None:
+            ways: tuple[Way, ...] = (PathSolver.solve_near if quick else PathSolver.solve,)
+        else:
+            ways = (at_once,) if quick else (at_once, PathSolver.solve)
+        for way in ways:
             try:
                 one = self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,)))
             except StructureError as error:
