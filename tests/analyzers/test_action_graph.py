@@ -139,7 +139,7 @@ def touching(damping, natural=1.0):
     )
     structure = vk.find_structure(osc, cells=(20, 20), starts=(4, 4), saddles=False, manifolds=False)
     clear = next(a.label for a in structure.attractors if a.impacts == 0)
-    graph = GraphSearch(nodes=(160, 160), steps_per_period=8)
+    graph = GraphSearch(nodes=(120, 120), steps_per_period=8)
     return osc, structure, clear, graph.search(problem(osc, structure, clear, vk.FirstContact()))
 
 
@@ -357,7 +357,7 @@ BOXES = [
 ]
 
 
-@pytest.mark.parametrize("scene", [(0.05, 1.0), (0.5, 1.0), (0.1, 1.7)])
+@pytest.mark.parametrize("scene", [(0.05, 1.0), (0.5, 1.7)])
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_a_box_costs_what_its_cheapest_face_costs(scene, box):
     """2ζω_n³ b² for |x| = b, at rest; 2ζω_n c² for |v| = c, at x = 0."""

@@ -196,7 +196,7 @@ def test_any_executor_gives_the_same_bits(splitting, structure):
 
 @pytest.mark.slow
 def test_workers_of_dask_one_of_which_is_killed(structure):
-    analyzer = vk.MFET(intensities=(0.02,), source=0, target_error=0.08, splitting=False, escapes=2)
+    analyzer = vk.MFET(intensities=(0.022,), source=0, target_error=0.08, splitting=False, escapes=2)
     alone = analyzer.run(WELL, structure)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,

@@ -131,7 +131,11 @@ def test_a_path_with_many_short_impacts_is_certified():
         barriers=(vk.Barrier(law, 0.5, "right"), vk.Barrier(law, -0.5, "left")), noise=vk.WhiteNoise(1e-4),
     )  # fmt: skip
     structure = vk.find_structure(osc, cells=(60, 60), manifolds=False, rng=0)
-    energy = vk.LeastAction(source="hammering", graph=None).run(osc, structure).energies[0]
+    energy = (
+        vk.LeastAction(source="hammering", graph=None, shooting=vk.Shooting(points=4000))
+        .run(osc, structure)
+        .energies[0]
+    )
     assert energy.certificate is not None
     assert energy.residual <= CERTIFIED
     part = {name: osc.parameters[name] * slope / energy.value for name, slope in energy.sensitivity.items()}

@@ -39,7 +39,7 @@ def test_cut_off_and_grid_of_the_double_well():
     assert actions[0] > actions[1] > actions[2] >= 0.1 * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("frequency", [0.570, 0.525])
+@pytest.mark.parametrize("frequency", [0.570, pytest.param(0.525, marks=pytest.mark.long)])
 def test_clear_states(frequency):
     """From guesses that know nothing of the path."""
     model, source, target = (reference.paper(frequency), *ends(frequency, "clear"))
@@ -47,7 +47,8 @@ def test_clear_states(frequency):
     check(reference.followed_in(guess, model.period / COARSE / 40), reference.ENERGIES[frequency, "clear"])
 
 
-@pytest.mark.parametrize(("frequency", "before"), [(0.570, 24), pytest.param(0.525, 16, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize(("frequency", "before"), [(0.570, 24), (0.525, 16)])
 def test_hammering_states(frequency, before):
     model, source, target = (reference.paper(frequency), *ends(frequency, "hammering"))
     guess = pieced(model, source, target, known_sections(frequency), COARSE, before, 6)

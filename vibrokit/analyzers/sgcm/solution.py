@@ -176,6 +176,27 @@ class DensitySolver:
                 before = AtIntensity(intensity, grid, found, transition, cores, known, steps)
                 yield before
 
+    def guide(self, intensity: float, executor: Executor) -> AtIntensity:
+        """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
+
+        It is one at more noise, on the grid of exploration, if this noise needs too many nodes. All steps are taken:
+        with half of them the variance of splitting doubles (double well, ζ = 0.05, depth 26).
+        """
+        explored, closer = self.explored(intensity, executor)
+        grid = self._grid(closer.region, self._sufficient(closer, intensity))
+        try:
+            self._check_resolution(grid, intensity)
+            needed = DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
+            check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
+        except StructureError:
+            return explored
+        start, committors = explored.begun(grid, intensity)
+        transition = Propagator(self._flow(grid, self.steps), intensity, executor)
+        cores = self._cores.on(grid, intensity)
+        found = quasi_stationary(transition, start, cores, self._cores.relaxation, _EXPLORED_TO)
+        known = self._committors(transition, found, cores, committors, _EXPLORED_TO)
+        return AtIntensity(intensity, grid, found, transition, cores, known) if known else explored
+
     def explored(self, intensity: float, executor: Executor) -> tuple[AtIntensity, DensityGrid]:
         """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
@@ -219,6 +240,12 @@ class DensitySolver:
             max(_FEWEST, min(math.ceil(fine * count), _MOST), min(math.ceil(coarse * count), _LARGEST))
             for count in explored.shape
         )
+        return nx, nv
+
+    def _sufficient(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
+        """The fewest nodes that resolve the density."""
+        factor = math.sqrt(self._cores.resolved(explored, _SPARE * _NARROWEST) / intensity)
+        nx, nv = (max(_FEWEST, min(math.ceil(factor * count), _LARGEST)) for count in explored.shape)
         return nx, nv
 
     def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:

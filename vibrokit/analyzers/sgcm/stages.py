@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,13 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
-from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
+from vibrokit.analyzers.sgcm.solution import DensitySolver
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAME = 1e-9  # of a section interval
 _MEMORY = 2.0  # GiB
-# For an importance function, if they resolve the density; otherwise as many as needed. With (200, 200) the errors of 48
-# replicas are the same within their spread (double wells, depths 6 to 27), and solving takes three times as long.
-_NODES = (120, 120)
 _BELOW = 20.0  # in ln: values so far below the least of the core are not computed
 
 Array = NDArray[np.float64]
@@ -84,22 +81,16 @@ def committor_stages(problem: ExitProblem, intensity: float) -> CommittorStages:
     Raises StructureError if there is none.
     """
     orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
-    steps = steps_for(problem.osc, np.concatenate(orbits))
-    for nodes in (_NODES, None):
-        solver = DensitySolver(problem, nodes, steps, _MEMORY)
-        with contextlib.suppress(StructureError), contextlib.closing(solver.solve((intensity,))) as solved:
-            return _stages(next(solved))
-    with ThreadPoolExecutor(os.cpu_count()) as executor:
-        return _stages(solver.explored(intensity, executor)[0])
-
-
-def _stages(one: AtIntensity) -> CommittorStages:
-    logs = [known.log_values for known in one.committors.values()]
-    if not logs or not isinstance(one.transition, Propagator):
-        raise StructureError(f"no committor was found at D = {one.intensity:g}.")
-    together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
-    floor = float(together.min()) - _BELOW
-    found = one.transition.stages(one.found, one.cores, together, floor)
+    solver = DensitySolver(problem, None, steps_for(problem.osc, np.concatenate(orbits)), _MEMORY)
+    with ExitStack() as stack:
+        executor = problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
+        one = solver.guide(intensity, executor)
+        logs = [known.log_values for known in one.committors.values()]
+        if not logs or not isinstance(one.transition, Propagator):
+            raise StructureError(f"no committor was found at D = {one.intensity:g}.")
+        together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
+        floor = float(together.min()) - _BELOW
+        found = one.transition.stages(one.found, one.cores, together, floor)
     stages = np.concatenate([np.where(found > floor + 0.5 * _BELOW, found, np.nan), together[None]])
     for stage in stages:
         nearest = distance_transform_edt(np.isnan(stage), return_distances=False, return_indices=True)
