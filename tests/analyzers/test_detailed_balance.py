@@ -33,7 +33,7 @@ def stopped(law, position=0.9):
 
 
 def least(osc, source=0, exit_=None):
-    structure = vk.find_structure(osc, rng=0, manifolds=False)
+    structure = vk.find_structure(osc, cells=(60, 60), rng=0, manifolds=False)
     found = least_actions(ExitProblem(osc, structure, structure.attractors[source], exit_ or vk.LeaveBasin()))
     assert all(each.lower <= each.value <= each.upper for each in found)
     return structure, {each.target: each.value for each in found}

@@ -16,6 +16,7 @@ import pytest
 
 import vibrokit as vk
 from tests.scenes import Coloured, double_well, scene
+from vibrokit.analyzers.mfet import splitting
 from vibrokit.analyzers.mfet.direct import Exits
 from vibrokit.analyzers.mfet.estimates import exponential_p_value, mean_tests, rate_of
 from vibrokit.analyzers.mfet.excursions import NOT_OUT
@@ -177,6 +178,15 @@ def test_no_excursion_leaves():
     with np.errstate(all="raise"):
         assert nobody.shares() == {}
         assert nobody.error == math.inf
+
+
+def test_where_no_excursion_leaves_there_is_no_rate(structure, monkeypatch):
+    monkeypatch.setattr(splitting, "_LEVELS", 1)  # of about 70 that are needed
+    found = vk.MFET(intensities=(0.01,), source=0, splitting=True, replicas=16, escapes=0).run(WELL, structure)
+    assert found.rates == ()
+    (finding,) = found.found(Code.NO_EXCURSION_LEFT)
+    assert finding.values["replicas"] == 16
+    assert not found.found(Code.SPLITTING_NOT_CONVERGED)
 
 
 # --- the same bits

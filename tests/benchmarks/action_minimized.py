@@ -72,7 +72,8 @@ def minimized(osc, structure, energy):
         added = periods * int(np.ceil(min(needed, MOST_ADDED) / periods))
         ends += [(model.orbit(orbit.points[0], periods), periods), added]
     source, before, saddle, after = ends
-    extended = guess.extended(at_phase(model, source, guess.nodes[0]), before, saddle, after, SAMPLES)
+    start, end = at_phase(model, source, guess.nodes[0]), at_phase(model, saddle, guess.nodes[-1])
+    extended = guess.extended(start, before, end, after, SAMPLES)
     found = reference.followed_in(extended, model.period / SAMPLES / FINEST)
     for _ in range(REFINED):
         found = reference.least(found.refined())

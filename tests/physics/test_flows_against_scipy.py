@@ -12,7 +12,7 @@ import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
-STARTS, PERIODS = 30, 20
+STARTS, PERIODS = 30, 10
 OMEGA, STOP, STIFFNESS = 0.57, 0.5, 50.0
 FINEST = [vk.FreeFlight(tolerance=1e-14), vk.Order8(tolerance=1e-14)]
 
@@ -82,7 +82,7 @@ def reference_with_momenta():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", [pytest.param(FINEST[0], marks=pytest.mark.long), FINEST[1]], ids=lambda s: s.name)
-def test_state_over_twenty_periods(stepper, long_reference):
+def test_state_over_ten_periods(stepper, long_reference):
     osc = vk.load_scene("hertz-0.570")
     ends = osc.section_map(starts()[:, :2], PERIODS, stepper=stepper)
     errors = np.linalg.norm(ends - long_reference[:, :2], axis=1)

@@ -247,6 +247,11 @@ class Code(StrEnum):
         "Steps twice as long change ln of the exit rate of {state} at D = {intensity:g} by {change:.2g} ± {error:.1g}: "
         "the steps are too long.", _FINER_STEPPER,
     )  # fmt: skip
+    NO_EXCURSION_LEFT = (
+        "no-excursion-left", WARNING,
+        "No excursion of {replicas} replicas left {state} at D = {intensity:g}: splitting gives no rate.",
+        "Raise the noise intensity, or raise replicas.",
+    )  # fmt: skip
     SPLITTING_NOT_CONVERGED = (
         "splitting-not-converged", WARNING,
         "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas} replicas; {wanted:.0%} "

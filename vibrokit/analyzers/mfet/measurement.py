@@ -230,21 +230,20 @@ class Measurement:
         rates = {}
         for target, (share, spread) in estimates.shares().items():
             if share > 0:
-                error = math.hypot(estimates.error, spread / share)
-                whole = rate_around(estimates.log_mean + math.log(share), error, count)
+                both = math.hypot(estimates.error, spread / share)
+                whole = rate_around(estimates.log_mean + math.log(share), both, count)
                 rates[target] = _in_seconds(whole, walk, tests=walk.checks)
-        findings = []
-        if estimates.error > self.settings.target_error:
+        findings = list[Finding]()
+        source, wanted, error = self.problem.source, self.settings.target_error, estimates.error
+        if not rates:
+            findings.append(Finding.of(Code.NO_EXCURSION_LEFT, source, intensity=walk.intensity, replicas=count))
+        elif error > wanted:
             findings.append(
                 Finding.of(
-                    Code.SPLITTING_NOT_CONVERGED,
-                    self.problem.source,
-                    intensity=walk.intensity,
-                    error=estimates.error,
-                    wanted=self.settings.target_error,
-                    replicas=count,
+                    Code.SPLITTING_NOT_CONVERGED, source,
+                    intensity=walk.intensity, error=error, wanted=wanted, replicas=count,
                 )
-            )
+            )  # fmt: skip
         return AtIntensity(walk.intensity, "splitting", rates, None, walk.interval, findings=tuple(findings))
 
 

@@ -39,9 +39,10 @@ _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the densi
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
 _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
 _NARROWEST = 2.0  # the same on the finest grid, at least
+_ENOUGH = 1.05 * _NARROWEST  # and a little to spare
 _WANTED = 4.0  # the same on the finest grid, by default
 _FEWEST, _MOST = 120, 400  # nodes along each side, by default
-_LARGEST, _SPARE = 640, 1.05  # the same if more than the most are needed for the least width, and a little more
+_LARGEST = 640  # the same if more than the most are needed for the least width
 _EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
 _MARGIN = 3  # nodes around it
@@ -183,7 +184,7 @@ class DensitySolver:
         with half of them the variance of splitting doubles (double well, ζ = 0.05, depth 26).
         """
         explored, closer = self.explored(intensity, executor)
-        grid = self._grid(closer.region, self._sufficient(closer, intensity))
+        grid = self._grid(closer.region, self._nodes(closer, intensity, _ENOUGH, _LARGEST))
         try:
             self._check_resolution(grid, intensity)
             needed = DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
@@ -233,19 +234,14 @@ class DensitySolver:
         """The nodes that are wanted, or those that the narrowest density needs."""
         if self.shape is not None:
             return self.shape
-        fine, coarse = (
-            math.sqrt(self._cores.resolved(explored, w) / intensity) for w in (_WANTED, _SPARE * _NARROWEST)
-        )
-        nx, nv = (
-            max(_FEWEST, min(math.ceil(fine * count), _MOST), min(math.ceil(coarse * count), _LARGEST))
-            for count in explored.shape
-        )
-        return nx, nv
+        fine = self._nodes(explored, intensity, _WANTED, _MOST)
+        enough = self._nodes(explored, intensity, _ENOUGH, _LARGEST)
+        return max(fine[0], enough[0]), max(fine[1], enough[1])
 
-    def _sufficient(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
-        """The fewest nodes that resolve the density."""
-        factor = math.sqrt(self._cores.resolved(explored, _SPARE * _NARROWEST) / intensity)
-        nx, nv = (max(_FEWEST, min(math.ceil(factor * count), _LARGEST)) for count in explored.shape)
+    def _nodes(self, explored: DensityGrid, intensity: float, spacings: float, most: int) -> tuple[int, int]:
+        """Nodes with so many spacings in the narrowest deviation."""
+        factor = math.sqrt(self._cores.resolved(explored, spacings) / intensity)
+        nx, nv = (max(_FEWEST, min(math.ceil(factor * count), most)) for count in explored.shape)
         return nx, nv
 
     def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:
