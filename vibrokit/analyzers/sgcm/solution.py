@@ -181,7 +181,7 @@ class DensitySolver:
         """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
 
         It is one at more noise, on the grid of exploration, if this noise needs too many nodes. All steps are taken:
-        with half of them the variance of splitting doubles (double well, ζ = 0.05, depth 26).
+        with half of them the variance of splitting is 1.8 times as large (double well, ζ = 0.05, depth 26).
         """
         explored, closer = self.explored(intensity, executor)
         grid = self._grid(closer.region, self._nodes(closer, intensity, _ENOUGH, _LARGEST))
