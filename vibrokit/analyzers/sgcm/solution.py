@@ -153,9 +153,7 @@ class DensitySolver:
             executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
             explored, closer = self.explored(intensities[0], executor)
             grid = self._grid(closer.region, self._shape(closer, intensities[-1]))
-            self._check_resolution(grid, intensities[-1])
-            needed = _ALL_FLOWS * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
-            check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
+            self._check(grid, intensities[-1], _ALL_FLOWS)
             flows = self._flow(grid, self.steps), self._flow(grid, self._half)
             before, at_boundary = explored, self.problem.exit.at_boundary
             share = 1.0 if at_boundary or self.problem.exit.by_position else _STEP_ERROR
@@ -186,9 +184,7 @@ class DensitySolver:
         explored, closer = self.explored(intensity, executor)
         grid = self._grid(closer.region, self._nodes(closer, intensity, _ENOUGH, _LARGEST))
         try:
-            self._check_resolution(grid, intensity)
-            needed = DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
-            check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
+            self._check(grid, intensity, 1.0)
         except StructureError:
             return explored
         start, committors = explored.begun(grid, intensity)
@@ -244,7 +240,8 @@ class DensitySolver:
         nx, nv = (max(_FEWEST, min(math.ceil(factor * count), most)) for count in explored.shape)
         return nx, nv
 
-    def _check_resolution(self, grid: DensityGrid, intensity: float) -> None:
+    def _check(self, grid: DensityGrid, intensity: float, flows: float) -> None:
+        """Raise StructureError if the nodes are too far apart, or the legs of so many flows need too much memory."""
         least = self._cores.resolved(grid, _NARROWEST)
         if intensity < least:
             factor = math.sqrt(least / intensity)
@@ -254,6 +251,8 @@ class DensitySolver:
                 f"{grid.shape[1]} nodes are enough for D = {least:.5g}, and this D needs {nx} × {nv}. "
                 "LeastAction gives the energy in the limit of weak noise."
             )
+        needed = flows * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
+        check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
 
     @cached_property
     def _cores(self) -> Cores:
