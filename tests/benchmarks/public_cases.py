@@ -130,7 +130,8 @@ def mean_time(case: Case, near: Any, intensity: float, touching: str | None = No
     chosen = vk.LeaveBasin() if touching is None else vk.FirstContact(side=touching)
     method = vk.MFET(source=source.label, intensities=(intensity,), exit=chosen)
     result = method.run(case.osc, case.structure, time_limit=case.limit)
-    return 1 / sum(rate.value for rate in result.rates if rate.source == source.label)
+    rate = sum(each.value for each in result.rates if each.source == source.label)
+    return 1 / rate if rate else math.inf
 
 
 def bifurcations(case: Case, parameter: str, values: list[float], kind: str) -> list[float]:
