@@ -22,6 +22,9 @@ from vibrokit.registry import load_attribute
 TRAJECTORIES = "trajectories"
 """Unit of stages that integrate many starts: `run_ensemble` advances them."""
 
+AFTERWARDS = 10.0
+"""Seconds in which work that was stopped may still make use of what it has found."""
+
 _SETTLED = 1.0  # seconds of a stage after which its pace is known well enough to estimate the time left
 
 

@@ -142,10 +142,10 @@ def least(value, bound=Bound.ESTIMATE):
 @pytest.mark.parametrize(
     ("value", "error", "estimate", "expected"),
     [
-        (0.9999, math.nan, None, (0.9999, 0.9999)),  # no path costs less than 1: the error was not known
-        (1.05, 0.05, (0.5, 0.05), (1.0 - ERROR, 1.0)),
-        (1.05, math.nan, (0.5, 0.05), (1.0 - ERROR, 1.0)),
-        (1.3, 0.1, (1.2, 0.05), (1.15, 1.2)),
+        (0.9999, math.nan, None, (1.0 - ERROR, 1.0, 1.0001)),  # no path costs less than 1: the error was not known
+        (1.05, 0.05, (0.5, 0.05), (1.0 - ERROR, 1.0, 1.1)),
+        (1.05, math.nan, (0.5, 0.05), (1.0 - ERROR, 1.0, 1.05)),
+        (1.3, 0.1, (1.2, 0.05), (1.15, 1.2, 1.4)),
     ],
 )
 def test_a_path_of_the_action_plot_costs_no_less_than_possible(value, error, estimate, expected):
@@ -157,7 +157,40 @@ def test_a_path_of_the_action_plot_costs_no_less_than_possible(value, error, est
     estimates = () if estimate is None else (graph(*estimate),)
     (energy,), _ = combined(ORBIT, (), estimates, least=[least(1.0)], shots=[shot])
     assert energy.lower <= energy.value <= energy.upper
-    assert (energy.lower, energy.value) == pytest.approx(expected)
+    assert (energy.lower, energy.value, energy.upper) == pytest.approx(expected)
+
+
+NEAR = [1 + 1.9e-9, 1 - 1.9e-9]  # the errors of both are 1e-9
+NOT_SO_NEAR = [1 + 1e-6, 1.002, 1.0099, 0.999]
+
+
+@pytest.mark.parametrize(("value", "attains"), [(x, True) for x in NEAR] + [(x, False) for x in NOT_SO_NEAR])
+def test_near_the_proven_minimum_is_not_the_proven_minimum(value, attains):
+    """A path certifies the minimum within the numerical errors of both; otherwise the two are upper and lower bound."""
+    (energy,), (finding,) = combined(ORBIT, (path(value),), (), least=[least(1.0, Bound.EXACT)])
+    assert (finding.code is Code.DETAILED_BALANCE) is attains
+    assert energy.value == (max(value, 1.0) if attains else 1.0)
+    assert energy.bound is (Bound.CERTIFIED if attains else Bound.EXACT)
+    (energy,), (finding,) = combined(ORBIT, (path(value),), (), least=[least(1.0)])  # perhaps not attained
+    assert (finding.code, energy.bound) == (
+        (Code.DETAILED_BALANCE, Bound.CERTIFIED) if attains else (Code.NOT_SEARCHED, Bound.UPPER)
+    )
+    assert energy.lower == pytest.approx(1.0, abs=2 * ERROR)
+    assert energy.lower <= 1.0 <= energy.upper
+    assert energy.value == max(value, 1.0)
+
+
+def test_a_path_without_an_error_does_not_attain_the_proven_minimum():
+    unknown = dataclasses.replace(path(1.0), numerical_error=math.nan)
+    (energy,), _ = combined(ORBIT, (unknown,), (), least=[least(1.0)])
+    assert energy.bound is Bound.UPPER
+
+
+def test_the_bounds_of_a_mirror_image_contain_its_own_value():
+    image = dataclasses.replace(path(1.0), lower=1.0 - 1e-12)
+    (energy,), (finding,) = combined(ORBIT, (path(1 - 1e-7),), (), {1: image})
+    assert finding.code is Code.MIRROR_IMAGE
+    assert energy.lower <= energy.value <= energy.upper
 
 
 def test_an_exact_energy_is_not_replaced_by_a_costlier_path():

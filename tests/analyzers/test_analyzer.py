@@ -73,6 +73,19 @@ def test_other_energies_are_refused(structure, changes, words):
         returned(structure, **changes)
 
 
+@pytest.mark.parametrize("lost", [0, 1])
+def test_an_attractor_in_a_cell_of_another_basin_is_refused(structure, lost):
+    """Leaving its basin could not be told from staying."""
+    labels = np.where(structure.basins.labels >= 0, 1 - lost, structure.basins.labels)
+    basins = dataclasses.replace(structure.basins, labels=labels.astype(np.int16))
+    wrong = dataclasses.replace(structure, basins=basins)
+    energies = [dataclasses.replace(SOUND, source=source, target=1 - source) for source in (0, 1)]
+    results = [Given(source=source, found=vk.Analysis((energies[source],))).run(OSC, wrong) for source in (0, 1)]
+    assert [len(result.energies) for result in results] == [int(source != lost) for source in (0, 1)]
+    (finding,) = results[lost].found(Code.SOURCE_FAILED)
+    assert finding.source == lost
+
+
 def test_branches_are_checked_too(structure):
     wrong = dataclasses.replace(SOUND, target=7)
     with pytest.raises(ValueError, match=r"Given\.analyze returned the target 7"):

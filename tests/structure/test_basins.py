@@ -270,6 +270,32 @@ def test_a_grid_whose_finer_one_would_take_too_many_sections_is_the_last(duffing
     np.testing.assert_array_equal(given.basins.labels, fine.basins.labels)
 
 
+@pytest.mark.parametrize("cells", [(1, 1), (1, 3), (4, 1), (2, 2), (5, 3)], ids=str)
+@pytest.mark.parametrize("scene", ["duffing", "hertz"])
+def test_attractors_own_their_places_on_any_grid(scene, cells, request):
+    """Of some of these grids, the cells around one attractor lead to the other."""
+    known = request.getfixturevalue(scene)
+    grid = BasinGrid(known, cells)
+    grid.fill()
+    found = grid.basins
+    assert [int(label) for a in known.attractors for label in found.at(a.points)] == [0, 1]
+    assert (Code.GRID_REFINED in {finding.code for finding in grid.findings}) == (found.labels.shape != cells)
+    assert Code.ATTRACTOR_LOST not in {finding.code for finding in grid.findings}
+
+
+def test_an_attractor_in_a_large_grid_is_found_by_splitting_few_cells(duffing):
+    """With one state renamed to the other on 80 × 80 cells, those around it and the boundary are split."""
+    grid = BasinGrid(duffing, (80, 80))
+    grid.fill()
+    labels, (place, _) = grid._labels.copy(), duffing.region.cells_at(duffing.attractors[1].points, (80, 80))
+    grid._labels[tuple(place.T)] = 0
+    assert grid._lost() == [1]
+    grid._find_lost()
+    assert grid.basins.labels.shape == (160, 160)
+    assert not grid._lost()
+    assert np.mean(grid.basins.labels[::2, ::2] == labels) > 0.95
+
+
 def test_progress_counts_every_cell(duffing):
     _, seen = interrupted(BasinGrid(duffing, (80, 80), refine=1), math.inf)
     total = 40 * 40 + 80 * 80 + 160 * 160

@@ -9,7 +9,9 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.progress import AFTERWARDS, working
 from vibrokit.results.action_graph import ActionGraphResult
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
@@ -40,6 +42,8 @@ class ActionGraph(GraphSearch, Analyzer):
                 raise
             stopped = (Finding.stopped("graph", interrupt, problem.source),)
         assert found is not None
-        return Analysis(
-            found.estimates, found.dataset(), (*found.findings, *stopped), found.energies, complete=not stopped
-        )
+        with working(time_limit=AFTERWARDS if stopped else None):
+            found = found.bounded(problem)
+        findings = (*found.findings, *stopped)
+        complete = all(finding.code is not Code.STOPPED for finding in findings)
+        return Analysis(found.estimates, found.dataset(), findings, found.energies, complete)

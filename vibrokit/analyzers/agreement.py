@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
 
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
@@ -13,7 +14,6 @@ from vibrokit.results.finding import Finding
 
 VAGUE = 0.5
 """Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
-_TIGHT = 0.01  # of a path's action: an exact lower bound so near to it certifies it; most graphs leave more
 _SAME = 1e-6  # relative difference of the actions of a path and of its mirror image
 
 
@@ -31,8 +31,9 @@ def combined(
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
-    Where it is known what no path can cost less than, the lower bound is at least that; where that is what the exit
-    costs, no path is needed. An action plot's path that was not polished is an upper bound within its own error.
+    Where it is proven what no path can cost less than, the lower bound is at least that; where that is what the exit
+    costs, no path is needed. A path attains the proven minimum only if both agree within their numerical errors. An
+    action plot's path that was not polished is an upper bound within its own error.
 
     Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
     attractor are mirror images of, the least possible actions, and the action plot's energies. Returns an energy and a
@@ -76,14 +77,11 @@ class _Known:
 
 def _of_target(attractor: Attractor, known: _Known) -> tuple[ActivationEnergy, Finding]:
     path, least = known.path, known.least
-    if path is None or (least is not None and least.bound is Bound.EXACT and not _reaches(path, least)):
+    if path is None or (least is not None and least.bound is Bound.EXACT and not _attains(path, least)):
         code, energy = _without_path(known)
-        energy = energy if least is None else _raised(energy, least)
     else:
         code, energy = _with_path(attractor, path, known)
-        if least is not None:
-            lower = min(least.lower, energy.value - energy.numerical_error)
-            energy = dataclasses.replace(energy, lower=max(energy.lower, lower))
+    energy = energy if least is None else _raised(energy, least)
     return energy, Finding(code, attractor.label, energy.target, known.values)
 
 
@@ -99,12 +97,13 @@ def _without_path(known: _Known) -> tuple[Code, ActivationEnergy]:
 
 def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[Code, ActivationEnergy]:
     graph, image, least = known.graph, known.image, known.least
-    if least is not None and _reaches(path, least):
+    if least is not None and _attains(path, least):
         without = Bound.EXACT if least.bound is Bound.EXACT else path.bound
         bound = without if path.certificate is None else Bound.CERTIFIED
         return Code.DETAILED_BALANCE, dataclasses.replace(path, bound=bound)
     if image is not None and cost_the_same(path, image):
-        return Code.MIRROR_IMAGE, dataclasses.replace(path, lower=image.lower, bound=image.bound)
+        lower = min(image.lower, path.value)
+        return Code.MIRROR_IMAGE, dataclasses.replace(path, lower=lower, bound=image.bound)
     if graph is None:
         return Code.NOT_SEARCHED, path
     if not attractor.repeats or path.bound is Bound.BRACKET:
@@ -112,22 +111,25 @@ def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> t
     return _compared(path, graph)
 
 
-def _reaches(path: ActivationEnergy, least: ActivationEnergy) -> bool:
-    """Whether a path costs hardly more than what no path can cost less than."""
-    return path.value - least.lower <= _TIGHT * path.value
+def _attains(path: ActivationEnergy, least: ActivationEnergy) -> bool:
+    """Whether a path costs what no path can cost less than, within the numerical errors of both."""
+    return abs(path.value - least.value) <= path.numerical_error + least.numerical_error
 
 
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
-    """An energy without a polished path that is at least what no path can cost less than; a known path limits it."""
-    limit = math.inf if energy.path is None else energy.upper
-    value = max(energy.value, min(least.value, limit))
-    raised = value - energy.value
+    """An energy whose lower bound is at least what no path can cost less than.
+
+    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it.
+    """
+    raised = least.value - energy.value
+    if energy.value >= least.lower:
+        return dataclasses.replace(energy, lower=min(max(energy.lower, least.lower), energy.value))
     return dataclasses.replace(
         energy,
-        value=value,
-        lower=min(max(energy.lower, least.lower), value),
-        upper=max(energy.upper, value),
-        numerical_error=max(raised, energy.numerical_error) if raised else energy.numerical_error,
+        value=least.value,
+        lower=max(energy.lower, least.lower),
+        upper=energy.upper if energy.upper >= least.value else least.value + raised,
+        numerical_error=float(np.fmax(raised, energy.numerical_error)),
     )
 
 

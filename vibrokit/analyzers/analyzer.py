@@ -257,6 +257,7 @@ class Analyzer(ABC):
     def _analyzed(self, problem: ExitProblem) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""
         try:
+            problem.check_basin()
             found = self.analyze(problem)
         except (StructureError, StepperError) as error:
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))

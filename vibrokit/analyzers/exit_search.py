@@ -22,7 +22,7 @@ from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import Search
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
-from vibrokit.progress import TRAJECTORIES, stage, working
+from vibrokit.progress import AFTERWARDS, TRAJECTORIES, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
@@ -33,7 +33,6 @@ from vibrokit.symbolic.flow_kind import Flow
 if TYPE_CHECKING:
     from vibrokit.analyzers.least_action import LeastAction
 
-_AFTERWARDS = 10.0  # s, for polishing what an action plot has found when it is stopped
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
 
 
@@ -75,7 +74,13 @@ class ExitSearch:
 
     @property
     def stopped(self) -> bool:
-        return any(finding.code is Code.STOPPED for finding in (*self.findings, *self._polished()[1]))
+        return any(
+            finding.code is Code.STOPPED for finding in (*self.findings, *self._graph_findings, *self._polished()[1])
+        )
+
+    @property
+    def _graph_findings(self) -> tuple[Finding, ...]:
+        return () if self.graph is None else self.graph.findings
 
     @property
     def _is_exact(self) -> bool:
@@ -124,7 +129,7 @@ class ExitSearch:
         limit = None
         try:
             found = self._shots = shooting.search(self.problem)
-            candidates, limit = found.candidates, None if found.complete else _AFTERWARDS
+            candidates, limit = found.candidates, None if found.complete else AFTERWARDS
             self.findings += found.findings
         except (StructureError, StepperError) as error:
             self._failed("action plot", error, only=self.analyzer.graph is None)
@@ -242,8 +247,12 @@ class ExitSearch:
         """Combine what was found."""
         branches, polished = self._polished()
         evidence = self._evidence
+        if self.graph is not None:
+            with working(time_limit=AFTERWARDS if self.stopped else None):
+                self.graph = self.graph.bounded(self.problem, evidence.cheapest.keys())
+            evidence = self._evidence
         energies, compared = evidence.combined(self._unpolished(evidence))
-        every = (*self.findings, *(() if self.graph is None else self.graph.findings), *polished)
+        every = (*self.findings, *self._graph_findings, *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
         findings += compared
         if not energies and not self.stopped:

@@ -73,6 +73,16 @@ class ExitProblem:
         """Whether there are attractors that are neither left nor may be reached."""
         return len(self.targets) + 1 < len(self.structure.attractors)
 
+    def check_basin(self) -> None:
+        """Refuse an attractor that the basin grid puts into another basin; raises StructureError."""
+        basins = self.structure.basins
+        if not self.exit.by_position and basins.lost(self.attractor, self.source):
+            cells = " × ".join(map(str, basins.labels.shape))
+            raise StructureError(
+                f"{self.attractor.name} lies in a cell of another basin on the grid of {cells} cells, so that leaving "
+                "its basin cannot be told from staying; find the structure with more cells or on a smaller region."
+            )
+
     def check_targets(self, method: str) -> None:
         """Refuse an exit for which a method has no attractor to reach; raises StructureError."""
         if not self.targets and not self.exit.by_position:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from vibrokit.errors import ResultFileError, StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import Variable
 from vibrokit.results.region import Region, centres
+
+if TYPE_CHECKING:
+    from vibrokit.results.attractor import Attractor
 
 UNSETTLED = -1
 """Label of cells whose motion is in the region and had reached no attractor within the budget."""
@@ -50,6 +54,15 @@ class Basins:
         cells, inside = self.region.cells_at(states, self.labels.shape)
         i, v = np.moveaxis(cells - cells % every, -1, 0)
         return np.where(inside, self.labels[i, v], UNSETTLED).astype(np.int16)
+
+    def lost(self, attractor: Attractor, label: int) -> bool:
+        """Return whether an attractor lies in cells of another basin: one point of an orbit, or most points of a set.
+
+        Points outside the region and cells that were not followed do not count.
+        """
+        points = attractor.points[self.region.contains(attractor.points)]
+        foreign = ~np.isin(self.at(points), (label, UNSETTLED, NOT_FOLLOWED))
+        return bool(foreign.any() if attractor.repeats else 2 * foreign.sum() > len(points))
 
     def __repr__(self) -> str:
         return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"

@@ -98,6 +98,15 @@ class Code(StrEnum):
         "section-map iterations.",
         "Set cells, an argument of find_structure, for a finer grid.",
     )  # fmt: skip
+    GRID_REFINED = (
+        "grid-refined", INFO,
+        "The basins have {nx} × {nv} cells: on a coarser grid an attractor lay in a cell of another basin.",
+        "Set cells, an argument of find_structure, for a finer grid.",
+    )  # fmt: skip
+    ATTRACTOR_LOST = (
+        "attractor-lost", WARNING, "{state} lies in a cell of another basin on {nx} × {nv} cells.",
+        "Find the structure on a smaller region around it.",
+    )  # fmt: skip
     SADDLES = "saddles", INFO, "Unstable orbits on basin boundaries: {count}."
     BOUNDARIES_SKIPPED = (
         "boundaries-skipped", WARNING,

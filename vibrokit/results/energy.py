@@ -40,7 +40,7 @@ class Bound(StrEnum):
     CERTIFIED = "certified"
     """Upper: a certified path. Lower: the graph search found no cheaper path within its error estimate."""
     UPPER = "upper"
-    """Upper: a path. Lower: what no search has excluded, 0 if nothing was."""
+    """Upper: a path. Lower: what no search has excluded or what is proven, 0 if there is neither."""
     ESTIMATE = "estimate"
     """Both are error estimates of a grid."""
     BRACKET = "bracket"

@@ -54,7 +54,8 @@ def find_structure(
         that ends at a copy of an attractor elsewhere has then left the region.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
-        are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map.
+        are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map. The number
+        doubles until no attractor lies in a cell of another basin.
     refine : int
         How many times cells near a boundary are split in four; the grid then has ``cells · 2**refine`` cells.
     margin : int, optional

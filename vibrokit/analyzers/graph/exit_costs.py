@@ -85,7 +85,7 @@ class ExitCosts:
                     target=label,
                     value=estimate.value,
                     lower=max(0.0, estimate.value - estimate.error),
-                    upper=estimate.value + estimate.error,
+                    upper=np.inf,
                     method=METHOD,
                     bound=Bound.ESTIMATE,
                     numerical_error=estimate.error,
@@ -94,6 +94,7 @@ class ExitCosts:
                 for target, estimate in reached
                 for label in target.labels
             ),
+            tuple(estimate for target, estimate in reached for _ in target.labels),
             tuple(_labelled(reached)),
             potential,
             (used, *self.findings, *self._not_converged(), *lost),

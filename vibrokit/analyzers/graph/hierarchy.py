@@ -10,7 +10,7 @@ import numpy as np
 
 from vibrokit.analyzers.graph.coverage import Coverage
 from vibrokit.analyzers.graph.targets import ExitTarget
-from vibrokit.analyzers.graph.tracing import SolvedGrid, distinct
+from vibrokit.analyzers.graph.tracing import SolvedGrid, TracedPath, distinct
 from vibrokit.analyzers.paths.candidate import Candidate
 
 PATH_FACTOR = 2.0
@@ -29,7 +29,12 @@ class TargetEstimate:
     side: float  # nodes along a side of the grid, the geometric mean of both
     steps: int  # in a section interval
     known: float  # least action of the paths there that were known before; infinite for none
-    candidates: tuple[Candidate, ...]  # distinct paths, the cheapest first; their last states lie beyond the exit
+    paths: tuple[TracedPath, ...]  # distinct ones, the cheapest first
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The paths as guesses for polishing; their last states lie beyond the exit."""
+        return tuple(path.candidate for path in self.paths)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,10 +81,9 @@ class GridHierarchy:
             value, error = fine, by_nodes + by_step
         else:
             value = error = self._value(self.whole, target)
-        candidates = tuple(path.candidate for path in paths)
         side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
         known = min((path.value for path in self.coverage.branches if path.target in target.labels), default=np.inf)
-        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, known, candidates)
+        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, known, tuple(paths))
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""

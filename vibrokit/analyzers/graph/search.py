@@ -47,9 +47,11 @@ class GraphSearch:
     if x were a node too, and damping is weak, grid rounding would add more action than the path itself. Near the
     attractor V is the exact quadratic form.
 
-    The error estimate of an exit is the change when the number of nodes along each side is halved, and the difference
-    from the action of the graph's path after relaxation by Hamilton's equations. The latter measures what
-    linearization over a step changes: it can be large over a whole period, and is about 0.2 % over an eighth of it.
+    The upper bound of an exit is the action of the graph's path, joined to the attractor and relaxed by Hamilton's
+    equations: a path of least action costs no more. The error estimate of V is the change when the number of nodes
+    along each side is halved, and twice the difference from that action. The latter measures what linearization over a
+    step changes, which can be large over a whole period and is about 0.2 % over an eighth of it, and the action that
+    interpolation loses where a turn hardly changes the energy. An exit without such a path has no bounds.
 
     Parameters
     ----------
@@ -86,7 +88,7 @@ class GraphSearch:
         gibibytes(f"{name}: max_memory_gib", self.max_memory_gib)
 
     def search(self, problem: ExitProblem) -> GraphSolution:
-        """Search the exits of one attractor.
+        """Search the exits of one attractor, with bounds.
 
         Raises
         ------
@@ -97,7 +99,7 @@ class GraphSearch:
             path end that the graph does not know, or the grids would take too much memory.
         """
         *_, best = self.solutions(problem)
-        return best
+        return best.bounded(problem)
 
     def solutions(self, problem: ExitProblem, known: Callable[[], KnownPaths] | None = None) -> Iterator[GraphSolution]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.

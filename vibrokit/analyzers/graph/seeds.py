@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.step_model import StepModel
+from vibrokit.analyzers.paths.cycle_potential import cycle_potential
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
@@ -34,11 +35,13 @@ def seeds(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
     """Return what is known of the potential at the nodes of each phase.
 
     Near the points of an orbit or of an equilibrium the potential is ½ δqᵀ Σ⁻¹ δq, with Σ carried from phase to phase
-    by M Σ Mᵀ + C, as far as the motion is linear there. An attractor that meets the section in a curve or a cloud has
-    the potential 0 at the nodes next to it. Raises StructureError if the attractor is not hyperbolic.
+    by M Σ Mᵀ + C, as far as the motion is linear there. At the nodes next to a limit cycle it is the quadratic form
+    across that, and at those next to another set of points it is 0. Raises StructureError if the attractor is not
+    hyperbolic.
     """
     if attractor.is_fixed:
         return _around_orbit(model, attractor, grids)
+    across = cycle_potential(model.scene, attractor, model.stepper) if attractor.kind == "limit cycle" else None
     points = attractor.points[:, :2] if attractor.kind != "limit cycle" else _dense(attractor.orbit, grids)
     values = []
     for phase in range(grids.phases):
@@ -46,6 +49,8 @@ def seeds(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds:
         corner = np.floor(grids.index(phase, points[grids.inside(phase, points)])).astype(np.int64)
         for more in ((0, 0), (0, 1), (1, 0), (1, 1)):
             known[tuple((corner + more).T)] = 0.0
+        if across is not None:
+            known[known == 0.0] = across.at(grids.nodes(phase)[known == 0.0])
         values.append(known)
         points = model.images(points, grids.time(phase), grids.step)
     return Seeds(values, np.empty((0, 2)))

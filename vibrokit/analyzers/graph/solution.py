@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 import xarray
 
+from vibrokit.analyzers.agreement import VAGUE
 from vibrokit.analyzers.graph.hierarchy import PATH_FACTOR, TargetEstimate
 from vibrokit.analyzers.graph.potential import Potential
+from vibrokit.analyzers.graph.whole_paths import whole_action
 from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
+
+WHOLE_PATHS = "whole paths"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -20,6 +27,7 @@ class GraphSolution:
     """Least actions of the exits of an attractor, on a grid."""
 
     energies: tuple[ActivationEnergy, ...]  # of each place where paths may end, the cheapest first
+    behind: tuple[TargetEstimate, ...]  # what gave each of them
     candidates: tuple[Candidate, ...]  # distinct paths to these places, in the same order, that end beyond the exit
     potential: Potential  # on the grid that reaches farthest
     findings: tuple[Finding, ...]
@@ -41,18 +49,48 @@ class GraphSolution:
             least[path.target] = min(path.value, least.get(path.target, np.inf))
         found = []
         for one in self.estimates:
-            action = least.get(one.target, np.inf)
+            if one.target not in least:
+                found.append(one)
+                continue
+            action = least[one.target]
             error = self.cheapest[one.target].by_nodes + PATH_FACTOR * abs(action - one.value)
             found.append(_with_error(one, error if action < one.value else min(error, one.numerical_error)))
         return tuple(found)
 
+    def bounded(self, problem: ExitProblem, polished: Container[int] = ()) -> GraphSolution:
+        """Return the same solution with energies that are bounded by the actions of whole paths.
+
+        What V is too low by, where interpolation leaks action, shows only beside such an action. So an energy without a
+        whole path has no bounds, and one that is far below it is replaced by it. Exits that polished paths lead to keep
+        their energies. If the work is stopped, a finding says so, and the others have no bounds.
+        """
+        wanted = [
+            (energy, estimate) for energy, estimate in zip(self.energies, self.behind, strict=True)
+            if energy.target not in polished
+        ]  # fmt: skip
+        actions, findings = {id(estimate): math.inf for _, estimate in wanted}, self.findings
+        try:
+            with stage(WHOLE_PATHS, subject=problem.attractor.name):
+                for estimate in {id(estimate): estimate for _, estimate in wanted}.values():
+                    found = (whole_action(problem, path) for path in estimate.paths)
+                    actions[id(estimate)] = next((action for action in found if math.isfinite(action)), math.inf)
+        except KeyboardInterrupt as interrupt:
+            findings = (*findings, Finding.stopped(WHOLE_PATHS, interrupt, problem.source))
+        energies = [
+            energy if energy.target in polished else _bounded(energy, estimate, actions[id(estimate)])
+            for energy, estimate in zip(self.energies, self.behind, strict=True)
+        ]
+        return dataclasses.replace(self, energies=tuple(energies), findings=findings)
+
     @property
     def estimates(self) -> tuple[ActivationEnergy, ...]:
-        """The best energy of each target."""
-        best: dict[int, ActivationEnergy] = {}
+        """The best energy of each target: that with the least upper bound, and the least lower bound of all."""
+        found: dict[int, list[ActivationEnergy]] = {}
         for energy in self.energies:
-            best.setdefault(energy.target, energy)
-        return tuple(best.values())
+            found.setdefault(energy.target, []).append(energy)
+        best = [min(some, key=lambda energy: (energy.upper, energy.value)) for some in found.values()]
+        lowest = [min(energy.lower for energy in some) for some in found.values()]
+        return tuple(dataclasses.replace(one, lower=lower) for one, lower in zip(best, lowest, strict=True))
 
     def dataset(self) -> xarray.Dataset:
         """Return the potential on the section, and the cheapest path.
@@ -77,11 +115,22 @@ class GraphSolution:
         )
 
 
+def _bounded(energy: ActivationEnergy, estimate: TargetEstimate, action: float) -> ActivationEnergy:
+    """An energy with bounds by the action of a whole path to the exit."""
+    error = estimate.by_nodes + PATH_FACTOR * abs(action - energy.value)
+    low, vague = min(energy.value, action), error > VAGUE * action
+    return dataclasses.replace(
+        energy,
+        value=action if vague and math.isfinite(action) else low,
+        lower=max(0.0, low - error) if math.isfinite(error) else 0.0,
+        upper=action,
+        numerical_error=error,
+    )
+
+
 def _with_error(energy: ActivationEnergy, error: float) -> ActivationEnergy:
     """The same energy with another error."""
-    return dataclasses.replace(
-        energy, lower=max(0.0, energy.value - error), upper=energy.value + error, numerical_error=error
-    )
+    return dataclasses.replace(energy, lower=max(0.0, energy.value - error), numerical_error=error)
 
 
 def _array(dims: str | tuple[str, ...], values: object, units: str, long_name: str) -> xarray.Variable:

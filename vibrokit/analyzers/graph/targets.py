@@ -21,6 +21,7 @@ _TOLERANCE = 1e-3  # of the refinement, in units of the distances above: the cos
 _SHORTEST = 0.01  # of a step: the covariance of a shorter one is close to singular
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,7 +30,9 @@ class TraceStart:
 
     state: Array  # (2,)
     phase: int = 0
-    beyond: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))  # states that follow, one in each step
+    beyond: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))  # the state on a face that follows
+    last: float | None = None  # time until then (s)
+    free: Mask | None = None  # (2,): which of its coordinates may be any
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -143,7 +146,8 @@ class FaceTarget(ExitTarget):
         value, phase, duration, place = self._refined(potential, *best[1:])
         _, predecessors = self._costs(potential, phase, duration, np.array([place]))
         start = grids.states(phase, predecessors[0])
-        return Arrival(value, 0.0, (TraceStart(start, phase, self._on_face(np.array([place]))),))
+        beyond, free = self._on_face(np.array([place])), np.arange(2) != self.axis
+        return Arrival(value, 0.0, (TraceStart(start, phase, beyond, duration, free),))
 
     def _refined(
         self, potential: Potential, phase: int, duration: float, place: float

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.graph.lead_in import lead_in
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.step_model import StepCosts, StepModel
 from vibrokit.analyzers.graph.targets import Arrival, ExitTarget, TraceStart
@@ -40,6 +41,11 @@ class TracedPath:
 
     candidate: Candidate  # priced by Hamilton's equations, except for the quadratic form that it starts in
     quadratic: float  # its cost as the graph computes it, with linearized steps
+    states: Array  # (count, 2): from a section on, a step apart
+    steps: int  # in a section interval
+    from_attractor: bool  # whether the first state is on the attractor itself, not next to it
+    target: ExitTarget
+    start: TraceStart  # the end of the path
 
     @property
     def linearization_error(self) -> float:
@@ -100,18 +106,20 @@ class SolvedGrid:
         """Return the distinct paths to a target, the cheapest first."""
         if target not in self._paths:
             arrival = self.arrival(target)
-            traced = [self._traced(target.labels[0], arrival.value, start) for start in arrival.starts]
+            traced = [self._traced(target, arrival.value, start) for start in arrival.starts]
             self._paths[target] = distinct(path for path in traced if path is not None)
         return self._paths[target]
 
-    def _traced(self, label: int, value: float, start: TraceStart) -> TracedPath | None:
-        problem, potential = self.problem, self.potential
+    def _traced(self, target: ExitTarget, value: float, start: TraceStart) -> TracedPath | None:
+        problem, potential, fixed = self.problem, self.potential, self.problem.attractor.is_fixed
         found = backtrack(self.model, potential, start.state, start.phase)
         if found is None or len(found[0]) < _FEWEST:
             return None
         states, before = found
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
         propagator = SegmentPropagator(problem.scene, stepper, self.steps)
+        lead = np.empty((0, 2)) if fixed else lead_in(problem.attractor, propagator, states[0])
+        states, before = np.concatenate([lead, states]), before if fixed else 0.0
         try:
             points, quadratic = gauss_newton(propagator, 0, states)
         except StructureError:
@@ -121,10 +129,12 @@ class SolvedGrid:
             return None
         if len(start.beyond):
             before += max(0.0, value - float(potential.at(start.phase, start.state[None])[0]))
-        states = np.concatenate([points[:, : propagator.size], start.beyond])
+        relaxed = points[:, : propagator.size]
+        states = np.concatenate([relaxed[len(lead) :], start.beyond])
         times = potential.grids.step * np.arange(len(states), dtype=float)
-        candidate = Candidate(problem.source, label, times, states, before + action, METHOD)
-        return TracedPath(candidate, before + quadratic)
+        candidate = Candidate(problem.source, target.labels[0], times, states, before + action, METHOD)
+        on_attractor = not fixed or found[1] == 0.0
+        return TracedPath(candidate, before + quadratic, relaxed, self.steps, on_attractor, target, start)
 
 
 def distinct(paths: Iterable[TracedPath]) -> list[TracedPath]:

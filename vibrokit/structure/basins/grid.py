@@ -28,6 +28,7 @@ _COARSEST, _FEWEST = 4096, 400  # cells of the first grid, followed to the attra
 _MOST_FIRST = 20_000_000  # sections that the first grid may take by default
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
+_FINEST = 2048  # cells along a side of a grid that is refined for an attractor in a cell of another basin
 _SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
     UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
@@ -36,6 +37,7 @@ CELL_CODES = tuple(_WITHOUT_ATTRACTOR.values())
 """Codes of the findings about cells that lead to no attractor."""
 
 Labels = NDArray[np.int16]
+Mask = NDArray[np.bool_]
 
 
 def classify_grid(
@@ -72,6 +74,7 @@ class BasinGrid:
         self._shapes = _shapes(whole, coarsest) if margin is not None else [whole]
         self._labels = np.full(whole, NOT_FOLLOWED, dtype=np.int16)
         self._sections = 0  # that the last grid took
+        self._refined = False  # whether an attractor lay in a cell of another basin
         self._avoided = 0  # sections that the grid after the last one would take, if they are too many
 
     @property
@@ -101,10 +104,36 @@ class BasinGrid:
             else:
                 self._follow(self._labels, classifier)
             for _ in range(self._refine):
-                near = ~agreeing(self._labels, max(1, self._margin or 0))
-                classifier = self._sharing(self._labels)
-                self._labels = _split(np.where(near, NOT_FOLLOWED, self._labels).astype(np.int16))
-                self._follow(self._labels, classifier)
+                self._split_near(~agreeing(self._labels, max(1, self._margin or 0)), self._sharing(self._labels))
+        self._find_lost()
+
+    def _find_lost(self) -> None:
+        """Refine the grid, at most to 2048 cells along a side, until no attractor lies in a cell of another basin.
+
+        Cells that put an attractor into another basin are too wide to tell what lies around them either. So few cells
+        are all followed anew, and of many cells none near a lost attractor classifies others.
+        """
+        while (lost := self._lost()) and 2 * max(self._labels.shape) <= _FINEST:
+            self._refined = True
+            with stage("basins of lost attractors", unit=CELLS, total=4 * self._labels.size):
+                if self._labels.size <= _COARSEST:
+                    self._split_near(np.ones(self._labels.shape, dtype=bool), self._classifier)
+                    continue
+                around, region = self._labels.copy(), self._classifier.region
+                for label in lost:
+                    places, inside = region.cells_at(self._classifier.attractors[label].points, around.shape)
+                    around[tuple(places[inside].T)] = UNSETTLED
+                self._split_near(~agreeing(around, max(1, self._margin or 0)), self._sharing(around))
+
+    def _lost(self) -> list[int]:
+        """Labels of the attractors that lie in cells of another basin."""
+        basins, attractors = self.basins, self._classifier.attractors
+        return [label for label, attractor in enumerate(attractors) if basins.lost(attractor, label)]
+
+    def _split_near(self, near: Mask, classifier: BasinClassifier) -> None:
+        """Split all cells in four, and follow the parts of some of them."""
+        self._labels = _split(np.where(near, NOT_FOLLOWED, self._labels).astype(np.int16))
+        self._follow(self._labels, classifier)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -113,7 +142,10 @@ class BasinGrid:
         if self._avoided:
             nx, nv = self._shapes[-1]
             found += (Finding.of(Code.COARSE_GRID, nx=nx, nv=nv, sections=self._avoided),)
-        return found
+        nx, nv = self._labels.shape
+        if self._refined:
+            found += (Finding.of(Code.GRID_REFINED, nx=nx, nv=nv),)
+        return found + tuple(Finding.of(Code.ATTRACTOR_LOST, label, nx=nx, nv=nv) for label in self._lost())
 
     def _sharing(self, finished: Labels) -> BasinClassifier:
         """Return a classifier that uses a finished grid, if it may."""
