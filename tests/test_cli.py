@@ -17,7 +17,7 @@ from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.settings import configured, setting
 from vibrokit.cli import main, parsed
 from vibrokit.errors import StructureError
-from vibrokit.progress import OutOfTime, advance, stage
+from vibrokit.progress import Deadline, advance, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
@@ -306,7 +306,7 @@ def test_ctrl_c_before_anything_was_found_writes_nothing(toys, monkeypatch, caps
 
 def test_a_time_limit_before_anything_was_found_says_so(toys, monkeypatch, capsys):
     def nothing_found(osc, **options):
-        raise OutOfTime
+        raise Deadline
 
     monkeypatch.setattr("vibrokit.structure.find.find_structure", nothing_found)
     assert main([*TOY, "-o", "r.nc", "--time-limit", "1000"]) == 1
@@ -345,6 +345,35 @@ def test_a_second_ctrl_c_stops_the_work_at_once(toys, monkeypatch, capsys):
     assert "written: r.nc (structure)" in capsys.readouterr().err
 
 
+def test_each_result_is_printed_and_saved_when_it_is_found(toys, monkeypatch, capsys):
+    def look(problem):
+        if problem.source == 0:
+            assert "left-rest → right-rest" in capsys.readouterr().out
+            assert vk.load_result("r-toy.nc").complete
+
+    monkeypatch.setattr(Toy2, "happens", staticmethod(look), raising=False)
+    assert main([*TOY, "toy-2", "-o", "r.nc"]) == 0
+    out, _ = capsys.readouterr()
+    assert "double-well: toy\n" not in out  # it is not printed twice
+    assert "written: r-toy.nc (toy), r-toy-2.nc (toy-2)" in out
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_sigterm_stops_as_ctrl_c_does_however_often_it_is_sent(toys, monkeypatch, capsys, count):
+    def end(problem):
+        for _ in range(count * problem.source):
+            signal.raise_signal(signal.SIGTERM)
+
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(Toy2, "happens", staticmethod(end), raising=False)
+    assert main([*TOY, "toy-2", "-o", "r.nc", "--json"]) == 143
+    out, err = capsys.readouterr()
+    assert "written: r-toy.nc (toy), r-toy-2.nc (toy-2), r-structure.nc (structure)" in err
+    assert [vk.load_result(f"r-{name}.nc").complete for name in ("toy", "toy-2")] == [True, False]
+    assert not json.loads(out)["complete"]
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
 def test_two_ctrl_c_while_saving_leave_the_old_file_whole(toys, monkeypatch, capsys):
     (toys / "r.nc").write_text("an older file")
     monkeypatch.setattr("vibrokit.results.atomic.os.replace", lambda *paths: press(2))
@@ -373,7 +402,7 @@ def test_ctrl_c_is_python_s_again_afterwards(toys):
 def test_a_time_limit_keeps_what_was_found(toys, monkeypatch, capsys):
     def run_out(problem):
         if problem.source:
-            raise OutOfTime
+            raise Deadline
 
     monkeypatch.setattr(Toy, "happens", staticmethod(run_out))
     assert main([*TOY, "toy-2", "-o", "r.nc", "--time-limit", "1000", "--json"]) == 1

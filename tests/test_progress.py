@@ -5,7 +5,7 @@ import pytest
 from vibrokit import progress
 from vibrokit.display import Display
 from vibrokit.errors import StructureError
-from vibrokit.progress import OutOfTime, Work, advance, compiling, count, current, report, stage, working
+from vibrokit.progress import Deadline, Work, advance, compiling, count, current, report, stage, working
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_a_time_limit_is_raised_once_also_in_inner_work(clock):
     with working(time_limit=10), working(), stage("graph"):
         advance()
         clock.now += 11
-        with pytest.raises(OutOfTime):
+        with pytest.raises(Deadline):
             advance()
         advance()
 

@@ -51,6 +51,10 @@ class CheckpointError(VibrokitError, ValueError):
     """A checkpoint is damaged, or belongs to other work."""
 
 
+class OutOfTime(VibrokitError, TimeoutError):
+    """The time limit was reached before there was anything to return."""
+
+
 class IntegrationError(VibrokitError, ArithmeticError):
     """A state became infinite or NaN, or the number of steps reached its limit.
 

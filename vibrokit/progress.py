@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from typing import Any
 
 from vibrokit.blas import one_blas_thread
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import OutOfTime, StructureError, shown
 from vibrokit.registry import load_attribute
 
 TRAJECTORIES = "trajectories"
@@ -28,8 +28,11 @@ AFTERWARDS = 10.0
 _SETTLED = 1.0  # seconds of a stage after which its pace is known well enough to estimate the time left
 
 
-class OutOfTime(KeyboardInterrupt):
-    """The time limit is reached; work stops as on Ctrl-C, and what was found is kept."""
+class Deadline(KeyboardInterrupt):
+    """The time limit is reached; work stops as on Ctrl-C, and what was found is kept.
+
+    No handler of errors inside the work may take it for one. If nothing was found, users see it as `OutOfTime`.
+    """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,20 +160,20 @@ class Work:
         self.interrupted = True
 
     def tell(self, *, compiling: bool = False, finished: bool = False) -> None:
-        """Tell the listener about the innermost stage; raises OutOfTime after a deadline, and asked interrupts."""
+        """Tell the listener about the innermost stage; raises as `check` does."""
         if self.stages and self.listener is not None:
             self.listener(self.stages[-1].update(compiling=compiling, finished=finished))
         if not finished:
             self.check()
 
     def check(self) -> None:
-        """Raise OutOfTime after a deadline, and interrupts that were asked for; each once, so that all else is kept."""
+        """Raise Deadline after a time limit, and interrupts that were asked for; each once, so that all is kept."""
         if self.interrupted:
             self.interrupted = False
             raise KeyboardInterrupt
         if time.perf_counter() > self.deadline:
             self.deadline = math.inf
-            raise OutOfTime("the time limit was reached before there was a result; raise time_limit.")
+            raise Deadline
         if self.outer is not None:
             self.outer.check()
 
@@ -192,10 +195,20 @@ def current() -> Work:
 
 @contextlib.contextmanager
 def working(progress: Progress = None, time_limit: float | None = None) -> Iterator[Work]:
-    """Open a piece of work; inside another one, the listener and the time limit of that stay in force."""
+    """Open a piece of work; inside another one, the listener and the time limit of that stay in force.
+
+    Raises OutOfTime if the time limit ends the outermost work, which then returns nothing.
+    """
     work = Work(_listener(progress), checked_time_limit(time_limit), _CURRENT.get())
-    with contextlib.nullcontext() if work.outer else one_blas_thread(), opened(work):
-        yield work
+    if work.outer is not None:
+        with opened(work):
+            yield work
+        return
+    try:
+        with one_blas_thread(), opened(work):
+            yield work
+    except Deadline:
+        raise OutOfTime("the time limit was reached before there was a result; raise time_limit.") from None
 
 
 @contextlib.contextmanager

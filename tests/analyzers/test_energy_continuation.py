@@ -127,9 +127,14 @@ def test_values_out_of_order_are_refused_on_opening(wells):
         EnergyContinuation.from_dataset(dataset, scene=wells.scene)
 
 
-def test_a_time_limit_before_the_first_path_is_no_answer():
-    with pytest.raises(KeyboardInterrupt):
-        vk.energy_continuation(WELLS, "damping_ratio", [0.1], analyzer=QUICK, time_limit=0.01)
+def test_a_time_limit_before_the_first_path_leaves_an_incomplete_record(tmp_path):
+    found = vk.energy_continuation(WELLS, "damping_ratio", [0.1], analyzer=QUICK, time_limit=0.01)
+    assert not found.complete
+    assert found.branches == ()
+    (stopped,) = found.found(Code.STOPPED)
+    assert stopped.values["reason"] == "time limit"
+    found.save(tmp_path / "c.nc")
+    assert vk.load_result(tmp_path / "c.nc").branches == ()
 
 
 @pytest.mark.parametrize("stopped_in", ["attractors", "action plot"])

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 import vibrokit as vk
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.progress import OutOfTime
 from vibrokit.results.codes import Code
 from vibrokit.structure import continuation as module
 from vibrokit.structure.attractors.describe import describe_orbit
@@ -268,7 +267,6 @@ def small():
 def test_an_interrupt_at_any_moment_leaves_the_values_found(small):
     osc, whole, seen = small
     stages = ("values", "branches", "basin fractions")
-    empty = 0
     for call in np.unique(np.linspace(1, len(seen), 25).astype(int)):
         calls = itertools.count(1)
 
@@ -276,11 +274,7 @@ def test_an_interrupt_at_any_moment_leaves_the_values_found(small):
             if next(calls) == call:
                 raise KeyboardInterrupt
 
-        try:
-            part = continuation(osc, "spring.linear", **SMALL, progress=listener)
-        except KeyboardInterrupt:
-            empty += 1
-            continue
+        part = continuation(osc, "spring.linear", **SMALL, progress=listener)
         (stopped,) = part.found(Code.STOPPED)
         assert stopped.values["stage"] in stages
         assert not part.complete
@@ -288,17 +282,13 @@ def test_an_interrupt_at_any_moment_leaves_the_values_found(small):
         assert len(part.values) == 3 or stopped.values["stage"] == "values"
         for number in part.branches:  # joined, if only by distance; the last value may hold a part of its attractors
             assert len(part.branch(number)) >= len(part.values) - 1
-        assert len(part.branches) == 2 or len(part.values) == 1
-    assert 0 < empty < 12
+        assert len(part.branches) == 2 or len(part.values) <= 1
 
 
 def test_a_time_limit_is_told_from_an_interrupt(small):
     osc, whole, _ = small
     for share in (0.3, 0.7):
-        try:
-            part = continuation(osc, "spring.linear", **SMALL, time_limit=share * whole.seconds)
-        except OutOfTime:
-            continue
+        part = continuation(osc, "spring.linear", **SMALL, time_limit=share * whole.seconds)
         assert all(stopped.values["reason"] == "time limit" for stopped in part.found(Code.STOPPED))
         assert part.complete == (not part.found(Code.STOPPED))
 

@@ -209,6 +209,10 @@ class Analyzer(ABC):
             raise SceneError("the scene has no noise, so nothing leaves an attractor; give it a noise model.")
         if not isinstance(self.exit, Exit):
             raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
+        if not structure.attractors:
+            raise StructureError(
+                "the structure has no attractors, because its search was stopped before; find it with more time."
+            )
         self.exit.check(osc, structure)
         return structure.attractors if self.source is None else (structure.attractor(self.source),)
 

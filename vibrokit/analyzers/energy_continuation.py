@@ -53,8 +53,7 @@ def energy_continuation(
     agrees with its derivative at both ends, so that a path is not exchanged for another one. Where paths cost the same,
     the least action passes from one to the other; a path that does not exist at any searched value is not found.
 
-    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If no path is
-    known by then, KeyboardInterrupt is raised.
+    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete.
 
     Parameters
     ----------
@@ -157,11 +156,9 @@ class _Run:
                     self._search(place)
                     advance()
         except KeyboardInterrupt as interrupt:
-            if not self.curves:
-                raise
             self.findings.append(Finding.stopped("searched values", interrupt))
             self.complete = False
-        if not self.curves:
+        if not self.curves and self.complete:
             reasons = [str(finding) for finding in self.findings] or ["all paths lead from sets that are no orbits."]
             raise StructureError(f"{_CALLER}: no exit path was found at any searched value. {reasons[0]}")
 

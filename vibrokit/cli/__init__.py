@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0 if all went well, 1 if an analysis or a check failed or is incomplete, 2 if the input is wrong, 130 after
-        Ctrl-C.
+        Ctrl-C, 143 after SIGTERM.
     """
     options = parsed(arguments)
     try:
@@ -63,7 +63,8 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser(
         "run",
         help="find steady states and their activation energies",
-        epilog="Ctrl-C and the time limit stop the work; what was found is printed and saved, marked incomplete.",
+        epilog="Each result is printed and saved when it is found. Ctrl-C, SIGTERM and the time limit stop the work; "
+        "what was found is kept, marked incomplete.",
     )
     run.add_argument("scene", nargs="?", help=which)
     run.add_argument(

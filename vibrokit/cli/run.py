@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vibrokit.cli.interrupts import Interrupts
-from vibrokit.errors import VibrokitError
+from vibrokit.errors import OutOfTime, VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer
@@ -45,6 +45,7 @@ class Outcome:
     results: dict[str, Result] = dataclasses.field(default_factory=dict)
     findings: list[Finding] = dataclasses.field(default_factory=list)
     files: dict[str, Path] = dataclasses.field(default_factory=dict)
+    printed: set[str] = dataclasses.field(default_factory=set)
     seconds: float = 0.0
     failed: bool = False
 
@@ -59,7 +60,7 @@ class Outcome:
         """Whether all that was asked for is there."""
         return {STRUCTURE, *self.asked} == {name for name, record in self.records.items() if record.complete}
 
-    def stopped(self, reason: KeyboardInterrupt) -> None:
+    def stopped(self, reason: KeyboardInterrupt | OutOfTime) -> None:
         """Note that the work ended before its records could say so."""
         from vibrokit.results.finding import Finding
 
@@ -80,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         try:
             _work(plan, options, interrupts, outcome)
             interrupts.finishing()
-        except KeyboardInterrupt as stopped:  # no steady state was known yet, or Ctrl-C was pressed twice
+        except (KeyboardInterrupt, OutOfTime) as stopped:  # before there was a structure, or Ctrl-C was pressed twice
             interrupts.finishing()
             outcome.stopped(stopped)
         _save(outcome, options)
@@ -89,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
             _draw(outcome, options)
         if interrupts.requested:
             print(f"vibrokit: interrupted; {_written(outcome)}.", file=sys.stderr)
-            return 130
+            return interrupts.status
         return outcome.status
 
 
@@ -150,6 +151,7 @@ def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outco
         try:
             cells = (options.cells, options.cells)
             outcome.structure = find_structure(plan.osc, cells=cells, stepper=plan.stepper, rng=options.seed)
+            _print_records(outcome, options)
             for name, analyzer in plan.analyzers.items():
                 if interrupts.requested or not all(record.complete for record in outcome.records.values()):
                     not_run(name, "the work was stopped before.")
@@ -162,37 +164,52 @@ def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outco
                 except Exception as error:  # of a plug-in, or a mistake of ours: what was found is kept
                     traceback.print_exc()
                     not_run(name, f"{type(error).__name__}: {error}")
+                else:
+                    _save_results(outcome, options)
+                    _print_records(outcome, options)
         finally:
             outcome.seconds = work.seconds
 
 
-def _save(outcome: Outcome, options: argparse.Namespace) -> None:
-    """Write what was found, if a file was asked for.
+def _save_results(outcome: Outcome, options: argparse.Namespace) -> list[str]:
+    """Write the results that were not written yet, if a file was asked for; return the names of all with a content."""
+    names = [name for name, one in outcome.results.items() if one.complete or one.energies or one.data]
+    for name in names:
+        if options.output is not None and name not in outcome.files:
+            _write(outcome, name, _numbered(options.output, name, len(outcome.asked)))
+    return names
 
-    The results are written; the structure too if no analyzer has a result, or if something is missing.
-    """
-    if options.output is None:
-        return
-    results = {
-        name: result for name, result in outcome.results.items() if result.complete or result.energies or result.data
-    }
-    targets = {name: _numbered(options.output, name, len(outcome.asked)) for name in results}
-    if outcome.structure is not None and not (results and outcome.complete):
-        targets[STRUCTURE] = _numbered(options.output, STRUCTURE, 1 + len(results))
-    for name, path in targets.items():
-        try:
-            outcome.records[name].save(path)
-        except (VibrokitError, OSError) as error:
-            outcome.failed = True
-            print(f"vibrokit: {path} was not written: {error}", file=sys.stderr)
-        else:
-            outcome.files[name] = path
+
+def _save(outcome: Outcome, options: argparse.Namespace) -> None:
+    """Write what was not written yet; the structure too if no analyzer has a result, or if something is missing."""
+    results = _save_results(outcome, options)
+    if options.output is not None and outcome.structure is not None and not (results and outcome.complete):
+        _write(outcome, STRUCTURE, _numbered(options.output, STRUCTURE, 1 + len(results)))
+
+
+def _write(outcome: Outcome, name: str, path: Path) -> None:
+    try:
+        outcome.records[name].save(path)
+    except (VibrokitError, OSError) as error:
+        outcome.failed = True
+        print(f"vibrokit: {path} was not written: {error}", file=sys.stderr)
+    else:
+        outcome.files[name] = path
+
+
+def _print_records(outcome: Outcome, options: argparse.Namespace) -> None:
+    """Print as text what was not printed yet; JSON is one object, printed at the end."""
+    from vibrokit.report.text import record_text
+
+    for name, record in outcome.records.items():
+        if not options.json and name not in outcome.printed:
+            print(record_text(f"{options.scene}: {name}", record), end="\n\n", flush=True)
+            outcome.printed.add(name)
 
 
 def _print(outcome: Outcome, options: argparse.Namespace) -> None:
-    """Print what was found, as one JSON object or as text; what was not run goes to standard error too."""
+    """Print what was not printed yet, or one JSON object; what was not run goes to standard error too."""
     from vibrokit.report.data import findings_data, run_data
-    from vibrokit.report.text import record_text
     from vibrokit.results.record import versions
 
     for finding in outcome.findings:
@@ -203,8 +220,7 @@ def _print(outcome: Outcome, options: argparse.Namespace) -> None:
         found |= {"files": {name: str(path) for name, path in outcome.files.items()}, "versions": versions()}
         print(json.dumps({**found, "seed": options.seed, "seconds": outcome.seconds}, allow_nan=False))
     else:
-        for name, record in outcome.records.items():
-            print(record_text(f"{options.scene}: {name}", record), end="\n\n")
+        _print_records(outcome, options)
         print(f"{outcome.seconds:.1f} s; {_written(outcome)}.")
     sys.stdout.flush()
 

@@ -13,7 +13,9 @@ import threading
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
-from vibrokit.progress import Work, count, opened
+from vibrokit.progress import Work, count, current, opened
+
+_GLANCE = 0.2  # s between looks at the time limit while others work
 
 Task = tuple[Any, ...]
 
@@ -26,6 +28,8 @@ def carry(
     Without an executor the caller does the tasks together with threads of this process. It does a single task, and
     those of a task of its own, alone: handing over costs more than most of them. A task that fails in an executor is
     submitted a second time: workers can be lost, also while they return a result.
+
+    A time limit is seen also while a task is under way, and threads of this process are then asked to end theirs.
     """
     if executor is not None:
         found = _submitted(work, tasks, executor)
@@ -37,6 +41,7 @@ def carry(
         for result, counts in found:
             count(**counts)
             yield result
+            current().check()
 
 
 def _submitted(
@@ -46,9 +51,10 @@ def _submitted(
     pending = [executor.submit(_counted_apart, work, task) for task in tasks]
     try:
         for number, future in enumerate(pending):
-            futures.wait((future,))
+            _await(future)
             if future.cancelled() or future.exception():
                 pending[number] = future = executor.submit(_counted_apart, work, tasks[number])
+                _await(future)
             yield future.result()
     finally:
         for future in pending:
@@ -62,15 +68,16 @@ def _together(work: Callable[..., Any], tasks: list[Task]) -> Generator[tuple[An
     """
     waiting = collections.deque(range(len(tasks)))
     results = [futures.Future[Any]() for _ in tasks]
+    over, around = threading.Event(), current()
 
-    def do_next() -> bool:
+    def do_next(part: Work) -> bool:
         try:
             number = waiting.popleft()
         except IndexError:
             return False
         outer, _inside.task = _inside.task, True
         try:
-            results[number].set_result(_counted_apart(work, tasks[number]))
+            results[number].set_result(_counted_apart(work, tasks[number], part))
         except BaseException as error:
             results[number].set_exception(error)
             if not isinstance(error, Exception):  # an interrupt does not wait for its turn
@@ -80,19 +87,43 @@ def _together(work: Callable[..., Any], tasks: list[Task]) -> Generator[tuple[An
         return True
 
     def help_out() -> None:
-        while do_next():
+        while do_next(_Part(over)):
             pass
 
     helpers = [_threads().submit(help_out) for _ in range(min(processors(), len(tasks)) - 1)]
     try:
         for result in results:
-            while not result.done() and do_next():
+            while not result.done() and do_next(_Part(over, around)):
                 pass
+            _await(result)
             yield result.result()
     finally:
         waiting.clear()
+        over.set()
         if not all(result.done() for result in results):
             futures.wait([helper for helper in helpers if not helper.cancel()])
+
+
+class _Part(Work):
+    """Work on one task, counted apart; it stops when the others are over, or when the work around it does."""
+
+    def __init__(self, over: threading.Event, around: Work | None = None) -> None:
+        super().__init__()
+        self._over, self._around = over, around
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt if nobody waits for the task any more, and what the work around it raises."""
+        if self._over.is_set():
+            raise KeyboardInterrupt
+        if self._around is not None:
+            self._around.check()
+
+
+def _await(future: futures.Future[Any]) -> None:
+    """Wait until a task is done; a time limit of the work under way ends that."""
+    while not future.done():
+        futures.wait((future,), timeout=_GLANCE)
+        current().check()
 
 
 class _Inside(threading.local):
@@ -120,11 +151,11 @@ if sys.platform != "win32":
     os.register_at_fork(after_in_child=_threads.cache_clear)  # a child has none of its parent's threads
 
 
-def _counted_apart(work: Callable[..., Any], task: Task) -> tuple[Any, Mapping[str, int]]:
+def _counted_apart(work: Callable[..., Any], task: Task, part: Work | None = None) -> tuple[Any, Mapping[str, int]]:
     """Do a task, in whatever thread or process; return its result and what it counted."""
 
     def counted() -> tuple[Any, Mapping[str, int]]:
-        with opened(Work()) as own:
+        with opened(part or Work()) as own:
             return work(*task), dict(own.counts)
 
     return contextvars.Context().run(counted)  # it may run in the calling thread

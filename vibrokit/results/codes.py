@@ -55,6 +55,12 @@ class Code(StrEnum):
 
     # Structure
     STEADY_STATES = "steady-states", INFO, "Steady states: {count}, from {starts} starts."
+    SEARCH_STOPPED = (
+        "search-stopped", ERROR,
+        "The search for steady states was stopped after {periods} periods of its {starts} starts: {settled} had "
+        "settled, {moving} were still moving in the region, {left} were outside it, and {diverged} had diverged.",
+        "Run it again with more time, or with fewer starts.",
+    )  # fmt: skip
     SHIFTED_COPIES = (
         "shifted-copies", INFO,
         "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, the "

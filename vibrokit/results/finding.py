@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from vibrokit.errors import shown
-from vibrokit.progress import OutOfTime
+from vibrokit.errors import OutOfTime, shown
+from vibrokit.progress import Deadline
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code, Severity
 
@@ -58,15 +58,15 @@ class Finding:
         return cls(code, source, target, values)
 
     @classmethod
-    def stopped(cls, stage: str, reason: KeyboardInterrupt, source: int | None = None) -> Finding:
+    def stopped(cls, stage: str, reason: KeyboardInterrupt | OutOfTime, source: int | None = None) -> Finding:
         """Make the finding that a stage was stopped, by the user or by a time limit."""
-        word = TIME_LIMIT if isinstance(reason, OutOfTime) else INTERRUPT
+        word = TIME_LIMIT if isinstance(reason, Deadline | OutOfTime) else INTERRUPT
         return cls.of(Code.STOPPED, source, stage=stage, reason=word)
 
     @property
     def interrupt(self) -> KeyboardInterrupt:
         """The interrupt that `stopped` was made of, for the work around to stop too."""
-        return OutOfTime() if self.values.get("reason") == TIME_LIMIT else KeyboardInterrupt()
+        return Deadline() if self.values.get("reason") == TIME_LIMIT else KeyboardInterrupt()
 
     @property
     def severity(self) -> Severity:

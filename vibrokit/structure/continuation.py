@@ -70,7 +70,7 @@ def continuation(
     distance between the sets of points. Finally, basin fractions are found on a grid.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete; branches that
-    were not followed yet are joined by distance. If nothing is known by then, KeyboardInterrupt is raised.
+    were not followed yet are joined by distance. The findings of the value under way say what its starts were doing.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ class _Run:
         self.stopped: Finding | None = None
 
     def run(self) -> None:
-        """Go through the stages; an interrupt ends them once something is known, and is raised before that."""
+        """Go through the stages; an interrupt ends them, and what is known by then is kept."""
         doing = "values"
         try:
             self._search()
@@ -161,8 +161,6 @@ class _Run:
             doing = "basin fractions"
             self._find_fractions()
         except KeyboardInterrupt as interrupt:
-            if not self.found:
-                raise
             self.stopped = Finding.stopped(doing, interrupt)
             self.tracing.pair_off()
 

@@ -42,8 +42,8 @@ def find_structure(
     it survives both; its largest Lyapunov exponent determines its kind. Basins are found on a grid, saddles by tracking
     the basins' boundaries, manifolds from the saddles.
 
-    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If no attractor
-    is known by then, KeyboardInterrupt is raised.
+    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If that is
+    during the search for attractors, a finding says what the starts were doing.
 
     Parameters
     ----------

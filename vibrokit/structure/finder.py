@@ -73,7 +73,7 @@ class Finder:
         self.doing = ""
 
     def run(self) -> None:
-        """Go through the stages; an interrupt ends them once an attractor is known, and is raised before that."""
+        """Go through the stages; an interrupt ends them, and what is known by then is kept."""
         stages = {"attractors": self._find_attractors, "basins": self._find_basins}
         stages |= {"saddles": self._find_saddles} if self.request.saddles else {}
         stages |= {"manifolds": self._grow_manifolds} if self.request.saddles and self.request.manifolds else {}
@@ -81,8 +81,6 @@ class Finder:
             for self.doing, find in stages.items():
                 find()
         except KeyboardInterrupt as interrupt:
-            if not self.search.attractors:
-                raise
             self.stopped = Finding.stopped(self.doing, interrupt)
             self._order()
 
@@ -134,7 +132,9 @@ class Finder:
     @cached_property
     def frame(self) -> Region:
         """Region of the basin grid."""
-        return self.region or frame_of(self.osc, self.search.attractors)
+        if self.region is not None or not self.search.attractors:
+            return self.searched
+        return frame_of(self.osc, self.search.attractors)
 
     @cached_property
     def settling(self) -> float:
@@ -229,6 +229,8 @@ class Finder:
             found.append(Finding.of(Code.SHIFTED_COPIES, shift=self.shift))
         if search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
+        if self.stopped and self.doing == "attractors":
+            found.append(search.progress)
         found += search.findings
         found += [_survival_finding(survival) for survival in search.survival]
         found += grid.findings

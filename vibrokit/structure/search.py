@@ -71,6 +71,8 @@ class Search:
         self.at_rest: tuple[Equilibrium, ...] = ()  # by position
         self.survival: tuple[Survival, ...] = ()
         self.starts = self.diverged = 0
+        self.unsettled = np.empty((0, 2))  # states of the starts that have not settled, after so many periods
+        self.periods = 0
         self.findings: list[Finding] = []
 
     def run(self, states: Array, wait: int, patient: bool) -> None:
@@ -80,7 +82,7 @@ class Search:
         `patient` is whether that is as long as the damping requires. If not, and nothing has settled, motion that goes
         on is not evidence of an attractor.
         """
-        self.starts = len(states)
+        self.starts, self.unsettled = len(states), states
         with stage("attractors", unit="starts", total=self.starts):
             if self.osc.autonomous:  # then starts need not be followed until they rest, which is long on stiff stops
                 self.at_rest = tuple(equilibria(self.osc, *self.region.x))
@@ -88,7 +90,8 @@ class Search:
                     self._add_orbit(rest.point, 1)
             for periods in _rounds(wait):
                 states = self._after(states, periods)
-                states = self._add_orbits(states, LONGEST_PERIOD)
+                self.unsettled, self.periods = states, self.periods + periods
+                states = self.unsettled = self._add_orbits(states, LONGEST_PERIOD)
                 report(self.starts - len(states))
                 if not len(states):
                     return
@@ -97,6 +100,16 @@ class Search:
             elif patient or self.attractors:
                 self._watch(states)
             report(self.starts)
+
+    @property
+    def progress(self) -> Finding:
+        """What the starts were doing after the last round."""
+        moving = int(self.region.contains(self.unsettled[:, :2]).sum())
+        settled, left = self.starts - self.diverged - len(self.unsettled), len(self.unsettled) - moving
+        return Finding.of(
+            Code.SEARCH_STOPPED, starts=self.starts, periods=self.periods, settled=settled, moving=moving, left=left,
+            diverged=self.diverged,
+        )  # fmt: skip
 
     def _arrival(self) -> Stop:
         """The test for having reached a known attractor, or a state from which motion cannot leave the well of one."""

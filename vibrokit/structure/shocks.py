@@ -51,7 +51,7 @@ def shape_stability(
     leads to another attractor or out of the region for good. Basins can have holes that these kicks miss, so the size
     is an upper bound.
 
-    Ctrl-C and the time limit raise KeyboardInterrupt.
+    Nothing is returned on Ctrl-C, which raises KeyboardInterrupt, or after the time limit.
 
     Parameters
     ----------
@@ -74,6 +74,8 @@ def shape_stability(
 
     Raises
     ------
+    OutOfTime
+        The time limit was reached.
     StructureError
         Counts that are not whole numbers, 1 or more; a structure of another scene.
     """

@@ -59,7 +59,7 @@ def unstable_orbits(
     those created at grazing. The derivative is that of the variational equations; what it converges to is refined with
     located contacts. There is no guarantee that all orbits are found; more starts may find more.
 
-    Ctrl-C and the time limit raise KeyboardInterrupt.
+    Nothing is returned on Ctrl-C, which raises KeyboardInterrupt, or after the time limit.
 
     Parameters
     ----------
@@ -89,6 +89,8 @@ def unstable_orbits(
 
     Raises
     ------
+    OutOfTime
+        The time limit was reached.
     StructureError
         The period is not a whole number, 1 or more, or is not 1 without periodic excitation; the region is not one.
     NoSectionError

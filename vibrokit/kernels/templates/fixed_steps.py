@@ -10,7 +10,9 @@ Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the
 it drives, Milstein's term makes it strong order 1. `given` normals, if any, replace those that a single trajectory
 draws.
 
-One driver serves all scenes, flows and steps of this kind; it reads from the facts of a scene what these need.
+One driver serves all scenes, flows and steps of this kind; it reads from the facts of a scene what these need. Some
+steps after it began, it returns to Python, and goes on when it is called with the same memory again: a trajectory has
+the same bits wherever it was cut.
 """
 
 import numpy as np
@@ -27,6 +29,20 @@ from vibrokit.kernels.templates.drawing import draw_lanes
 # Facts, before the parameters of a scene: lanes of a block, values of the forcing in a step, numbers that a step works
 # in, whether the forcing depends on time, and whether steps share factors.
 LANES, NODES, WORK, FORCED, PREPARED = 1, 2, 3, 4, 5
+
+
+MOST_STEPS = 4096  # taken in one go
+
+
+def memory_of(states, parameters, settings, streams):
+    """What `advance` keeps from call to call; the last array has what waits and what is active."""
+    equations, lanes, nodes = states.shape[1], int(parameters[LANES]), int(parameters[NODES])
+    intervals = max(int(settings[1]), 1) if parameters[FORCED] > 0.0 else 0
+    z, before, work = np.zeros((equations, lanes)), np.zeros((equations, lanes)), np.zeros(int(parameters[WORK]))
+    tabulated = np.zeros(max(intervals * int(settings[0]) * nodes, 1))
+    stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
+    holder, done = np.full(lanes, -1), np.zeros(lanes, dtype=np.int64)
+    return z, before, work, tabulated, stream, drawn, holder, done, np.array([0, 0, -1, 0])
 
 
 @njit(**CONTRACTED)
@@ -55,28 +71,35 @@ def advance(
     out_status,
     out_label,
     visits,
+    z,
+    before,
+    work,
+    tabulated,
+    stream,
+    drawn,
+    holder,  # (lanes,): the trajectory in each lane, −1 for none
+    done,  # (lanes,): intervals that it has passed
+    place,
+    most,  # steps before it returns
 ):
     count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
     forced, noisy, steps = parameters[FORCED] > 0.0, streams.shape[1] > 0, int(settings[0])
     # Intervals after which the forcing repeats; 0 if it never does.
     cycle = int(settings[1]) if forced else 1
     h = interval / steps
-    z, before = np.zeros((equations, lanes)), np.zeros((equations, lanes))
-    work, tabulated = np.zeros(int(parameters[WORK])), np.zeros(max(cycle, 1) * steps * nodes if forced else 1)
-    stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
     block, room, table, normals = pointer_to(z), pointer_to(work), pointer_to(tabulated), pointer_to(drawn)
     theta = offset_by(pointer_to(parameters), int(parameters[0]))
-    if parameters[PREPARED] > 0.0:
-        prepare(h, theta, room)
-    holder, done = np.zeros(lanes, dtype=np.int64), np.zeros(lanes, dtype=np.int64)
-    for lane in range(lanes):  # compiles faster than np.full
-        holder[lane] = -1
-    waiting, active, elapsed = 0, 0, 0
-    if forced:
-        for phase in range(cycle):
-            tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * nodes))
-    while waiting < count or active > 0:
-        if active == 0 or cycle > 0:  # otherwise lanes that do not share the phase of a newcomer go on first
+    waiting, active, elapsed, step, used = place[0], place[1], place[2], place[3], 0
+    if elapsed < 0:  # the first call
+        elapsed = 0
+        if parameters[PREPARED] > 0.0:
+            prepare(h, theta, room)
+        if forced:
+            for phase in range(cycle):
+                tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * nodes))
+    while used < most and (waiting < count or active > 0):
+        # If the forcing never repeats, lanes that do not share the phase of a newcomer go on first.
+        if step == 0 and (active == 0 or cycle > 0):
             if active == 0:
                 elapsed = phases[waiting]
             for lane in range(lanes):
@@ -102,22 +125,28 @@ def advance(
                     waiting += 1
             if active == 0:
                 break
-        if cycle == 0:
-            tabulate(start_time + elapsed * interval, h, steps, theta, table)
-        for e in range(equations):
-            for lane in range(lanes):
-                before[e, lane] = z[e, lane]
-        forces = offset_by(table, (elapsed % cycle if cycle > 0 else 0) * steps * nodes)
+        if step == 0:
+            if cycle == 0:
+                tabulate(start_time + elapsed * interval, h, steps, theta, table)
+            for e in range(equations):
+                for lane in range(lanes):
+                    before[e, lane] = z[e, lane]
+        forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
+        end = min(step + MOST_STEPS, steps)
+        used += end - step
         if noisy:
-            for step in range(steps):
+            for now in range(step, end):
                 draw_lanes(stream, drawn, lanes)
                 if given.shape[0] > 0:
-                    drawn[0] = given[done[0] * steps + step, 0]
-                    drawn[lanes] = given[done[0] * steps + step, 1]
+                    drawn[0] = given[done[0] * steps + now, 0]
+                    drawn[lanes] = given[done[0] * steps + now, 1]
                 step_lanes(block, forces, normals, theta, room, h, 1)
                 forces = offset_by(forces, nodes)
         else:
-            step_lanes(block, forces, normals, theta, room, h, steps)
+            step_lanes(block, forces, normals, theta, room, h, end - step)
+        step = end if end < steps else 0
+        if step > 0:
+            continue
         elapsed += 1
         for lane in range(lanes):
             index = holder[lane]
@@ -157,5 +186,5 @@ def advance(
             out_label[index] = label
             holder[lane] = -1
             active -= 1
-    # Numba frees an array after its last use, which must not be before that of the pointers to it.
-    work[0], tabulated[0], drawn[0] = 0.0, 0.0, 0.0
+    place[0], place[1], place[2], place[3] = waiting, active, elapsed, step
+    return used

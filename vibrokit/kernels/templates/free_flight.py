@@ -33,6 +33,9 @@ from vibrokit.kernels.templates.steps import (
 
 # --- scene above, stepper below ---
 
+# The task of a flight that goes on after the next attempt; steps from one such pause to the next.
+FLIES, PAUSE = 5.0, 1024.0
+
 
 @njit(**INNER)
 def fly(lane, memory, pushing, theta, settings, lanes, room):
@@ -43,6 +46,10 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
         memory[COUNT] += 1.0
         if memory[COUNT] > settings[1]:
             return STALLED
+        if memory[COUNT] % PAUSE == 0.0:
+            memory[TASK] = FLIES
+            put(y, STATE, lane, lanes)
+            return UNDERWAY
         remaining = memory[END] - y[CLOCK]
         last = remaining <= 1.01 * reach
         length, touched = remaining if last else reach, -1
@@ -65,7 +72,10 @@ def fly(lane, memory, pushing, theta, settings, lanes, room):
 
 @njit(**INNER)
 def judge(lane, memory, pushing, theta, settings, lanes, room):
-    """Judge an attempt, which is always one in contact: ask for another, or go on from its end."""
+    """Go on after a pause of the flight, or judge an attempt in contact: ask for another, or go on from its end."""
+    if memory[TASK] == FLIES:
+        memory[TASK] = STEPS
+        return COMPLETED
     if STOPS:
         if memory[TASK] == STEPS:
             return judge_contact(lane, memory, pushing, theta, settings, lanes, room)

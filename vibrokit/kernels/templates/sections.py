@@ -1,8 +1,13 @@
-"""From section to section, for steppers that locate their events."""
+"""From section to section, for steppers that locate their events.
+
+Some work after it began, `advance` returns to Python, and goes on when it is called with the same memory again: a
+trajectory has the same bits wherever it was cut.
+"""
 
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.links import LINKS
 from vibrokit.kernels.options import INNER, OPTIONS
 from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
@@ -30,7 +35,6 @@ from vibrokit.kernels.templates.steps import (
     WORK,
     barriers,
     face,
-    keep_alive,
     of,
     put,
     size_of,
@@ -84,6 +88,14 @@ def clear(lane, stops, lanes):
         lanes[number] = 0.0
 
 
+def memory_of(states, parameters, settings, streams):
+    """What `advance` keeps from call to call; the last array has what waits and what is active."""
+    stops = int(parameters[int(parameters[0]) - 1 - LINKS])
+    numbers, switches = np.zeros(stops * LANES + ROOM), np.zeros(LANES * max(stops, 1), dtype=np.uint8)
+    holder, done, ended = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64), np.full(LANES, UNDERWAY)
+    return numbers, switches, holder, done, ended, np.zeros(2, dtype=np.int64)
+
+
 @njit(**OPTIONS)
 def advance(
     states,
@@ -110,10 +122,16 @@ def advance(
     out_status,
     out_label,
     visits,
+    numbers,
+    switches,
+    holder,  # (LANES,): the trajectory in each lane, −1 for none
+    done,  # (LANES,): intervals that it has passed
+    ended,  # (LANES,): how an interval ended that is not concluded yet, else UNDERWAY
+    place,
+    most,  # attempts and intervals before it returns
 ):
     facts, theta = offset_by(pointer_to(parameters), 1), offset_by(pointer_to(parameters), int(parameters[0]))
     settings, stops = pointer_to(options), barriers(theta)
-    numbers, switches = np.zeros(stops * LANES + ROOM), np.zeros(LANES * max(stops, 1), dtype=np.uint8)
     lanes, pushing = offset_by(pointer_to(numbers), stops * LANES), pointer_to(switches)
     room = offset_by(lanes, WORK)
     y, equations = room, states.shape[1]
@@ -121,18 +139,18 @@ def advance(
     cycle = int(settings[2])  # intervals after which the forcing repeats; 0 if it never does
     goes_on = settings[4] > 0.0  # for this time; otherwise each interval begins anew
     span = settings[4] if goes_on else interval
-    count, waiting, active = states.shape[0], 0, 0
-    holder, done = np.zeros(LANES, dtype=np.int64), np.zeros(LANES, dtype=np.int64)
-    for lane in range(LANES):  # compiles faster than np.full
-        holder[lane] = -1
-    while waiting < count or active > 0:
+    count, waiting, active, used = states.shape[0], place[0], place[1], 0
+    while used < most and (waiting < count or active > 0):
         for lane in range(LANES):
             own, pushed = offset_by(room, MEMORIES + lane * MEMORY), offset_by(pushing, lane * max(stops, 1))
             status = UNDERWAY
             if holder[lane] >= 0:
-                status = judge(lane, own, pushed, theta, settings, lanes, room)
-                status = proceed(status, lane, own, pushed, theta, settings, lanes, room)
-            while status != UNDERWAY or (holder[lane] < 0 and waiting < count):
+                status = ended[lane]
+                if status == UNDERWAY:
+                    status = judge(lane, own, pushed, theta, settings, lanes, room)
+                    status = proceed(status, lane, own, pushed, theta, settings, lanes, room)
+            while used < most and (status != UNDERWAY or (holder[lane] < 0 and waiting < count)):
+                used += 1 + int(own[COUNT])
                 begins = True
                 if holder[lane] >= 0:  # an interval has ended
                     index, label, begins = holder[lane], -1, not goes_on
@@ -178,7 +196,10 @@ def advance(
                     begin(y, span, lane, own, pushed, theta, settings, lanes, room)
                 travel(start + interval, own)
                 status = proceed(COMPLETED, lane, own, pushed, theta, settings, lanes, room)
+            ended[lane] = status
+        used += 1
         if active > 0:
             attempt(lanes, pushing, theta, room, facts)
             misfit(lanes, settings[0], abs(span), facts)
-    keep_alive(numbers, switches)
+    place[0], place[1] = waiting, active
+    return used

@@ -65,12 +65,6 @@ MORE = 99.0  # attempts that a tiny one counts as, besides itself
 
 
 @njit(**INNER)
-def keep_alive(numbers, switches):
-    """Numba frees an array after its last use, which must not be before that of the pointers to it."""
-    numbers[0], switches[0] = 0.0, 0
-
-
-@njit(**INNER)
 def barriers(theta):
     """Number of stops. Before it is what jumps at them, and before that are five facts of each stop."""
     return int(theta[-1 - LINKS])
