@@ -8,7 +8,9 @@ import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
+from vibrokit.symbolic.domain import Domain
 from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
@@ -110,6 +112,32 @@ class Model:
     def drift(self) -> sympy.Matrix:
         """Drift b(q, t) with stops as `Piecewise`, a column of length n."""
         return self.drift_with(self.forcing, tuple(map(self.guarded_force, range(len(self.scene.barriers)))))
+
+    @cached_property
+    def borders(self) -> tuple[Border, ...]:
+        """Where motion without noise ends: the poles of the forces, and the edges of their domains."""
+        x, v = self.state[:2]
+        found = dict.fromkeys(one for rate in (self.smooth_force, *self._extra_drift) for one in self._borders(rate))
+        for index, (contact, barrier) in enumerate(zip(self.contacts, self.scene.barriers, strict=True)):
+            depth = barrier.sign * (x - self.symbols[f"barriers.{index}.position"])
+            for one in borders_of(contact.law, (DEPTH, RATE)):
+                gauge = one.gauge.subs({DEPTH: sympy.Max(depth, 0), RATE: barrier.sign * v}, simultaneous=True)
+                found[Border(gauge, one.pole)] = None
+        return tuple(found)
+
+    @cached_property
+    def noise_borders(self) -> tuple[Border, ...]:
+        """Where noisy motion ends besides: the borders of the amplitude of the noise."""
+        return tuple(one for one in self._borders(sum(self.amplitude)) if one not in self.borders)
+
+    def _borders(self, expression: sympy.Expr) -> tuple[Border, ...]:
+        return borders_of(sympy.sympify(expression), self.state)
+
+    @cached_property
+    def domain(self) -> Domain:
+        """The intervals of x in which a mass at rest has a force, at the parameters of the scene."""
+        at_rest = dict.fromkeys(self.state[1:], sympy.Integer(0)) | self._numbers
+        return Domain([border.at(at_rest) for border in self.borders], self.state[0])
 
     @cached_property
     def amplitude(self) -> sympy.Matrix:
