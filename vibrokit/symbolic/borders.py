@@ -37,8 +37,14 @@ class Border:
     gauge: sympy.Expr
     pole: bool
 
-    def __str__(self) -> str:
-        return f"{self.gauge} ≠ 0" if self.pole else f"{self.gauge} > 0"
+    @property
+    def relation(self) -> str:
+        """How the gauge compares with 0 where the formula has a value: "≠" or ">"."""
+        return "≠" if self.pole else ">"
+
+    def in_words(self, gauge: str) -> str:
+        """Return what the border is, with the text of its gauge."""
+        return f"a pole of the forces ({gauge} = 0)" if self.pole else f"where the forces end ({gauge} > 0 inside)"
 
     def at(self, values: dict[sympy.Symbol, sympy.Expr]) -> Border:
         """Return the border with values in place of symbols."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import sympy
@@ -56,6 +56,27 @@ class Domain:
 
     def _holds(self, x: float) -> bool:
         return all(pole or gauge(np.array([x]))[0] > 0 for gauge, _, pole in self._gauges)
+
+
+def border_ahead(
+    borders: Sequence[Border], state: Sequence[sympy.Symbol], place: Sequence[float], change: Sequence[float]
+) -> tuple[int, list[float]] | None:
+    """Return which border is the first on the straight way from a place in the state space to place + change, and where.
+
+    The borders have numbers in place of parameters. None if there is no border on the way.
+    """
+    share = sympy.Symbol("share", real=True)
+    way = {q: sympy.Float(at) + share * sympy.Float(by) for q, at, by in zip(state, place, change, strict=True)}
+    met = [
+        (zero, number)
+        for number, border in enumerate(borders)
+        for zero in _zeros(border.at(way), share)(0.0, 1.0)
+        if 0.0 <= zero <= 1.0
+    ]
+    if not met:
+        return None
+    first, number = min(met)
+    return number, [at + first * by for at, by in zip(place, change, strict=True)]
 
 
 def _inside(low: float, high: float) -> float:

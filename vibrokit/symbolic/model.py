@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import sympy
@@ -10,7 +11,7 @@ from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
-from vibrokit.symbolic.domain import Domain
+from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
@@ -132,6 +133,20 @@ class Model:
 
     def _borders(self, expression: sympy.Expr) -> tuple[Border, ...]:
         return borders_of(sympy.sympify(expression), self.state)
+
+    def border_ahead(self, state: Sequence[float], time: float, lapse: float) -> str:
+        """Return in words the border that the motion from a state (x, v, …) meets within a time (s); "" for none.
+
+        For so short a time the motion is a straight line.
+        """
+        values = self._numbers | dict(zip(self.state, state, strict=True)) | {self.time: time}
+        change = [lapse * float(rate) for rate in self.drift.subs(values).evalf()]
+        met = border_ahead([border.at(self._numbers) for border in self.borders], self.state, state, change)
+        if met is None:
+            return ""
+        border, place = self.borders[met[0]], zip(self.state, met[1], strict=True)
+        where = ", ".join(f"{q} = {at:.6g}" for q, at in place if q in border.gauge.free_symbols)
+        return f"{where}, {border.in_words(as_text(border.gauge))}"
 
     @cached_property
     def domain(self) -> Domain:
@@ -260,6 +275,9 @@ class Model:
         lines = [rf"\dot{{{as_latex(q)}}} &= {as_latex(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines.append(rf"\dot{{S}} &= {as_latex(self.action_rate)}")
+        for border in (*self.borders, *self.noise_borders):
+            if border.at(self._numbers).exists:
+                lines.append(rf"{as_latex(border.gauge)} &{border.relation} 0")
         return r"\begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}"
 
     def _repr_latex_(self) -> str:
@@ -272,6 +290,9 @@ class Model:
         lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
+        for border in (*self.borders, *self.noise_borders):
+            if border.at(self._numbers).exists:
+                lines.append(f"{as_text(border.gauge)} {border.relation} 0")
         return "\n".join(lines)
 
 
