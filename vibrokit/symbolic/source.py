@@ -97,7 +97,7 @@ class SceneText:
                 "ROOTED": tuple(contact.rooted for contact in contacts),
                 "JUMPS": tuple(contact.jumps for contact in contacts),
             }
-        rows["FORCED"] = self.forced
+        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders)}
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
