@@ -242,9 +242,7 @@ class Oscillator(Scene):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
-_AT_BORDER = (
-    "no motion goes on from there: start elsewhere, follow the motion for a shorter time, or add a stop before that place."
-)
+_AT_BORDER = "no motion goes on from there: start elsewhere, follow it for a shorter time, or put a stop before it."
 
 
 def _advice(stepper: Stepper) -> str:

@@ -17,9 +17,7 @@ _REACH = 16.0  # times v Δt: under a force r⁻ⁿ the pole is ½ (n + 1) v Δt
 Array = NDArray[np.float64]
 
 
-def ending(
-    scene: Scene, flow: Flow, stepper: Stepper, state: Array, time: float, spacing: float
-) -> tuple[float, str]:
+def ending(scene: Scene, flow: Flow, stepper: Stepper, state: Array, time: float, spacing: float) -> tuple[float, str]:
     """Return when a trajectory ended (s), and at which border, in words; "" if it met none.
 
     The trajectory ends in the interval `spacing` after a time at which it was in `state`. Of a noisy one, that is the

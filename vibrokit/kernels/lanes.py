@@ -92,8 +92,10 @@ def _staged(text: SceneText) -> list[str]:
         lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
         lines += ended(text, start, point, at("room", stage, 0)) if stage else []
     if text.gauges:
-        end = [at("z", 0, row) + _combined(RESULT, functools.partial(at, "room", row=row)) for row in range(len(start))]
-        lines += ["    for lane in range(LANES):", *ended(text, start, end, at("room", 0, 0))]
+        last = [
+            at("z", 0, row) + _combined(RESULT, functools.partial(at, "room", row=row)) for row in range(text.states)
+        ]
+        lines += ["    for lane in range(LANES):", *ended(text, start, last, at("room", 0, 0))]
     lines += [f"    for number in range({size}):"]
     end = _combined(RESULT, lambda s: f"room[{s * size} + number]")
     return [*lines, f"        z[number] += {end.removeprefix(' + ')}"]

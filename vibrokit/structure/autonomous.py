@@ -87,8 +87,8 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
 def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 
-    They are searched for between the borders of the forces, each part by itself, because a force changes its sign at a
-    pole, too. Between the places where it is evaluated, the force is searched for changes of sign where it comes near 0 and turns
+    A force changes its sign at a pole, too, so each interval between borders of the forces is searched by itself.
+    Between the places where it is evaluated, the force is searched for changes of sign where it comes near 0 and turns
     back, so that a node and a saddle next to it are both found. A StructureError is raised for a scene with periodic
     excitation.
     """

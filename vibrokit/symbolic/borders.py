@@ -107,8 +107,10 @@ def _poles(divisor: sympy.Expr) -> Iterator[Border]:
         except sympy.PolynomialError:
             factors = [numerator]
         for factor in factors:
-            yield from [Border(factor, pole=True)] if factor in (divisor, numerator, -divisor) or factor.is_Add else (
-                _poles(factor)
+            yield from (
+                [Border(factor, pole=True)]
+                if factor in (divisor, numerator, -divisor) or factor.is_Add
+                else (_poles(factor))
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -45,7 +46,7 @@ class Domain:
     def intervals(self, low: float = -math.inf, high: float = math.inf) -> list[tuple[float, float]]:
         """Return the intervals between two places (m) in which the force has a value, in ascending order."""
         ends = [low, *self.borders(low, high), high]
-        return [(one, other) for one, other in zip(ends, ends[1:], strict=False) if self._holds(_inside(one, other))]
+        return [(one, other) for one, other in itertools.pairwise(ends) if self._holds(_inside(one, other))]
 
     def around(self, x: float) -> tuple[float, float]:
         """Return the interval that contains a place (m), or else the nearest; of two, the one on the right."""
@@ -61,7 +62,7 @@ class Domain:
 def border_ahead(
     borders: Sequence[Border], state: Sequence[sympy.Symbol], place: Sequence[float], change: Sequence[float]
 ) -> tuple[int, list[float]] | None:
-    """Return which border is the first on the straight way from a place in the state space to place + change, and where.
+    """Return which border is the first on the straight way from a state to place + change, and where it is met.
 
     The borders have numbers in place of parameters. None if there is no border on the way.
     """

@@ -148,6 +148,15 @@ class Model:
         where = ", ".join(f"{q} = {at:.6g}" for q, at in place if q in border.gauge.free_symbols)
         return f"{where}, {border.in_words(as_text(border.gauge))}"
 
+    def _present(self, more: Sequence[Border] = ()) -> list[Border]:
+        """The borders that are somewhere, at the parameters of the scene."""
+        return [border for border in (*self.borders, *more) if border.at(self._numbers).exists]
+
+    @property
+    def conditions(self) -> str:
+        """Where the forces have values, such as ``"h - x ≠ 0"``; "" if they have them everywhere."""
+        return " and ".join(f"{as_text(border.gauge)} {border.relation} 0" for border in self._present())
+
     @cached_property
     def domain(self) -> Domain:
         """The intervals of x in which a mass at rest has a force, at the parameters of the scene."""
@@ -275,9 +284,9 @@ class Model:
         lines = [rf"\dot{{{as_latex(q)}}} &= {as_latex(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines.append(rf"\dot{{S}} &= {as_latex(self.action_rate)}")
-        for border in (*self.borders, *self.noise_borders):
-            if border.at(self._numbers).exists:
-                lines.append(rf"{as_latex(border.gauge)} &{border.relation} 0")
+        signs = {"≠": r"\neq", ">": ">"}
+        present = self._present(self.noise_borders)
+        lines += [f"{as_latex(border.gauge)} &{signs[border.relation]} 0" for border in present]
         return r"\begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}"
 
     def _repr_latex_(self) -> str:
@@ -290,9 +299,7 @@ class Model:
         lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
-        for border in (*self.borders, *self.noise_borders):
-            if border.at(self._numbers).exists:
-                lines.append(f"{as_text(border.gauge)} {border.relation} 0")
+        lines += [f"{as_text(border.gauge)} {border.relation} 0" for border in self._present(self.noise_borders)]
         return "\n".join(lines)
 
 

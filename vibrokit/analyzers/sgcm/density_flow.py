@@ -197,7 +197,7 @@ class DensityFlow:
     def _followed(self, flow: Flow, states: Array, start: float, duration: float, sign: Array) -> tuple[Array, Array]:
         """States at the end, NaN if they diverge, and the share of cells that has been at the exit.
 
-        Where position decides, motion that has ended forwards in time, as at a pole, is out. `sign` undoes a reflection.
+        Where position decides, motion that ended on its way forwards, as at a pole, is out. `sign` undoes a reflection.
         """
         checks = 1 if self.beyond is None else _CHECKS
         farthest = np.full(len(states), -np.inf) if self.beyond is None else self.beyond(states * sign)
