@@ -95,6 +95,7 @@ class Oscillator(Scene):
             The state became infinite or NaN; the error has the time and the last finite state.
         """
         from vibrokit.kernels.choice import single_stepper
+        from vibrokit.kernels.ending import ending
         from vibrokit.kernels.single import record
 
         start = self._checked_states(state, 1)[0]
@@ -106,11 +107,18 @@ class Oscillator(Scene):
         path = record(self, flow, chosen, start, start_time, length / count, count, seed=seed)
         times: Array = start_time + length / count * np.arange(count + 1, dtype=float)
         if len(path) <= count:
-            last = tuple(float(value) for value in path[-1])
+            last, since = tuple(float(value) for value in path[-1]), float(times[len(path) - 1])
+            when, border = ending(self, flow, chosen, path[-1], since, length / count)
+            if border:
+                raise IntegrationError(
+                    f"the trajectory ended at t = {when:.6g}, at {border}, after the sample {last}; {_AT_BORDER}",
+                    when,
+                    last,
+                )
             raise IntegrationError(
-                f"the trajectory diverged between t = {times[len(path) - 1]:g} and {times[len(path)]:g}, after the "
+                f"the trajectory diverged between t = {since:g} and {times[len(path)]:g}, after the "
                 f"state {last}; {_advice(chosen)}",
-                float(times[len(path) - 1]),
+                since,
                 last,
             )
         return Trajectory(times, path, tuple(barrier.position for barrier in self.barriers))
@@ -150,6 +158,7 @@ class Oscillator(Scene):
             A state became infinite or NaN; the error has the trajectory, the time and the last finite state.
         """
         from vibrokit.kernels.choice import ensemble_stepper
+        from vibrokit.kernels.ending import ending
         from vibrokit.kernels.ensemble import run_ensemble
         from vibrokit.kernels.streams import streams_of
 
@@ -165,10 +174,11 @@ class Oscillator(Scene):
             first = failed[0]
             time = float(ended.intervals[first] * self.section_interval)
             last = tuple(float(value) for value in ended.states[first])
+            _, border = ending(self, flow, chosen, ended.states[first], time, self.section_interval)
             raise IntegrationError(
-                f"{failed.size} of {len(starts)} trajectories diverged; the first, number {first} from "
-                f"{tuple(starts[first].tolist())}, in the period after t = {time:g}, after the state {last}; "
-                f"{_advice(chosen)}",
+                f"{failed.size} of {len(starts)} trajectories {'ended' if border else 'diverged'}; the first, number "
+                f"{first} from {tuple(starts[first].tolist())}, in the period after t = {time:g}, after the state "
+                f"{last}{', at ' + border if border else ''}; {_AT_BORDER if border else _advice(chosen)}",
                 time,
                 last,
             )
@@ -230,6 +240,9 @@ class Oscillator(Scene):
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+
+_AT_BORDER = "no motion goes on from there: start elsewhere, follow it for a shorter time, or put a stop before it."
 
 
 def _advice(stepper: Stepper) -> str:

@@ -76,10 +76,14 @@ class AttemptWriter:
         values = [*self._text.variables, *["f"] * self._text.forced, *pushing, *self._text.parameters]
         slopes = [f"_slope{row}" for row in range(self._count)]
         lines += [f"        {', '.join(slopes)} = rates({', '.join(values)})"]
+        if self._text.gauges:
+            states = [self._at("STATE", row) for row in range(self._text.states)]
+            points = [*states, *self._text.variables[: self._text.states], *self._text.parameters]
+            lines += [f"        _slope0 += crossed({', '.join(points)})"]
         weight = "_weight*" if self._stops else ""
         rates = ["_weight" if self._stops else "1.0", *(f"{weight}{slope}" for slope in slopes)]
         lines += [f"        slopes[{row * LANES} + lane] = {rate}" for row, rate in enumerate(rates, start=_CLOCK)]
-        return [_IMPORTS, "\n".join([*lines, ""])]
+        return [_IMPORTS, self._text.crossed, "\n".join([*lines, ""])]
 
     def _at(self, name: str, row: int = 0) -> str:
         """Text of the number of a lane in a row of a block of rows."""

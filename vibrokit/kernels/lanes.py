@@ -29,14 +29,14 @@ CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 def classical_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    pieces = [tabulation(text, CLASSICAL_NODES), text.derivative, text.amplitude, text.slope]
+    pieces = [tabulation(text, CLASSICAL_NODES), text.derivative, text.crossed, text.amplitude, text.slope]
     return [*pieces, steps_of(text, _unrolled(text), len(CLASSICAL_NODES))]
 
 
 def staged_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
     nodes = tuple(float(node) for node in NODES)
-    return [tabulation(text, nodes), text.derivative, steps_of(text, _staged(text), STAGES)]
+    return [tabulation(text, nodes), text.derivative, text.crossed, steps_of(text, _staged(text), STAGES)]
 
 
 def staged_room(text: SceneText) -> int:
@@ -76,6 +76,7 @@ def _staged(text: SceneText) -> list[str]:
     def at(block: str, place: int, row: int) -> str:
         return f"{block}[{place * size + row * lanes} + lane]"
 
+    start = [at("z", 0, row) for row in range(text.states)]
     for stage, weights in enumerate(WEIGHTS):
         if few:
             before = [_combined(weights, functools.partial(at, "room", row=row)) for row in range(len(names))]
@@ -89,9 +90,23 @@ def _staged(text: SceneText) -> list[str]:
         lines += ["    for lane in range(LANES):"]
         lines += [f"        {', '.join(at('room', stage, row) for row in range(len(names)))} = \\"]
         lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
+        lines += ended(text, start, point, at("room", stage, 0)) if stage else []
+    if text.gauges:
+        last = [
+            at("z", 0, row) + _combined(RESULT, functools.partial(at, "room", row=row)) for row in range(text.states)
+        ]
+        lines += ["    for lane in range(LANES):", *ended(text, start, last, at("room", 0, 0))]
     lines += [f"    for number in range({size}):"]
     end = _combined(RESULT, lambda s: f"room[{s * size} + number]")
     return [*lines, f"        z[number] += {end.removeprefix(' + ')}"]
+
+
+def ended(text: SceneText, start: Sequence[str], point: Sequence[str], target: str) -> list[str]:
+    """A line that makes a number NaN if a pole lies between the start of a step and a point; none without poles."""
+    if not text.gauges:
+        return []
+    states = [*start[: text.states], *point[: text.states]]
+    return [f"        {target} += crossed({', '.join([*states, *text.parameters])})"]
 
 
 def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
@@ -108,6 +123,7 @@ def _unrolled(text: SceneText) -> list[str]:
     names, lanes = text.variables, lanes_of(text)
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
+    start = [f"z[{row * lanes} + lane]" for row in range(text.states)]
     lines = ["    f0, f1, f2 = forces[_node], forces[_node + 1], forces[_node + 2]"] if text.forced else []
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
@@ -118,11 +134,12 @@ def _unrolled(text: SceneText) -> list[str]:
         force = [_FORCES[stage // 2]] if text.forced else []
         targets = ", ".join(f"k{stage}_{name}" for name in names)
         lines.append(f"        {targets} = derivative({', '.join([*point, *force, *text.parameters])})")
+        lines += ended(text, start, point, f"k{stage}_{names[0]}") if before or noisy else []
     for row, name in enumerate(names):
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
         after = " + _later" if noisy and name == driven else ""
         lines.append(f"        z[{row * lanes} + lane] = {name} + h/6.0*({slopes}){after}")
-    return lines
+    return [*lines, *ended(text, names, start, start[0])]
 
 
 def _kicks(driven: str, text: SceneText) -> list[str]:

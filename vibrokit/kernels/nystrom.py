@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.lanes import lanes_of, steps_of, tabulation
+from vibrokit.kernels.lanes import ended, lanes_of, steps_of, tabulation
 from vibrokit.kernels.nystrom_tableau import NODES, POSITION, STAGES, VELOCITY, WEIGHTS
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.second_order_source import SecondOrderWriter
     from vibrokit.symbolic.source import SceneText
 
+_START, _POINT = ("_u0", "_w0"), ("_x0", "_w0")  # the first pair is that of the motion; forces depend on x only
 _SCALE = """@njit(**LINKED)
 def prepare(h, theta, room):
     constants = np.zeros((KINDS, 3))
@@ -54,7 +55,7 @@ def nystrom_step(text: SceneText) -> list[str]:
     head = f"STAGES = {STAGES}\nKINDS = {writer.kinds}\nFRACTIONS = np.array({(*NODES.tolist(), 1.0)!r})\n"
     accelerations = writer.text(tuple(text.parameters), forced=text.forced)
     step = steps_of(text, _step(text, writer), STAGES)
-    return [head, tabulation(text, NODES.tolist()), accelerations, _SCALE, step]
+    return [head, tabulation(text, NODES.tolist()), accelerations, text.crossed, _SCALE, step]
 
 
 def nystrom_room(text: SceneText) -> int:
@@ -88,7 +89,7 @@ def _step(text: SceneText, writer: SecondOrderWriter) -> list[str]:
         lines += [f"        z[{pair.velocity * lanes} + lane] = {moved}{_sum(VELOCITY, last[2], f'_g{{}}_{n}')}"]
     for n, place in enumerate(writer.integrals):
         lines += [f"        z[{place * lanes} + lane] +={_sum(VELOCITY, 'h', f'_r{{}}_{n}').removeprefix(' +')}"]
-    return lines
+    return [*lines, *ended(text, _START, _POINT, f"z[{writer.pairs[0].position * lanes} + lane]")]
 
 
 def _stage(text: SceneText, writer: SecondOrderWriter, stage: int, weights: NDArray[np.float64]) -> list[str]:
@@ -100,6 +101,7 @@ def _stage(text: SceneText, writer: SecondOrderWriter, stage: int, weights: NDAr
     targets = [*(f"_a{n}" for n, _ in pairs), *(f"_r{stage}_{n}" for n, _ in enumerate(writer.integrals))]
     arguments = [*(f"_x{n}" for n, _ in pairs), *[f"forces[_node + {stage}]"] * text.forced, *text.parameters]
     lines += [f"        {', '.join(targets)}, = accelerations({', '.join(arguments)})"]
+    lines += ended(text, _START, _POINT, "_a0") if stage else []
     for n, pair in pairs:
         own, square = (f"room[{_factor(pair.kind, row, 3)}]" for row in (stage, STAGES))
         scaled = f"{own}*(_a{n} + {square}*_x{n})"

@@ -71,6 +71,9 @@ class Code(StrEnum):
         "starts-diverged", WARNING, "{count} of {starts} starts diverged.",
         "Narrow the region, or check the signs of the forces.",
     )  # fmt: skip
+    STARTS_ENDED = (
+        "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
+    )  # fmt: skip
     STARTS_UNSETTLED = (
         "starts-unsettled", WARNING, "At least {count} starts did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,

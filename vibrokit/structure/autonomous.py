@@ -18,6 +18,7 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.borders import intervals_within
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import CONVERGED, Orbit
@@ -86,6 +87,7 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
 def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 
+    A force changes its sign at a pole, too, so each interval between borders of the forces is searched by itself.
     Between the places where it is evaluated, the force is searched for changes of sign where it comes near 0 and turns
     back, so that a node and a saddle next to it are both found. A StructureError is raised for a scene with periodic
     excitation.
@@ -100,11 +102,13 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     def force_at(x: float) -> float:
         return float(force(np.array([x]))[0])
 
-    places = np.linspace(low, high, _PLACES)
-    places = np.sort([*places, *_turns_back(force_at, places, force(places))])
-    forces, found = force(places), []
-    crossed = np.flatnonzero(forces[:-1] * forces[1:] < 0)
-    guesses = [*places[forces == 0], *(float(brentq(force_at, places[at], places[at + 1])) for at in crossed)]
+    guesses, found = list[float](), list[Equilibrium]()
+    for one, other in intervals_within(osc, low, high):
+        places = np.linspace(one, other, _PLACES)
+        places = np.sort([*places, *_turns_back(force_at, places, force(places))])
+        forces = force(places)
+        crossed = np.flatnonzero(forces[:-1] * forces[1:] < 0)
+        guesses += [*places[forces == 0], *(float(brentq(force_at, places[at], places[at + 1])) for at in crossed)]
     for guess in sorted(guesses):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
             found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))

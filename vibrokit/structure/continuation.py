@@ -133,6 +133,7 @@ class _Found:
     budget: int = 0
     findings: tuple[Finding, ...] = ()
     stopped: Finding | None = None
+    refused: bool = False  # whether there is no such scene
 
 
 @dataclasses.dataclass(eq=False)
@@ -205,8 +206,8 @@ class _Run:
 
     @cached_property
     def tracing(self) -> Tracing:
-        """The branches through what was found."""
-        held = [at for at in self.found if at.attractors]
+        """The branches through what was found; they may end on the way to a value where nothing was."""
+        held = [at for at in self.found if not at.refused]
         frame = _union([at.region for at in held if at.region is not None])
         size = np.ones(2) if frame is None else np.diff(frame.bounds)[:, 0]
         stepper = self.request.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
@@ -216,9 +217,11 @@ class _Run:
     def _find_fractions(self) -> None:
         """Find the basin fractions of all attractors at each value."""
         tracing = self.tracing
-        held = list(zip(tracing.values, tracing.found, strict=True))
+        places = [place for place, attractors in enumerate(tracing.found) if attractors]
+        held = [(tracing.values[place], tracing.found[place]) for place in places]
         self.region = self.region or _union([frame_of(tracing.at(value), attractors) for value, attractors in held])
-        budgets = {found.value: found.budget for found in self.found}
+        longest = max((found.budget for found in self.found), default=0)
+        budgets = {found.value: found.budget or longest for found in self.found}
         tasks = [
             (
                 tracing.at(value), labelled(attractors, has_stops=bool(self.osc.barriers)),
@@ -230,7 +233,7 @@ class _Run:
             stage("basin fractions", unit="values", total=len(tasks)),
             contextlib.closing(self._each(basin_fractions, tasks)) as each,
         ):
-            for index, (attractors, findings) in enumerate(each):
+            for index, (attractors, findings) in zip(places, each, strict=True):
                 tracing.found[index] = list(attractors)
                 self.cell_findings[tracing.values[index]] = findings
                 advance()
@@ -255,6 +258,9 @@ class _Run:
 def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> _Found:
     try:
         there = osc.replace({path: value})
+    except VibrokitError as error:
+        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),), refused=True)
+    try:
         structure = find_structure(there, cells=_FEW, saddles=False, manifolds=False, **given)
     except VibrokitError as error:
         return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),))

@@ -227,7 +227,10 @@ class Finder:
         found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
         if self.shift:
             found.append(Finding.of(Code.SHIFTED_COPIES, shift=self.shift))
-        if search.diverged:
+        where = self.osc.model.conditions
+        if search.diverged and where:
+            found.append(Finding.of(Code.STARTS_ENDED, count=search.diverged, starts=search.starts, where=where))
+        elif search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
         if self.stopped and self.doing == "attractors":
             found.append(search.progress)
@@ -271,6 +274,10 @@ def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> st
     advice = "raise budget" if budget < wait else "widen the region or raise budget"
     if search.diverged > search.starts / 2:
         advice = "most motions grow without bound; narrow the region, or check the signs of the forces"
+        if where := search.osc.model.conditions:
+            advice = (
+                f"most motions end where the forces do ({where}); narrow the region, or check the signs of the forces"
+            )
     return (
         f"no steady state was found from {search.starts} starts in x ∈ {region.x}, v ∈ {region.v}: within {budget} "
         f"periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "

@@ -16,6 +16,7 @@ from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.borders import between_borders
 from vibrokit.structure.scales import length_of, states_at, units_of
 
 _MARGIN = 0.25  # of the width, on each side
@@ -31,9 +32,8 @@ Array = NDArray[np.float64]
 def search_region(osc: Oscillator) -> Region:
     """Return a region for starts: it contains the stops, and the reach of a linear oscillator under the same forces."""
     reach = length_of(osc)
-    return _without_deep_contact(
-        osc, Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
-    )
+    region = Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
+    return _without_deep_contact(osc, between_borders(osc, region))
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
@@ -65,6 +65,7 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest)
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
+    region = between_borders(osc, region, points[:, 0].tolist())
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
 
 
@@ -75,9 +76,12 @@ def with_barrier_tops(osc: Oscillator, low: float, high: float) -> tuple[float, 
     """
     field, length = VectorField(osc), max(length_of(osc), 0.5 * (high - low))
     periodic = sum(field.excitation(i, 0.0) for i, part in enumerate(osc.excitations) if part.period is not None)
-    away = length * np.geomspace(1.0 / _TRIED, _FARTHEST, _TRIED)
+    distances = length * np.geomspace(1.0 / _TRIED, _FARTHEST, _TRIED)
 
     def extended(end: float, sign: float) -> float:
+        border = osc.model.domain.around(end)[1 if sign > 0 else 0]
+        away = distances[distances < sign * (border - end)]
+
         def push(distances: Array) -> Array:
             places = np.stack([end + sign * distances, np.zeros_like(distances)], axis=1)
             outward: Array = sign * (field.rate(states_at(osc, places))[:, 1] - periodic)

@@ -14,6 +14,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.borders import length_between_borders
 
 _RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
 _AMPLITUDES, _PHASES = 400, 128  # of the trial motions of harmonic balance
@@ -35,8 +36,9 @@ def length_of(osc: Oscillator) -> float:
     excitations, and the amplitude of the largest resonant motion. Where two stops do not limit a resonance, it
     multiplies the deflection by periodic forces. Where x = 0 is unstable without forcing, or there are neither stops
     nor forces, it includes the deflection at which the nonlinear part of the spring's force is as large as the linear
-    part. Where damping changes its sign with the amplitude, it includes the amplitude at which it does. A linear spring
-    has no length scale; the length is 1 then.
+    part. Where damping changes its sign with the amplitude, it includes the amplitude at which it does. Where forces
+    have poles or other borders, no motion about x = 0 is larger than the distance to the nearest, which takes the place
+    of amplitudes. A linear spring has no length scale; the length is 1 then.
     """
     field, push, swing = VectorField(osc), 0.0, 0.0
     for index, part in enumerate(osc.excitations):
@@ -45,6 +47,8 @@ def length_of(osc: Oscillator) -> float:
         push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
         swing += largest / osc.natural_frequency**2 if part.period is None else _swing(osc, field, largest, part.period)
     stops = (2 * abs(barrier.position) for barrier in osc.barriers)
+    if osc.model.domain:
+        return max([push, length_between_borders(osc), *stops]) or 1.0
     length = max([push, swing, _self_sustained(osc, field), *stops])
     if not length or _pushes_away(osc, field):
         length = max(length, _bending(osc, field))

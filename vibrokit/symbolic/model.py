@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
+from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
@@ -110,6 +113,55 @@ class Model:
     def drift(self) -> sympy.Matrix:
         """Drift b(q, t) with stops as `Piecewise`, a column of length n."""
         return self.drift_with(self.forcing, tuple(map(self.guarded_force, range(len(self.scene.barriers)))))
+
+    @cached_property
+    def borders(self) -> tuple[Border, ...]:
+        """Where motion without noise ends: the poles of the forces, and the edges of their domains."""
+        x, v = self.state[:2]
+        found = dict.fromkeys(one for rate in (self.smooth_force, *self._extra_drift) for one in self._borders(rate))
+        for index, (contact, barrier) in enumerate(zip(self.contacts, self.scene.barriers, strict=True)):
+            depth = barrier.sign * (x - self.symbols[f"barriers.{index}.position"])
+            for one in borders_of(contact.law, (DEPTH, RATE)):
+                gauge = one.gauge.subs({DEPTH: sympy.Max(depth, 0), RATE: barrier.sign * v}, simultaneous=True)
+                found[Border(gauge, one.pole)] = None
+        return tuple(found)
+
+    @cached_property
+    def noise_borders(self) -> tuple[Border, ...]:
+        """Where noisy motion ends besides: the borders of the amplitude of the noise."""
+        return tuple(one for one in self._borders(sum(self.amplitude)) if one not in self.borders)
+
+    def _borders(self, expression: sympy.Expr) -> tuple[Border, ...]:
+        return borders_of(sympy.sympify(expression), self.state)
+
+    def border_ahead(self, state: Sequence[float], time: float, lapse: float) -> str:
+        """Return in words the border that the motion from a state (x, v, …) meets within a time (s); "" for none.
+
+        For so short a time the motion is a straight line.
+        """
+        values = self._numbers | dict(zip(self.state, state, strict=True)) | {self.time: time}
+        change = [lapse * float(rate) for rate in self.drift.subs(values).evalf()]
+        met = border_ahead([border.at(self._numbers) for border in self.borders], self.state, state, change)
+        if met is None:
+            return ""
+        border, place = self.borders[met[0]], zip(self.state, met[1], strict=True)
+        where = ", ".join(f"{q} = {at:.6g}" for q, at in place if q in border.gauge.free_symbols)
+        return f"{where}, {border.in_words(as_text(border.gauge))}"
+
+    def _present(self, more: Sequence[Border] = ()) -> list[Border]:
+        """The borders that are somewhere, at the parameters of the scene."""
+        return [border for border in (*self.borders, *more) if border.at(self._numbers).exists]
+
+    @property
+    def conditions(self) -> str:
+        """Where the forces have values, such as ``"h - x ≠ 0"``; "" if they have them everywhere."""
+        return " and ".join(f"{as_text(border.gauge)} {border.relation} 0" for border in self._present())
+
+    @cached_property
+    def domain(self) -> Domain:
+        """The intervals of x in which a mass at rest has a force, at the parameters of the scene."""
+        at_rest = dict.fromkeys(self.state[1:], sympy.Integer(0)) | self._numbers
+        return Domain([border.at(at_rest) for border in self.borders], self.state[0])
 
     @cached_property
     def amplitude(self) -> sympy.Matrix:
@@ -232,6 +284,9 @@ class Model:
         lines = [rf"\dot{{{as_latex(q)}}} &= {as_latex(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines.append(rf"\dot{{S}} &= {as_latex(self.action_rate)}")
+        signs = {"≠": r"\neq", ">": ">"}
+        present = self._present(self.noise_borders)
+        lines += [f"{as_latex(border.gauge)} &{signs[border.relation]} 0" for border in present]
         return r"\begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}"
 
     def _repr_latex_(self) -> str:
@@ -244,6 +299,7 @@ class Model:
         lines = [f"{q}' = {as_text(rate)}" for q, rate in self.equations.items()]
         if self.momenta:
             lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
+        lines += [f"{as_text(border.gauge)} {border.relation} 0" for border in self._present(self.noise_borders)]
         return "\n".join(lines)
 
 

@@ -59,6 +59,7 @@ class SceneText:
     def parameters(self) -> dict[str, int]:
         """Parameters of the right-hand side by name, with their indices in `theta`."""
         used = self._contacts.used().union(*(rate.free_symbols for rate in self._equations.rates))
+        used = used.union(*(gauge.free_symbols for gauge in self.gauges))
         return {str(symbol): place for symbol, place in self._index.items() if symbol in used}
 
     @property
@@ -96,7 +97,7 @@ class SceneText:
                 "ROOTED": tuple(contact.rooted for contact in contacts),
                 "JUMPS": tuple(contact.jumps for contact in contacts),
             }
-        rows["FORCED"] = self.forced
+        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders)}
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"
@@ -198,6 +199,28 @@ class SceneText:
         """What writes the second-order form of the flow; None if it has none."""
         form = second_order_form(self._equations, self.flow)
         return None if form is None else SecondOrderWriter(form, self._equations, self._index)
+
+    @cached_property
+    def gauges(self) -> tuple[sympy.Expr, ...]:
+        """What changes its sign at each pole; where a formula has no value, forces are NaN and need no test."""
+        random = self.flow in (Flow.NOISY, Flow.LINEARISED, Flow.COVARIANCE_REVERSED) or self.flow.has_momenta
+        borders = self._model.borders + (self._model.noise_borders if random else ())
+        return tuple(border.gauge for border in borders if border.pole)
+
+    @property
+    def crossed(self) -> str:
+        """Function `crossed(states of two points…, parameters…)`: NaN if a pole lies between, otherwise 0; or empty."""
+        if not self.gauges:
+            return ""
+        names, targets = self.variables[: self.states], dict[str, sympy.Expr]()
+        for place, suffix in enumerate(("from", "to")):
+            moved = {q: sympy.Symbol(f"_{q}_{suffix}", real=True) for q in self._model.state}
+            targets |= {f"{place}{n}": gauge.subs(moved, simultaneous=True) for n, gauge in enumerate(self.gauges)}
+        lines, texts = assignments(targets, "c")
+        arguments = [f"_{name}_{suffix}" for suffix in ("from", "to") for name in names]
+        same = " and ".join(f"({texts[f'0{n}']})*({texts[f'1{n}']}) > 0.0" for n in range(len(self.gauges)))
+        head = ["@njit(**INLINED)", f"def crossed({', '.join([*arguments, *self.parameters])}):"]
+        return "\n".join([*head, *lines, f"    return 0.0 if {same} else np.nan", ""])
 
     @property
     def amplitude(self) -> str:

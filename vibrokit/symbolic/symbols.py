@@ -16,7 +16,7 @@ _SPELLED = {"lambda": "lamda"}  # the spelling of SymPy; lambda is a Python keyw
 _IN_CODE = re.compile(
     r"(?!.*_$)(_.*|[xvtzfhS]|[A-Z]{3,}|[pm]_\d+|[CUW]\d+(_\w+)?|k\d_\w+|f\d|(even|odd|rate)\d*|depth|other|nearer|side"
     r"|touching|pushing|lanes?|on\d+|theta|out|series|once|share|product|first|second|later|half|size|start|table|node|slopes"
-    r"|rates|excitation|forcing|derivative|rhs|stop|law|amplitude|slope|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
+    r"|rates|excitation|forcing|derivative|rhs|stop|law|amplitude|slope|crossed|tabulate|taylor|flight_rate|step_lanes|kick_\w+|record|advance"
     r"|njit|np|min|max|abs|range|sign|a?(sin|cos|tan)h?|exp|log|sqrt|copysign)"
 )
 

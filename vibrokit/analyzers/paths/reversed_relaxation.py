@@ -83,7 +83,7 @@ def _relaxed(problem: ExitProblem, propagator: SegmentPropagator, start: Array, 
             states = np.concatenate([*recorded, more[:enough]])
             return None if problem.is_out(states[1:]).any() else states
         recorded.append(more)
-        if not around.contains(more[-1:]).all():  # where the motion may never come to rest
+        if not len(more) or not around.contains(more[-1:]).all():  # it has ended, or may never come to rest
             break
         at_rest = np.linalg.norm(np.ptp(more, axis=0) / units) <= wanted  # in another well
         if len(more) < samples or (at_rest and distances[-1] > wanted):

@@ -197,7 +197,7 @@ class DensityFlow:
     def _followed(self, flow: Flow, states: Array, start: float, duration: float, sign: Array) -> tuple[Array, Array]:
         """States at the end, NaN if they diverge, and the share of cells that has been at the exit.
 
-        `sign` undoes a reflection.
+        Where position decides, motion that ended on its way forwards, as at a pole, is out. `sign` undoes a reflection.
         """
         checks = 1 if self.beyond is None else _CHECKS
         farthest = np.full(len(states), -np.inf) if self.beyond is None else self.beyond(states * sign)
@@ -207,7 +207,12 @@ class DensityFlow:
             states = np.where((ended.status == COMPLETED)[:, None], ended.states, np.nan)
             if self.beyond is not None:
                 farthest = np.fmax(farthest, self.beyond(states * sign))
-        return states, _NOWHERE if self.beyond is None else ABSORBED * self.grid.share(farthest)
+        if self.beyond is None:
+            return states, _NOWHERE
+        share = self.grid.share(farthest)
+        if flow is Flow.STATE:
+            share[np.isnan(states[:, 0]).reshape(share.shape)] = 1.0
+        return states, ABSORBED * share
 
 
 def steps_for(osc: Oscillator, states: Array) -> int:

@@ -16,6 +16,7 @@ from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.streams import streams_of
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import TRAJECTORIES, stage
@@ -118,7 +119,8 @@ class SampledMatrix:
                 self.scene, Flow.NOISY, stepper, states, start_time=number * interval, interval=interval,
                 streams=streams, executor=self.executor,
             )  # fmt: skip
-            states, streams = ended.states, ended.streams
+            gone = ended.status != COMPLETED  # at a pole, for instance
+            states, streams = np.where(gone[:, None], np.nan, ended.states), ended.streams
             if self.beyond is not None:
-                out |= self.beyond(states) >= 0
+                out |= gone | (self.beyond(states) >= 0)
         return states, out

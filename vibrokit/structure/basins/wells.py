@@ -35,7 +35,7 @@ def wells(
     low, high = region.x
     edges, speeds = np.linspace(low, high, cells[0] + 1), np.linspace(*region.v, num=cells[1] + 1, dtype=np.float64)
     rests = equilibria(osc, low, high)
-    bounds = [low, *(float(rest.point[0]) for rest in rests), high]
+    bounds = [low, *sorted([*osc.model.domain.borders(low, high), *(float(rest.point[0]) for rest in rests)]), high]
     stops = [barrier.position for barrier in osc.barriers if low < barrier.position < high]
     places = np.unique([*edges, *stops, *bounds])
     inside, work = _work(osc, places)

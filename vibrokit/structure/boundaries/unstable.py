@@ -58,7 +58,8 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         points = visited(osc, orbit, stepper)
     if orbit.kind == "equilibrium":
         exponents = equilibrium_exponents(osc, orbit.point)
-        multipliers = np.exp(exponents * osc.section_interval)
+        with np.errstate(over="ignore"):  # next to a pole, one may be too large for a number
+            multipliers = np.exp(exponents * osc.section_interval)
     else:
         order = _descending(orbit.multipliers)
         multipliers, exponents = orbit.multipliers[order], orbit.exponents[order]

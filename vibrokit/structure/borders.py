@@ -1,0 +1,57 @@
+"""Borders of the forces of a scene, as its poles are: regions and searches end there."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.vector_field import VectorField
+from vibrokit.oscillator import Oscillator
+from vibrokit.results.region import Region
+
+_DECADES, _PER_DECADE = 12, 32  # distances from a border, above and below 1 m, at which forces are compared with 0
+_BESIDE = 1e-9  # of an interval: so near to a border its force is finite
+
+Array = NDArray[np.float64]
+
+
+def length_between_borders(osc: Oscillator) -> float:
+    """Return the distance (m) from x = 0 to the nearest border; 0 for a scene without.
+
+    Where x = 0 is itself a border, or beyond one, it is twice the distance to the farthest place of rest, or else the
+    distance to the farther border.
+    """
+    low, high = osc.model.domain.around(0.0)
+    if low < 0.0 < high:
+        nearest = min(-low, high)
+        return nearest if math.isfinite(nearest) else 0.0
+    side = 1.0 if low >= 0.0 else -1.0
+    near, far = sorted((abs(low), abs(high)))
+    away = near + np.geomspace(10.0**-_DECADES, 10.0**_DECADES, 2 * _DECADES * _PER_DECADE + 1)
+    away = away[away < far]
+    states = np.zeros((len(away), 2 + len(osc.noise.extra_states if osc.noise else ())))
+    states[:, 0] = side * away
+    outward = VectorField(osc).rate(states)[:, 1] > 0
+    rests = away[1:][outward[1:] != outward[:-1]]
+    lengths = [*(2.0 * rests[-1:]), *([far] if math.isfinite(far) else [])]
+    return float(f"{min(lengths, default=0.0):.9g}")
+
+
+def between_borders(osc: Oscillator, region: Region, places: Sequence[float] = (0.0,)) -> Region:
+    """Return the part of a region that lies between the borders around some places (m)."""
+    ends = [osc.model.domain.around(place) for place in places]
+    low, high = max(region.x[0], min(end[0] for end in ends)), min(region.x[1], max(end[1] for end in ends))
+    return dataclasses.replace(region, x=(low, high)) if (low, high) != region.x else region
+
+
+def intervals_within(osc: Oscillator, low: float, high: float) -> list[tuple[float, float]]:
+    """Return the parts of a range of x (m) between borders; those that end at a border end a little before it."""
+    found = []
+    for one, other in osc.model.domain.intervals(low, high):
+        beside = _BESIDE * (other - one)
+        found.append((one + beside * (one > low), other - beside * (other < high)))
+    return found
