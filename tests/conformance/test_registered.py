@@ -38,7 +38,7 @@ LAWS = [
     vk.Hertz(stiffness=1e6),
     vk.CustomLaw("k*depth + c*rate", k=20.0, c=0.3),
     vk.CustomLaw("k*(exp(60*depth) - 1)", k=0.5),
-    vk.CustomLaw("k*depth**1.3*(1 + c*sign(rate)/4)", k=20.0, c=1.0),
+    vk.CustomLaw("k*depth**1.3*(1 + c*tanh(rate)/4)", k=20.0, c=1.0),
     vk.CustomLaw("pi*k*depth*exp(1)*sin(depth + pi/7)", k=20.0),
     vk.CustomLaw("k*sqrt(depth) + theta*depth*tanh(rate)", k=20.0, theta=1.0),
     vk.CustomLaw("k*max(depth - gap, 0) + p_1*depth**2 + c0*asin(depth/2)", k=20.0, gap=0.01, p_1=3.0, c0=1.5),

@@ -9,6 +9,7 @@ import sympy
 from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.formulas import derived_formula
+from vibrokit.symbolic.friction import refuse_friction
 
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
@@ -54,9 +55,13 @@ class DerivedContact:
         return self.clamped or self.jumps or _bends(self.law)
 
 
-def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol]) -> DerivedContact:
-    """Derive the formula and the properties of the law of a barrier."""
+def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_frequency: float) -> DerivedContact:
+    """Derive the formula and the properties of the law of a barrier in a scene of this natural frequency (s⁻¹).
+
+    Raises DerivationError if the force is unbounded at first touch, or jumps in the rate.
+    """
     law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
+    refuse_friction(barrier.law, law, RATE, symbols, natural_frequency)
     analytic = _analytic(law, DEPTH)
     root = sympy.Symbol("root", positive=True)
     smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)

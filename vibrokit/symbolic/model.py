@@ -13,10 +13,9 @@ from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
 from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula
+from vibrokit.symbolic.friction import refuse_friction
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.symbols import parameter_symbols
-
-_ROUNDING = 1e-15  # of the friction
 
 
 class Model:
@@ -48,7 +47,7 @@ class Model:
     def contacts(self) -> tuple[DerivedContact, ...]:
         """Derived contact of each stop."""
         return tuple(
-            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"))
+            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"), self.scene.natural_frequency)
             for index, barrier in enumerate(self.scene.barriers)
         )
 
@@ -72,7 +71,9 @@ class Model:
         omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
         spring = omega**2 * x
         if self.scene.spring is not None:
-            spring = derived_formula(self.scene.spring, "force", self._symbols_of("spring"), (x, v))
+            symbols = self._symbols_of("spring")
+            spring = derived_formula(self.scene.spring, "force", symbols, (x, v))
+            refuse_friction(self.scene.spring, spring, v, symbols, self.scene.natural_frequency)
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = derived_formula(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
         return -2 * zeta * omega * v - spring + constant + push
@@ -258,9 +259,7 @@ class Model:
         """Whether friction is constant and all other forces derive from a potential, at the parameters of the scene."""
         if self.forcing != 0 or len(self.state) > 2 or not self._conservative_stops:
             return False
-        force, v, friction = self.smooth_force.subs(self._numbers), self.state[1], self._friction
-        # A force that jumps where v changes its sign has the derivative 0, so that the force itself is asked.
-        return not friction.free_symbols & {*self.state} and not _rest(force, friction, v).has(v)
+        return not self._friction.free_symbols & {*self.state}
 
     @cached_property
     def _numbers(self) -> dict[sympy.Symbol, float]:
@@ -301,10 +300,3 @@ class Model:
             lines += [f"S' = {as_text(self.action_rate)}", f"H = {as_text(self.hamiltonian)}"]
         lines += [f"{as_text(border.gauge)} {border.relation} 0" for border in self._present(self.noise_borders)]
         return "\n".join(lines)
-
-
-def _rest(force: sympy.Expr, friction: sympy.Expr, v: sympy.Symbol) -> sympy.Expr:
-    """A force without its friction, and without what rounding leaves of that."""
-    rest = sympy.expand(force + friction * v)
-    small = _ROUNDING * abs(friction)
-    return rest.xreplace({each: sympy.Integer(0) for each in rest.atoms(sympy.Float) if abs(each) < small})

@@ -13,4 +13,8 @@ class Spring(Part):
 
     @abstractmethod
     def force(self, x: Any, v: Any) -> Any:
-        """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression."""
+        """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression.
+
+        It must not jump in `v`, as dry friction does: write f*tanh(v/w) for f*sign(v), with a small width w. The
+        derivation of the equations raises DerivationError otherwise.
+        """
