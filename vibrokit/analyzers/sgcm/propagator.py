@@ -22,8 +22,10 @@ from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.progress import current
 
 _BLOCKS = 4  # of rows, which threads or processes share
+_NODES_AT_ONCE = 2**14  # between looks at the time limit: a node takes 1 to 10 µs
 _RELEVANT = 14.0  # in ln p below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
 
 Array = NDArray[np.float64]
@@ -164,7 +166,12 @@ def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array,
     """Some rows of φ after a step, their marks, and what the exit takes up; in whatever thread or process."""
     shape = (last - first, given[0].shape[1])
     out, marks, taken = np.empty(shape), np.empty(shape, dtype=np.uint8), np.empty(last - first)
-    step_rows(*given, out, marks, taken, first, last)
+    rows = max(1, _NODES_AT_ONCE // shape[1])
+    for begin in range(first, last, rows):
+        end = min(begin + rows, last)
+        part = slice(begin - first, end - first)
+        step_rows(*given, out[part], marks[part], taken[part], begin, end)
+        current().check()
     return out, marks, taken
 
 
