@@ -222,15 +222,33 @@ def test_one_attractor_that_fails_loses_no_other(toys, monkeypatch, capsys):
 
 
 def test_an_analyzer_that_cannot_run_leaves_the_structure(toys, capsys):
-    assert main([*TOY, "-o", "r.nc", "--exit", "first-contact:right", "--json"]) == 1
+    assert main([*TOY, "-o", "r.nc", "--source", "7", "--json"]) == 1
     out, err = capsys.readouterr()
     record = json.loads(out)
     assert not record["complete"]
     (finding,) = [one for one in record["findings"] if one["record"] == "run"]
     assert (finding["code"], finding["severity"]) == ("analyzer-not-run", "error")
-    assert "no right stop" in err
+    assert "attractor 7" in err
     assert record["files"] == {"structure": "r.nc"}
     assert len(vk.load_result("r.nc").attractors) == 2
+
+
+REFUSED = {
+    "no noise": (("action-graph", "action-plot", "least-action", "sgcm", "mfet"), {"noise": None}, []),
+    "no stop": (("action-plot", "mfet"), {}, ["--exit", "first-contact:right"]),
+    "no intensity": (("sgcm", "mfet"), {"noise": vk.WhiteNoise(0.0)}, []),
+    "a stepper without noise": (("mfet",), {}, ["--stepper", "order8:1e-8"]),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_can_be_checked_before_any_work_is(toys, monkeypatch, capsys, case):
+    analyzers, changes, options = REFUSED[case]
+    monkeypatch.setattr("vibrokit.structure.find.find_structure", lambda *_, **__: pytest.fail("it has begun"))
+    vk.save_scene(dataclasses.replace(vk.load_scene("double-well"), **changes), "scene.toml")
+    for name in analyzers:
+        assert main(["run", "scene.toml", "--analyzer", name, *options]) == 2
+        assert f"{name} cannot be run" in capsys.readouterr().err
 
 
 def test_an_analyzer_that_crashes_leaves_the_others(toys, monkeypatch, capsys):

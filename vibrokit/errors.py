@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 
 class VibrokitError(Exception):
@@ -51,6 +51,10 @@ class CheckpointError(VibrokitError, ValueError):
     """A checkpoint is damaged, or belongs to other work."""
 
 
+class ArgumentError(VibrokitError, TypeError):
+    """A class is called without a value that it needs, or with one that it does not take, or is abstract."""
+
+
 class OutOfTime(VibrokitError, TimeoutError):
     """The time limit was reached before there was anything to return."""
 
@@ -92,11 +96,15 @@ def nearest(name: str, known: Iterable[str]) -> str:
     The last component of a path counts as a name too: ``"freqency"`` is close to ``"excitations.0.frequency"``.
     """
     names = sorted(known)
-    forms = {path.rpartition(".")[2]: path for path in reversed(names)} | {path: path for path in names}
+    return nearest_form(name, {path.rpartition(".")[2]: path for path in reversed(names)} | {n: n for n in names})
+
+
+def nearest_form(name: str, forms: Mapping[str, str]) -> str:
+    """Return the same, where each known name has other forms, which are the keys."""
     close = difflib.get_close_matches(str(name)[:60], forms, n=1)
     if close:
         return f"; the nearest is {forms[close[0]]!r}."
-    return f"; allowed: {listed(names)}."
+    return f"; allowed: {listed(sorted(set(forms.values())))}."
 
 
 def listed(names: Sequence[str]) -> str:
@@ -106,3 +114,8 @@ def listed(names: Sequence[str]) -> str:
 
 
 _MOST_LISTED = 20
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """Return a number with its noun: ``"1 start"``, ``"2 starts"``."""
+    return f"{count:d} {noun if count == 1 else plural or f'{noun}s'}"

@@ -11,7 +11,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, shown
+from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, nearest_form, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.contact.contact_law import ContactLaw
@@ -72,10 +72,18 @@ def _find(source: str | os.PathLike[str]) -> Path:
     if os.path.isdir(path):
         raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled()}.")
     if not os.path.exists(path):  # False too for text that cannot be the name of a file
-        raise UnknownNameError(
-            f"there is no file or bundled scene {shown(str(source))}{nearest(str(source), bundled_scenes())}"
-        )
+        known = {name: name for name in bundled_scenes()} | {file.stem: str(file) for file in _beside(path)}
+        wanted = path.stem if path.suffix.lower() == ".toml" else path.name
+        raise UnknownNameError(f"there is no file or bundled scene {shown(str(source))}{nearest_form(wanted, known)}")
     return path
+
+
+def _beside(path: Path) -> list[Path]:
+    """The scene files in the folder of a path."""
+    try:
+        return list(path.parent.glob("*.toml"))
+    except (OSError, ValueError):  # no path that the system knows
+        return []
 
 
 def _bundled() -> str:

@@ -330,6 +330,20 @@ def test_no_such_scene(source, said):
     assert len(str(error.value)) < 500
 
 
+@pytest.mark.parametrize(
+    ("wanted", "meant"), [("tub.toml", "tube.toml"), ("tube", "tube.toml"), ("valv.TOML", "valve.toml")]
+)
+def test_a_scene_file_beside_it_is_suggested(tmp_path, monkeypatch, wanted, meant):
+    for name in ("tube", "valve", "gear-rattle"):
+        (tmp_path / f"{name}.toml").touch()
+    with pytest.raises(UnknownNameError) as error:
+        vk.load_scene(tmp_path / wanted)
+    assert str(error.value).endswith(f"the nearest is {str(tmp_path / meant)!r}.")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnknownNameError, match=f"the nearest is '{meant}'"):
+        vk.load_scene(wanted)
+
+
 def test_a_folder(tmp_path):
     with pytest.raises(SceneError, match=r"is a folder; give a TOML file or one of .*hertz-0\.570.*\.$"):
         vk.load_scene(tmp_path)

@@ -248,7 +248,7 @@ def test_findings_that_are_none_are_refused(findings, sound, tmp_path):
     ("code", "values", "words"),
     [
         (Code.REMARK, {}, "'remark' has values that do not fit its sentence .KeyError: 'text'"),
-        (Code.STEADY_STATES, {"count": 3}, "'steady-states' .*KeyError: 'starts'.*{count}, from {starts} starts"),
+        (Code.STEADY_STATES, {"count": 3}, "'steady-states' .*KeyError: 'starts'.*{count}, from {starts:start}"),
         (Code.CELLS_UNSETTLED, {"fraction": "half"}, "'cells-unsettled' .*ValueError"),
         (Code.CELLS_UNSETTLED, {"fraction": None}, "'cells-unsettled' .*TypeError"),
         ("steady-states", {"count": 3, "starts": 9}, "needs a Code, such as Code.REMARK, got 'steady-states'"),

@@ -29,6 +29,21 @@ def test_five_lines_are_enough(make):
     assert max(map(len, repr(make()).splitlines())) <= 180
 
 
+@pytest.mark.parametrize(
+    ("code", "name", "one", "two"),
+    [
+        (Code.STARTS_UNSETTLED, "count", "1 start did", "2 starts did"),
+        (Code.BRANCHES, "branches", "1 branch of", "2 branches of"),
+        (Code.BRANCHES, "values", "at 1 value of", "at 2 values of"),
+        (Code.CHAOTIC_SOURCE, "count", "from 1 unstable orbit inside", "from 2 unstable orbits inside"),
+    ],
+)
+def test_one_is_singular(code, name, one, two):
+    values = {"branches": 3, "values": 3, "parameter": "x", "periods": (1,)}
+    assert one in str(Finding(code, 0, values={**values, name: 1}))
+    assert two in str(Finding(code, 0, values={**values, name: 2}))
+
+
 def test_a_result_shows_three_energies_and_the_first_warning():
     result = full_result()
     title, first, second, third, warning = repr(result).splitlines()

@@ -9,6 +9,7 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.oscillator import Oscillator
 from vibrokit.progress import AFTERWARDS, working
 from vibrokit.results.action_graph import ActionGraphResult
 from vibrokit.results.codes import Code
@@ -24,6 +25,11 @@ class ActionGraph(GraphSearch, Analyzer):
     """
 
     result: ClassVar[type[Result]] = ActionGraphResult
+
+    def check(self, osc: Oscillator) -> None:
+        """Refuse also noise with states of its own."""
+        super().check(osc)
+        self.check_noise(osc)
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Search the exits of one attractor; errors as of `search`.

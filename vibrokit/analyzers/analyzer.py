@@ -17,6 +17,7 @@ from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
+from vibrokit.construction import Constructed
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -78,7 +79,7 @@ def at_exit(problem: ExitProblem, method: str, bound: Bound) -> Analysis:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,))
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Analyzer(ABC):
+class Analyzer(ABC, metaclass=Constructed):
     """A method with its configuration in its fields and no hidden state. Abstract.
 
     A subclass becomes a frozen dataclass by itself; no decorator is needed.
@@ -197,6 +198,21 @@ class Analyzer(ABC):
                 seconds=work.seconds,
             )
 
+    def check(self, osc: Oscillator) -> None:
+        """Refuse a scene that the method cannot analyze, whatever its structure: `run` and the command line begin so.
+
+        Raises
+        ------
+        SceneError, StructureError, StepperError
+            The scene has no noise or no such exit; a setting is not for this scene.
+        """
+        check_means(osc, self.stepper, None)
+        if osc.noise is None:
+            raise SceneError("the scene has no noise, so nothing leaves an attractor; give it a noise model.")
+        if not isinstance(self.exit, Exit):
+            raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
+        self.exit.check_scene(osc)
+
     def least_intensity(self, osc: Oscillator) -> float:
         """Return the least noise intensity for which energies are meant, that of the scene by default (m² s⁻³)."""
         return osc.noise.intensity if osc.noise else 0.0
@@ -205,10 +221,7 @@ class Analyzer(ABC):
         """Check what a run is given, before any work is done, and return the attractors to leave."""
         check_means(osc, self.stepper, executor)
         check_belongs(osc, structure)
-        if osc.noise is None:
-            raise SceneError("the scene has no noise, so nothing leaves an attractor; give it a noise model.")
-        if not isinstance(self.exit, Exit):
-            raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
+        self.check(osc)
         if not structure.attractors:
             raise StructureError(
                 "the structure has no attractors, because its search was stopped before; find it with more time."

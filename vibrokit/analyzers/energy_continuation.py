@@ -97,6 +97,7 @@ def energy_continuation(
     chosen = LeastAction() if analyzer is None else analyzer
     if not isinstance(chosen, LeastAction):
         raise StructureError(f"{_CALLER}: analyzer must be a LeastAction, got {shown(analyzer)}.")
+    chosen.check(osc)
     places = _places(numbers, search, float(entry.value))
     seed = seed_of(rng)
     with working(progress, time_limit) as work:

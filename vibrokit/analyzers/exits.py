@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
+from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.ensemble import UNBOUNDED, Stop
 from vibrokit.oscillator import Oscillator
@@ -28,7 +29,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
 @dataclasses.dataclass(frozen=True)
-class Exit(ABC):
+class Exit(ABC, metaclass=Constructed):
     """What counts as leaving an attractor: a value that every method asks the same few questions. Abstract.
 
     A subclass becomes a frozen dataclass by itself; no decorator is needed.
@@ -56,8 +57,11 @@ class Exit(ABC):
         super().__init_subclass__(**options)
         dataclasses.dataclass(frozen=True)(cls)
 
-    def check(self, osc: Oscillator, structure: Structure) -> None:  # noqa: B027 - most scenes have most exits
-        """Raise StructureError if the scene has no such exit."""
+    def check_scene(self, osc: Oscillator) -> None:
+        """Raise StructureError if the scene has no such exit, whatever its structure."""
+
+    def check(self, osc: Oscillator, structure: Structure) -> None:
+        """Raise StructureError if the structure has no such exit."""
 
     def scene(self, osc: Oscillator) -> Oscillator:
         """Return the scene that a path moves in until it leaves."""
@@ -243,7 +247,7 @@ class FirstContact(LeaveRegion):
         if self.side not in ("left", "right", None):
             raise StructureError(f"FirstContact: side must be 'left', 'right' or None for either, got {self.side!r}.")
 
-    def check(self, osc: Oscillator, structure: Structure) -> None:
+    def check_scene(self, osc: Oscillator) -> None:
         """Refuse a scene without the stop."""
         if not self._stops(osc):
             which = f"no {self.side} stop" if self.side else "no stop"

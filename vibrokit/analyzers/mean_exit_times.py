@@ -106,6 +106,13 @@ class MFET(Analyzer):
         """The least of the intensities."""
         return min(self.intensities) if self.intensities else super().least_intensity(osc)
 
+    def check(self, osc: Oscillator) -> None:
+        """Refuse also noise of intensity 0, and a stepper that takes no noise."""
+        super().check(osc)
+        self._intensities(osc)
+        if self.stepper is not None:
+            self.stepper.check(osc, Flow.NOISY)
+
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
         problem.check_targets("MFET")

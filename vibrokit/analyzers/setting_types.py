@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
-from vibrokit.errors import StructureError, shown
+from vibrokit.errors import StructureError, counted, shown
 
 
 class Typed(str):
@@ -114,5 +114,5 @@ def _name(declared: Any) -> str:
     if get_origin(declared) not in _SEQUENCES:
         return " or ".join(map(_name, arguments))
     if get_origin(declared) is tuple and Ellipsis not in arguments:
-        return f"{len(arguments)} values with commas between ({', '.join(map(_name, arguments))})"
+        return f"{counted(len(arguments), 'value')} with commas between ({', '.join(map(_name, arguments))})"
     return f"{_name(arguments[0])}, or several with commas between"

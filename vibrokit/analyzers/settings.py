@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from vibrokit.analyzers.exits import Exit
 from vibrokit.analyzers.setting_types import Typed, checked
-from vibrokit.errors import SceneError, StructureError, UnknownNameError, VibrokitError, nearest, shown
+from vibrokit.errors import SceneError, StructureError, UnknownNameError, VibrokitError, counted, nearest, shown
 from vibrokit.kernels.named import name_of as stepper_name
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -150,5 +150,5 @@ def named_exit(text: str) -> Exit:
     fields = dataclasses.fields(kind)
     values = [Typed(word) for word in arguments.split(",")] if colon else []
     if len(values) > len(fields):
-        raise StructureError(f"exit {shown(text)}: {name} takes {len(fields)} arguments, got {len(values)}.")
+        raise StructureError(f"exit {shown(text)}: {name} takes {counted(len(fields), 'argument')}, got {len(values)}.")
     return _made(kind, {field.name: value for field, value in zip(fields, values, strict=False)}, f"{kind.__name__}: ")

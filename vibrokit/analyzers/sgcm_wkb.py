@@ -99,6 +99,11 @@ class SGCM(Analyzer):
         """The least of the intensities."""
         return min(self.intensities) if self.intensities else super().least_intensity(osc)
 
+    def check(self, osc: Oscillator) -> None:
+        """Refuse also noise of intensity 0, and noise with states of its own."""
+        super().check(osc)
+        checked_noise(osc, needs_intensity=self.intensities is None)
+
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
         problem.check_targets("SGCM")

@@ -107,7 +107,7 @@ def planned(options: argparse.Namespace) -> Plan:
     from vibrokit.results.pictures import checked_picture
     from vibrokit.scene_file import load_scene
 
-    for target in (options.output, options.figure):
+    for target in (options.output, options.figure, options.checkpoint):
         if target is not None and not target.parent.is_dir():
             raise VibrokitError(f"the folder {target.parent} of {target} does not exist; make it first.")
     if options.figure is not None:
@@ -128,7 +128,13 @@ def planned(options: argparse.Namespace) -> Plan:
             raise VibrokitError(
                 f"--checkpoint is for one of the analyzers that write one, such as mfet; got {len(keeping)}."
             )
-    return Plan(osc, stepper, {name: configured(kind, settings) for name, kind in kinds.items()})
+    analyzers = {name: configured(kind, settings) for name, kind in kinds.items()}
+    for name, analyzer in analyzers.items():
+        try:
+            analyzer.check(osc)
+        except VibrokitError as error:
+            raise VibrokitError(f"{name} cannot be run: {error}") from error
+    return Plan(osc, stepper, analyzers)
 
 
 def source_of(text: str) -> int | str:

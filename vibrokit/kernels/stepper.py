@@ -6,6 +6,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Self
 
+from vibrokit.construction import Constructed
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Emitter(ABC):
+class Emitter(ABC, metaclass=Constructed):
     """What generated modules consist of: that of the scene, and those that scenes of a form share.
 
     For developers
@@ -35,7 +36,7 @@ class Emitter(ABC):
         """Return the constants that stand above the templates."""
         return []
 
-    def check(self, scene: Scene, flow: Flow) -> None:  # noqa: B027 - most take every scene
+    def check(self, scene: Scene, flow: Flow) -> None:
         """Raise StepperError if the modules cannot be made for this flow of this scene."""
 
 

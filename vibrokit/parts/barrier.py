@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, Literal, Self
 
+from vibrokit.construction import Constructed
 from vibrokit.errors import ParameterError, SceneError, shown
 from vibrokit.parts.contact.contact_law import ContactLaw
 from vibrokit.parts.parameter import Parameter
@@ -13,7 +14,7 @@ _POSITION = Parameter("position", "position", "b", "m")
 
 
 @dataclasses.dataclass(frozen=True)
-class Barrier:
+class Barrier(metaclass=Constructed):
     """A stop: a contact law, its position, and its side of the mass.
 
     Parameters

@@ -8,12 +8,13 @@ from abc import ABC
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
+from vibrokit.construction import Constructed
 from vibrokit.errors import ParameterError, nearest
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
-class Part(ABC):
+class Part(ABC, metaclass=Constructed):
     """One part of a scene: a frozen dataclass whose fields are its parameters.
 
     A subclass becomes a frozen dataclass without a decorator. Every class is either abstract or final: a concrete

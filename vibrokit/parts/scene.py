@@ -10,6 +10,7 @@ from fractions import Fraction
 from numbers import Real
 from typing import Any, NamedTuple, Self
 
+from vibrokit.construction import Constructed
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.excitation.excitation import Excitation
@@ -34,7 +35,7 @@ class Entry(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Scene:
+class Scene(metaclass=Constructed):
     """The parts of one oscillator, x″ + 2ζω_n x′ + spring = stops + Σ excitations + noise.
 
     Parameters

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
+from vibrokit.errors import counted
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour
 
@@ -55,7 +56,7 @@ def survival(
     if left_over == 0:
         known, share = known[:-1], share[:-1]  # the last share is 0, which a logarithm does not show
     (steps,) = axes.step(
-        np.concatenate([[0.0], known]), share, where="post", color=colour(label), label=f"{count} walkers"
+        np.concatenate([[0.0], known]), share, where="post", color=colour(label), label=counted(count, "walker")
     )
     ends = np.array([0.0, known[-1] if len(known) else mean])
     (law,) = axes.plot(ends, np.exp(-ends / mean), "k--", linewidth=1.0, label=f"exponential, mean {mean:.3g} s")

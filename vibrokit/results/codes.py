@@ -26,7 +26,7 @@ class Code(StrEnum):
     """What can be found. Each code has a severity, a sentence and advice on what to do.
 
     The sentence is a template of the finding's values; ``{state}`` and ``{goal}`` in it are the finding's source and
-    target, by name where names are known.
+    target, by name where names are known. ``{count:start}`` is a number with its noun.
     """
 
     severity: Severity
@@ -54,10 +54,10 @@ class Code(StrEnum):
     ANALYZER_NOT_RUN = "analyzer-not-run", ERROR, "The analyzer {analyzer} was not run: {reason}", _SEE_REASON
 
     # Structure
-    STEADY_STATES = "steady-states", INFO, "Steady states: {count}, from {starts} starts."
+    STEADY_STATES = "steady-states", INFO, "Steady states: {count}, from {starts:start}."
     SEARCH_STOPPED = (
         "search-stopped", ERROR,
-        "The search for steady states was stopped after {periods} periods of its {starts} starts: {settled} had "
+        "The search for steady states was stopped after {periods:period} of its {starts:start}: {settled} had "
         "settled, {moving} were still moving in the region, {left} were outside it, and {diverged} had diverged.",
         "Run it again with more time, or with fewer starts.",
     )  # fmt: skip
@@ -68,19 +68,19 @@ class Code(StrEnum):
         "Give a region to keep all of them.",
     )  # fmt: skip
     STARTS_DIVERGED = (
-        "starts-diverged", WARNING, "{count} of {starts} starts diverged.",
+        "starts-diverged", WARNING, "{count} of {starts:start} diverged.",
         "Narrow the region, or check the signs of the forces.",
     )  # fmt: skip
     STARTS_ENDED = (
         "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
     )  # fmt: skip
     STARTS_UNSETTLED = (
-        "starts-unsettled", WARNING, "At least {count} starts did not settle on an equilibrium or a limit cycle.",
+        "starts-unsettled", WARNING, "At least {count:start} did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,
     )  # fmt: skip
     SURVIVAL = (
         "survival", INFO,
-        "Starts that had not settled after {periods} periods with {stepper}: {survivors} of {starts}.",
+        "Starts that had not settled after {periods:period} with {stepper}: {survivors} of {starts}.",
     )  # fmt: skip
     CHAOTIC_TRANSIENT = (
         "chaotic-transient", INFO,
@@ -88,7 +88,7 @@ class Code(StrEnum):
     )  # fmt: skip
     SLOW_SETTLING = (
         "slow-settling", WARNING,
-        "{count} starts still approach an orbit of period above {period}, or one with a multiplier close to 1.",
+        "Starts that still approach an orbit of period above {period}, or one with a multiplier close to 1: {count}.",
         _RAISE_BUDGET,
     )  # fmt: skip
     CELLS_UNSETTLED = (
@@ -124,13 +124,13 @@ class Code(StrEnum):
     )  # fmt: skip
     MOTIONS_NOT_CONVERGED = (
         "motions-not-converged", WARNING,
-        "{count} motions on the boundary between {state} and {goal} almost repeat, but Newton's method did not "
-        "converge to an orbit.", _FINER_STEPPER,
+        "Motions on the boundary between {state} and {goal} that almost repeat, but from which Newton's method did not "
+        "converge to an orbit: {count}.", _FINER_STEPPER,
     )  # fmt: skip
     CHAOTIC_EDGE = (
         "chaotic-edge", INFO,
         "The edge state between {state} and {goal} is chaotic: largest Lyapunov exponent {exponent:.3g} ± {error:.1g} "
-        "s⁻¹, from {count} motions. Unstable orbits found inside it: {orbits}.",
+        "s⁻¹, from {count:motion}. Unstable orbits found inside it: {orbits}.",
         "Exit paths are polished to these orbits; without one the graph gives an estimate.",
     )  # fmt: skip
     EDGE_NOT_CONVERGED = (
@@ -144,8 +144,8 @@ class Code(StrEnum):
     )  # fmt: skip
     EDGE_BUDGET = (
         "edge-budget", WARNING,
-        "{count} basin boundaries were not followed to a saddle: classifying states next to them takes more than "
-        "{budget:.1e} section-map iterations.",
+        "Basin boundaries that were not followed to a saddle, because classifying states next to them takes more than "
+        "{budget:.1e} section-map iterations: {count}.",
         "Set edge_budget, an argument of find_structure, to more, or search on a smaller region.",
     )  # fmt: skip
     LARGE_RESIDUAL = (
@@ -153,13 +153,13 @@ class Code(StrEnum):
         _FINER_STEPPER,
     )  # fmt: skip
     SADDLES_OUTSIDE = (
-        "saddles-outside", INFO, "{count} of the unstable orbits lie outside the region.",
+        "saddles-outside", INFO, "Unstable orbits outside the region: {count}.",
         "Widen the region to show them.",
     )  # fmt: skip
     NO_MANIFOLDS = "no-manifolds", WARNING, "Saddle {saddle} has no manifolds: {reason}", _SEE_REASON
 
     # Continuation
-    BRANCHES = "branches", INFO, "{branches} branches of steady states at {values} values of {parameter}."
+    BRANCHES = "branches", INFO, "{branches:branch/branches} of steady states at {values:value} of {parameter}."
     BIFURCATION = "bifurcation", INFO, "{kind} of branch {state} at {value:.8g} ± {error:.1g}."
     BRANCH_ENDS = (
         "branch-ends", WARNING,
@@ -167,12 +167,12 @@ class Code(StrEnum):
         "Add values between the two.",
     )  # fmt: skip
     FOUND_BY_NEIGHBOUR = (
-        "found-by-neighbour", INFO, "{count} steady states were found from a neighbouring value and not by the search.",
+        "found-by-neighbour", INFO, "Steady states found from a neighbouring value and not by the search: {count}.",
     )  # fmt: skip
     ENERGY_BRANCHES = (
         "energy-branches",
         INFO,
-        "{branches} exit paths were followed over {values} values of {parameter}.",
+        "Exit paths followed over {values:value} of {parameter}: {branches}.",
     )
     PATH_LOST = (
         "path-lost", INFO, "The exit path {state} could not be followed from {parameter} = {value:.8g} to {next:.8g}: "
@@ -201,22 +201,22 @@ class Code(StrEnum):
     # Action plot
     SHOTS = (
         "shots", INFO,
-        "Action plot from {state}: {escaped} of {paths} paths reached the exit, {left_region} left the region without "
-        "an exit, {remaining} remained inside, {diverged} diverged; {branches} distinct exit paths.",
+        "Action plot from {state}: {escaped} of {paths:path} reached the exit, {left_region} left the region without "
+        "an exit, {remaining} remained inside, {diverged} diverged; {branches:distinct exit path}.",
     )  # fmt: skip
     REFINEMENT = (
         "refinement", INFO,
-        "Action plot from {state}: over the last {last} of {rounds} refinement rounds the least action changed by "
+        "Action plot from {state}: over the last {last} of {rounds:refinement round} the least action changed by "
         "{change:.1e} (relative).", "If the change is above the error you accept, raise rounds or points.",
     )  # fmt: skip
     REFINEMENT_TOO_SHORT = (
         "refinement-too-short", WARNING,
-        "Action plot from {state}: {rounds} refinement rounds are too few to tell how the least action changes.",
+        "Action plot from {state}: too few refinement rounds ({rounds}) to tell how the least action changes.",
         "Raise rounds.",
     )  # fmt: skip
 
     # Graph
-    GRAPH = "graph", INFO, "Graph from {state}: {nodes_x} × {nodes_v} nodes, {steps} steps per period by {stepper}."
+    GRAPH = "graph", INFO, "Graph from {state}: {nodes_x} × {nodes_v} nodes, {steps:step} per period by {stepper}."
     GRAPH_MEMORY = (
         "graph-memory", INFO,
         "Graph from {state}: {memory:g} GiB of memory allow {nodes_x} × {nodes_v} nodes instead of "
@@ -267,12 +267,12 @@ class Code(StrEnum):
     )  # fmt: skip
     NO_EXCURSION_LEFT = (
         "no-excursion-left", WARNING,
-        "No excursion of {replicas} replicas left {state} at D = {intensity:g}: splitting gives no rate.",
+        "No excursion of {replicas:replica} left {state} at D = {intensity:g}: splitting gives no rate.",
         "Raise the noise intensity, or raise replicas.",
     )  # fmt: skip
     SPLITTING_NOT_CONVERGED = (
         "splitting-not-converged", WARNING,
-        "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas} replicas; {wanted:.0%} "
+        "The rate of {state} at D = {intensity:g} has an error of {error:.0%} after {replicas:replica}; {wanted:.0%} "
         "was wanted.", "Raise replicas, or expect an error of that size.",
     )  # fmt: skip
     ARRHENIUS_NOT_REACHED = (
@@ -284,7 +284,7 @@ class Code(StrEnum):
     # Density
     DENSITY_NOT_CONVERGED = (
         "density-not-converged", WARNING,
-        "The density of {state} at D = {intensity:g} had not converged after {intervals} section intervals: ln rate "
+        "The density of {state} at D = {intensity:g} had not converged after {intervals:section interval}: ln rate "
         "still changes by about {change:.1e}.", "Expect an error of that size, or raise the noise intensity.",
     )  # fmt: skip
     DENSITY_AT_EDGE = (
@@ -372,7 +372,7 @@ class Code(StrEnum):
     )  # fmt: skip
     CHAOTIC_SOURCE = (
         "chaotic-source", INFO,
-        "{state} is chaotic: paths are sought from {count} unstable orbits inside it (periods: {periods}).",
+        "{state} is chaotic: paths are sought from {count:unstable orbit} inside it (periods: {periods}).",
         "Its energies are brackets.",
     )  # fmt: skip
     GRAPH_ONLY_SOURCE = "graph-only-source", INFO, "{state} is {kind}: only the graph gives its energies."

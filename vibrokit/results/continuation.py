@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.errors import ResultFileError
+from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
@@ -21,7 +21,7 @@ from vibrokit.results.labels import label_of
 from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
-from vibrokit.results.summary import Summary, counted
+from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.errors import ResultFileError, StructureError, shown
+from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.record import Record
 from vibrokit.results.summary import Summary
@@ -78,7 +78,8 @@ class DensityHistory(Record):
     def summary(self) -> Summary:
         """The times, and the probability on the nodes at each."""
         rows = ((f"t = {t:.6g} s", f"probability {mass:.6g}") for t, mass in zip(self.times, self.mass, strict=True))
-        return Summary(f"Density on {len(self.x)} × {len(self.v)} nodes at {len(self.times)} times", tuple(rows))
+        times = counted(len(self.times), "time")
+        return Summary(f"Density on {len(self.x)} × {len(self.v)} nodes at {times}", tuple(rows))
 
     def plot(self, ax: Any = None, axis: str = "x") -> MarginalArtists:
         """Draw the marginal densities of x, or of v, at all times."""

@@ -10,11 +10,11 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.errors import ResultFileError, StructureError, shown
+from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import LARGEST, Word
-from vibrokit.results.summary import Summary, counted
+from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from vibrokit.errors import OutOfTime, shown
+from vibrokit.errors import OutOfTime, counted, shown
 from vibrokit.progress import Deadline
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code, Severity
@@ -104,7 +104,16 @@ def _named(label: int | None, names: Sequence[str]) -> str:
     return names[label] if label < len(names) else f"attractor {label}"
 
 
+class _Count(int):
+    """A whole number, shown with a noun if that is its format: ``{count:start}``, ``{count:branch/branches}``."""
+
+    def __format__(self, form: str) -> str:
+        return counted(self, *form.split("/")) if form[:2].isalpha() and len(form) > 1 else super().__format__(form)
+
+
 def _listed(value: Value) -> Value:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return _Count(value)
     if isinstance(value, list | tuple):
         return ", ".join(f"{entry:.6g}" if isinstance(entry, float) else str(entry) for entry in value) or "none"
     return value

@@ -8,6 +8,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.errors import counted
+
 
 class ManifoldEnd(StrEnum):
     """Why a branch ends at the last point of its curve; each has a sentence."""
@@ -63,4 +65,5 @@ class Manifold:
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"
-        return f"Manifold: {kind} branch of saddle {self.saddle}, {len(self.curve)} vertices, ends: {self.end}"
+        vertices = counted(len(self.curve), "vertex", "vertices")
+        return f"Manifold: {kind} branch of saddle {self.saddle}, {vertices}, ends: {self.end}"

@@ -6,13 +6,13 @@ from typing import Any, ClassVar, Self
 
 import xarray
 
-from vibrokit.errors import ResultFileError, UnknownNameError
+from vibrokit.errors import ResultFileError, UnknownNameError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, read_energies
 from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
-from vibrokit.results.summary import Summary, counted
+from vibrokit.results.summary import Summary
 
 
 class PlainRecord(Record):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 import xarray
 
-from vibrokit.errors import ResultFileError, StructureError
+from vibrokit.errors import ResultFileError, StructureError, counted
 from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
@@ -19,7 +19,7 @@ from vibrokit.results.labels import exit_between, goal_of, label_of, source_amon
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
-from vibrokit.results.summary import Summary, counted
+from vibrokit.results.summary import Summary
 
 if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer

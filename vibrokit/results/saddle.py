@@ -7,6 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.errors import counted
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Saddle:
@@ -69,4 +71,5 @@ class Saddle:
         return max(self.nodes, self.points, key=len)
 
     def __repr__(self) -> str:
-        return f"Saddle: {self.kind}, period {self.period}, {len(self.points)} points, leads to {self.leads_to}"
+        points = counted(len(self.points), "point")
+        return f"Saddle: {self.kind}, period {self.period}, {points}, leads to {self.leads_to}"

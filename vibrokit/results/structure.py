@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray
 
-from vibrokit.errors import ResultFileError
+from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
 from vibrokit.results.basins import NOT_FOLLOWED, Basins, grid_variables, read_grid
@@ -15,7 +15,7 @@ from vibrokit.results.labels import label_of
 from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record
 from vibrokit.results.saddle import Saddle
-from vibrokit.results.summary import Summary, counted
+from vibrokit.results.summary import Summary
 from vibrokit.results.survival import Survival
 from vibrokit.results.table import Table
 

@@ -42,8 +42,3 @@ class Summary:
         table = f"<table>{body}</table>" if body else ""
         items = "".join(f"<li>{one.severity}: {escape(one.sentence(names))}</li>" for one in findings)
         return f"<p><b>{escape(self.title)}</b></p>{table}{f'<ul>{items}</ul>' if items else ''}"
-
-
-def counted(count: int, noun: str, plural: str = "") -> str:
-    """Return a number with its noun."""
-    return f"{count} {noun if count == 1 else plural or f'{noun}s'}"

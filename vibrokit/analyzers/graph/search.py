@@ -17,7 +17,8 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.errors import SceneError, StructureError
+from vibrokit.construction import Constructed
+from vibrokit.errors import SceneError, StructureError, counted
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
 from vibrokit.results.codes import Code
@@ -37,7 +38,7 @@ _STEPS_PER_PERIOD = (8, 16, 32, 64)  # more in a period that is longer than two 
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class GraphSearch:
+class GraphSearch(metaclass=Constructed):
     """Search for the least action from an attractor to its exits, as a shortest path over time and space.
 
     The period is divided into steps, and the section at each of these phases into nodes. A step from a state x to a
@@ -87,6 +88,14 @@ class GraphSearch:
                 )
         gibibytes(f"{name}: max_memory_gib", self.max_memory_gib)
 
+    def check_noise(self, osc: Oscillator) -> None:
+        """Raise SceneError if the noise has states of its own."""
+        if osc.noise is not None and osc.noise.extra_states:
+            raise SceneError(
+                f"the noise has {counted(len(osc.noise.extra_states), 'state')} of its own, and the graph covers x and "
+                "v only; use ActionPlot."
+            )
+
     def search(self, problem: ExitProblem) -> GraphSolution:
         """Search the exits of one attractor, with bounds.
 
@@ -110,12 +119,8 @@ class GraphSearch:
         number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to exits that are not
         settled then.
         """
-        noise, attractor = problem.osc.noise, problem.attractor
-        if noise is not None and noise.extra_states:
-            raise SceneError(
-                f"the noise has {len(noise.extra_states)} states of its own, and the graph covers x and v only; use "
-                "ActionPlot."
-            )
+        attractor = problem.attractor
+        self.check_noise(problem.osc)
         low, high = problem.structure.basins.region.bounds.T
         if np.any((attractor.points[:, :2] < low) | (attractor.points[:, :2] > high)):
             raise StructureError(

@@ -17,7 +17,7 @@ from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.density_flow import ABSORBED, DensityFlow, Leg
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
-from vibrokit.errors import SceneError
+from vibrokit.errors import SceneError, counted
 from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
@@ -182,7 +182,7 @@ def checked_noise(osc: Oscillator, needs_intensity: bool = True) -> NoiseModel:
     if osc.noise.extra_states:
         extra = len(osc.noise.extra_states)
         raise SceneError(
-            f"the noise has {extra} state{'s' * (extra > 1)} of its own, so that a density needs {2 + extra} "
+            f"the noise has {counted(extra, 'state')} of its own, so that a density needs {2 + extra} "
             f"dimensions: with 100 nodes in each, {100 ** (2 + extra) * 8 / 2**30:.3g} GiB. Densities are computed in "
             "x and v only; use ActionPlot or LeastAction."
         )

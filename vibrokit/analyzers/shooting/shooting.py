@@ -16,6 +16,7 @@ from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget, growin
 from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.analyzers.shooting.starts import Ring, Starts
+from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import TRAJECTORIES, stage
@@ -31,7 +32,7 @@ _STARTS, _FEWEST_STARTS, _ALL_INTERVALS = 24_000, 1000, 5e6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Shooting:
+class Shooting(metaclass=Constructed):
     """Extremal paths from the whole unstable manifold of an attractor, and their actions at the exit.
 
     Extremals of least action leave an attractor along its unstable manifold in (q, p), which near the attractor is
