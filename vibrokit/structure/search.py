@@ -38,6 +38,7 @@ _REACH = 0.1  # distance, relative to the motion, of a stable orbit that Newton'
 _LOOSE = 1e-2  # recurrences from which Newton's method is tried
 _GUESSES = 8
 _FIRST_ROUND = 64  # periods; doubled from round to round
+_LONGER = 3  # times the periods before, of the next stretch
 _WATCHED = 64  # starts that are followed for a long time
 _MEASURED = 16  # starts of a Lyapunov exponent
 _LEAST_MEASURED, _MOST_MEASURED = 1000, 20_000  # periods
@@ -89,9 +90,7 @@ class Search:
                 for rest in self.at_rest:
                     self._add_orbit(rest.point, 1)
             for periods in _rounds(wait):
-                states = self._after(states, periods)
-                self.unsettled, self.periods = states, self.periods + periods
-                states = self.unsettled = self._add_orbits(states, LONGEST_PERIOD)
+                states = self.unsettled = self._add_orbits(self._after(states, periods), LONGEST_PERIOD)
                 report(self.starts - len(states))
                 if not len(states):
                     return
@@ -118,10 +117,18 @@ class Search:
         return reached if trapped is None else reached.or_in_cells(trapped.region.bounds, trapped.labels)
 
     def _after(self, states: Array, periods: int) -> Array:
-        """Return the states some periods later, without those that reached a known orbit and those that diverged."""
-        ended, labels = follow(self.osc, states, self._arrival(), periods, self.stepper, self.executor)
-        self.diverged += int(np.sum(labels == ESCAPED))
-        return ended.states[labels == UNSETTLED]
+        """Return the states some periods later, without those that reached a known orbit and those that diverged.
+
+        The first ones are followed in stretches, so that if the work is stopped it is known what they were doing.
+        """
+        arrival, end = self._arrival(), self.periods + periods
+        while self.periods < end:
+            stretch = min(max(1, _LONGER * self.periods), end - self.periods)
+            ended, labels = follow(self.osc, states, arrival, stretch, self.stepper, self.executor)
+            self.diverged += int(np.sum(labels == ESCAPED))
+            states = self.unsettled = ended.states[labels == UNSETTLED]
+            self.periods += stretch
+        return states
 
     def _known(self, point: Array, tolerance: float) -> bool:
         return any(same_point(self.osc, point, known.points, tolerance) for known in self.attractors if known.repeats)
