@@ -115,9 +115,9 @@ def length_of(course, sigma, lapse, rate):
 
 @njit(**INNER)
 def grain_of(i, depth, x, rate, theta):
-    """Uncertainty of the law due to the rounding of x."""
-    more = 0.5 * depth + 64.0 * EPSILON * abs(x)
-    return 3.0 * EPSILON * abs(x) * abs(law(i, depth + more, rate, theta) - law(i, depth, rate, theta)) / more
+    """Uncertainty of the law due to the rounding of x, and its own rounding."""
+    more, force = 0.5 * depth + 64.0 * EPSILON * abs(x), law(i, depth, rate, theta)
+    return 3.0 * EPSILON * (abs(x) * abs(law(i, depth + more, rate, theta) - force) / more + abs(force))
 
 
 @njit(**INNER)
