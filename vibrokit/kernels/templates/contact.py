@@ -36,7 +36,6 @@ from vibrokit.kernels.templates.steps import (
     SINCE,
     SPAN,
     STEPS,
-    TAKEN,
     TASK,
     TIME,
     TIMED,
@@ -84,14 +83,19 @@ def press(i, lane, memory, pushing, theta, settings, lanes, room):
 
 @njit(**INNER)
 def course_of(i, lane, memory, pushing, theta, lanes, room):
-    """Choose the course of the next step in contact, and where on it the state lies."""
+    """Choose the course of the next step in contact, and where on it the state lies.
+
+    It runs in the root of the depth where the mass is about to leave: where it turned some time ago, and is fast enough
+    to reach the surface `against` the larger of the accelerations here and there. A mass at rest in the stop is not.
+    """
     depth, rate = depth_at(STATE, i, lane, lanes, theta), side_of(i, theta) * of(STATE, 1, lane, lanes)
     if memory[PULLED] == 0.0 and rate < 0.0 and depth > 0.0 and memory[TIMED] == 0.0:
         slope = offset_by(room, ROW)
         take(STATE, lane, lanes, room)
         rhs(room[CLOCK], room, pushing, theta, slope)
         acceleration = side_of(i, theta) * slope[1]
-        if rate * rate > (4.0 if acceleration > 0.0 else -1.0) * acceleration * depth:
+        against = max(acceleration, acceleration + law(i, depth, rate, theta) - law(i, 1e-30, rate, theta))
+        if rate * rate > max(-acceleration, 4.0 * against) * depth:
             return ROOT_DEPTH, np.sqrt(depth)
     if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
         return ROOT_TIME, np.sqrt(of(STATE, CLOCK, lane, lanes) - memory[SINCE])
@@ -111,9 +115,9 @@ def length_of(course, sigma, lapse, rate):
 
 @njit(**INNER)
 def grain_of(i, depth, x, rate, theta):
-    """Uncertainty of the law due to the rounding of x."""
-    more = 0.5 * depth + 64.0 * EPSILON * abs(x)
-    return 3.0 * EPSILON * abs(x) * abs(law(i, depth + more, rate, theta) - law(i, depth, rate, theta)) / more
+    """Uncertainty of the law due to the rounding of x, and its own rounding."""
+    more, force = 0.5 * depth + 64.0 * EPSILON * abs(x), law(i, depth, rate, theta)
+    return 3.0 * EPSILON * (abs(x) * abs(law(i, depth + more, rate, theta) - force) / more + abs(force))
 
 
 @njit(**INNER)
@@ -131,13 +135,15 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
         if then > memory[END] or side_of(i, theta) * of(TRIAL, 1, lane, lanes) >= 0.0:
             memory[TIMED] = 2.0 if then > memory[END] else 1.0
             return COMPLETED
-    elif memory[PULLED] == 0.0 and not tiny and leaves(i, then - now, lane, lanes, theta):
-        return ask(0.5 * length, lane, memory, settings, lanes)
+    elif not tiny and leaves(i, then - now, lane, lanes, theta):
+        if memory[PULLED] == 0.0 or depth_at(TRIAL, i, lane, lanes, theta) >= 0.0:
+            return ask(0.5 * length, lane, memory, settings, lanes)
     if length != memory[FIRST]:
         memory[LAST] = 0.0
-    memory[FIRST], memory[TAKEN] = length, lanes[FACTOR + lane]
+    memory[FIRST] = length
+    plan_contact(course, lanes[SIGMA + lane], length, then - now, lanes[FACTOR + lane], memory)
     if is_clamped(i, theta):
-        return turn(i, lane, memory, pushing, theta, settings, lanes, room)
+        return turn(i, tiny, lane, memory, pushing, theta, settings, lanes, room)
     return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
 
 
@@ -157,28 +163,28 @@ def leaves(i, lapse, lane, lanes, theta):
 
 
 @njit(**INNER)
-def turn(i, lane, memory, pushing, theta, settings, lanes, room):
-    """End a step where the law changes its sign, or where a mass that is not pushed leaves the stop."""
+def turn(i, tiny, lane, memory, pushing, theta, settings, lanes, room):
+    """End a step where the law changes its sign, or where a mass that is not pushed leaves the stop.
+
+    Outside the stop the law says nothing. A law that has just changed its sign may not show it at the start of the
+    step, for its value is rounding there; the step is shortened until its end shows it.
+    """
+    pulled, length = memory[PULLED] != 0.0, lanes[LENGTH + lane]
+    if pulled and depth_at(TRIAL, i, lane, lanes, theta) < 0.0:
+        land(RELEASES, DEPTH_GOAL, i, length, lane, memory, theta, lanes)
+        return UNDERWAY
     before = push_of(i, of(STATE, 0, lane, lanes), of(STATE, 1, lane, lanes), theta)
     after = push_of(i, of(TRIAL, 0, lane, lanes), of(TRIAL, 1, lane, lanes), theta)
-    pulled, length = memory[PULLED] != 0.0, lanes[LENGTH + lane]
     turned = after > 0.0 if pulled else after < 0.0
     if turned and (before < 0.0 if pulled else before > 0.0):
         land(FLIPS, LAW_GOAL, i, length, lane, memory, theta, lanes)
         return UNDERWAY
+    if turned and not tiny:
+        return ask(0.5 * length, lane, memory, settings, lanes)
     if turned:
         for e in range(CLOCK, size_of(lanes)):
             lanes[TRIAL + e * LANES + lane] = lanes[STATE + e * LANES + lane]
         length = 0.0
-    return turned_at(i, length, turned, lane, memory, pushing, theta, settings, lanes, room)
-
-
-@njit(**INNER)
-def turned_at(i, length, turned, lane, memory, pushing, theta, settings, lanes, room):
-    """Let go a mass that is not pushed and has left the stop; conclude otherwise."""
-    if memory[PULLED] != 0.0 and depth_at(TRIAL, i, lane, lanes, theta) < 0.0:
-        land(RELEASES, DEPTH_GOAL, i, length, lane, memory, theta, lanes)
-        return UNDERWAY
     return conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, room)
 
 
@@ -188,7 +194,7 @@ def conclude_landing(lane, memory, pushing, theta, settings, lanes, room):
     i, length = int(memory[AIM]), lanes[LENGTH + lane]
     if memory[TASK] == FLIPS:
         memory[TASK] = STEPS
-        return turned_at(i, length, True, lane, memory, pushing, theta, settings, lanes, room)
+        return conclude(i, length, True, lane, memory, pushing, theta, settings, lanes, room)
     lanes[TRIAL + lane] = stop(i, theta)
     return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
 
@@ -197,12 +203,9 @@ def conclude_landing(lane, memory, pushing, theta, settings, lanes, room):
 def conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, room):
     """Accept the attempt."""
     course, sigma = lanes[COURSE + lane], lanes[SIGMA + lane]
-    lapse = of(TRIAL, CLOCK, lane, lanes) - of(STATE, CLOCK, lane, lanes)
     accept(lane, lanes)
-    last = memory[LAST] > 0.0
-    if last and length == memory[FIRST]:
+    if memory[LAST] > 0.0 and length == memory[FIRST]:
         lanes[STATE + CLOCK * LANES + lane] = memory[END]
-    plan_contact(course, sigma, length, lapse, last, memory)
     y = room
     if turned:
         take(STATE, lane, lanes, y)
@@ -232,9 +235,11 @@ def meet(i, lane, memory, pushing, theta, settings, lanes, room):
 
 
 @njit(**INNER)
-def plan_contact(course, sigma, length, lapse, last, memory):
-    """Choose how long the next step in contact shall last."""
-    factor = memory[TAKEN]
+def plan_contact(course, sigma, length, lapse, factor, memory):
+    """Choose how long the next step in contact shall last, after one that may still be shortened to end on an event.
+
+    How early the event is must not matter: no time may pass before it, and the next step would last as long.
+    """
     if course == ROOT_TIME:
         if sigma == 0.0:
             memory[FIRST_STEP] = lapse * min(factor, 1.5) ** 2
@@ -242,7 +247,7 @@ def plan_contact(course, sigma, length, lapse, last, memory):
         lapse = longer * (2.0 * (sigma + length) + longer)
     else:
         lapse *= factor
-    if length != 0.0 and not (last and lapse < memory[CONTACT_STEP]):
+    if lapse > 0.0 and not (memory[LAST] > 0.0 and lapse < memory[CONTACT_STEP]):
         memory[CONTACT_STEP] = lapse
     if memory[TIMED] == 1.0:
         memory[TIMED] = 0.0
