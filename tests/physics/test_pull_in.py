@@ -1,7 +1,7 @@
 """Pull-in of an electrostatic actuator, and other motions between poles: closed forms of a potential with poles.
 
-The actuator is set 2 of the transducers in Kolchuzhin's LMGT_MEMS_component_library (an example of ANSYS): mass 1e-4 kg,
-spring 200 N/m, damping 0.04 N s/m, plates of 1e-4 m² with a gap of 150 µm.
+The actuator is set 2 of the transducers in Kolchuzhin's LMGT_MEMS_component_library (an example of ANSYS): mass
+1e-4 kg, spring 200 N/m, damping 0.04 N s/m, plates of 1e-4 m² with a gap of 150 µm.
 """
 
 import functools
@@ -19,7 +19,7 @@ from vibrokit.results.codes import Code
 SQUARE, GAP = 2e6, 1.5e-4  # ω_n² (s⁻²), m
 DAMPING = 0.1414214
 COARSE = {"cells": (60, 60), "starts": (8, 8), "manifolds": False}
-QUICK = vk.LeastAction(shooting=None, graph=None)
+QUICK = vk.LeastAction(shooting=None, graph=vk.GraphSearch(nodes=(40, 40)))
 
 
 def strength(voltage):
@@ -73,7 +73,7 @@ def test_one_state_and_its_escape_into_the_pole(voltage, rest, saddle, energy):
 
 
 def test_the_share_of_the_basin_as_scipy_has_it():
-    osc, found = structure(400.0)
+    _, found = structure(400.0)
     a, omega = strength(400.0), math.sqrt(SQUARE)
 
     def captured(x, v):
@@ -89,10 +89,11 @@ def test_the_share_of_the_basin_as_scipy_has_it():
         arrival.terminal = True
         return solve_ivp(rates, (0.0, 60.0), (x / GAP, v / (GAP * omega)), events=arrival, rtol=1e-8).status == 1
 
-    places = np.random.default_rng(0).random((60, 2)) * found.basins.region.widths + found.basins.region.bounds[:, 0]
-    labels = found.basins.label_at(places) if hasattr(found.basins, "label_at") else None
-    assert labels is not None
-    assert np.mean([captured(*place) == (label == ESCAPED) for place, label in zip(places, labels, strict=True)]) > 0.95
+    places = np.random.default_rng(0).choice(found.basins.region.cell_centres((60, 60)), 60, replace=False)
+    labels = found.basins.at(places)
+    assert {0, ESCAPED} == set(labels.tolist())
+    agree = [captured(*place) == (label == ESCAPED) for place, label in zip(places, labels, strict=True)]
+    assert sum(agree) >= 59  # a cell on the boundary may have another label than its centre
 
 
 @pytest.mark.slow
@@ -168,7 +169,8 @@ def test_all_motion_settles_on_one_side_of_a_wall(formula, rest):
     (attractor,) = found.attractors
     assert attractor.points[0, 0] == pytest.approx(brentq(rest, 0.5, 9.0), rel=1e-9)
     assert found.basins.region.x[0] >= 0.0
-    assert attractor.basin_fraction == (1.0 if "log" not in formula else pytest.approx(attractor.basin_fraction))
+    if "log" not in formula:  # whose work is finite, so that fast motion reaches x = 0
+        assert attractor.basin_fraction == 1.0
 
 
 @pytest.mark.slow
