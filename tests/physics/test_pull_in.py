@@ -181,3 +181,32 @@ def test_two_wells_between_the_poles_of_a_tangent():
     assert [a.points[0, 0] for a in found.attractors] == pytest.approx([-rest, rest], rel=1e-9)
     assert [a.basin_fraction for a in found.attractors] == pytest.approx([0.5, 0.5], abs=0.01)
     assert found.basins.region.x == pytest.approx((-0.5 * math.pi, 0.5 * math.pi))
+
+
+@pytest.mark.slow
+def test_no_exit_leads_across_a_pole():
+    """Behind the pole the formula has another state, which has no meaning for the motion before it."""
+    osc = actuator(400.0)
+    found = vk.find_structure(osc, region=((-1e-4, 3e-4), (-0.3, 0.3)), **COARSE)
+    assert [attractor.points[0, 0] < GAP for attractor in found.attractors] == [True, False]
+    result = QUICK.run(osc, found)
+    assert [(energy.source, energy.target) for energy in result.energies] == [(0, ESCAPED)]
+    assert result.energies[0].value == pytest.approx(1.102786, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_rates_between_two_poles_agree():
+    """By simulation and by the density, neither of which crosses a pole, and by symmetry."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring("tan(x) - 1.5*x"), noise=vk.WhiteNoise(0.014)
+    )
+    found = vk.find_structure(osc, **COARSE)
+    rates = [
+        rate
+        for analyzer in (vk.MFET(intensities=(0.014,)), vk.SGCM(intensities=(0.014,)))
+        for rate in analyzer.run(osc, found).rates
+    ]
+    assert len(rates) == 4
+    values = np.array([rate.value for rate in rates])
+    errors = np.array([math.log(rate.upper / rate.lower) for rate in rates])  # two standard errors or more
+    assert (np.abs(np.log(values / values.mean())) < errors.max()).all()
