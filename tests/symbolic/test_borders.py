@@ -7,6 +7,7 @@ import sympy
 
 import vibrokit as vk
 from tests.scenes import scene
+from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.parts.formula_expression import expression
 from vibrokit.symbolic.borders import borders_of
@@ -120,3 +121,17 @@ def test_the_model_shows_where_forces_have_values():
     assert str(model).splitlines()[-1].endswith("≠ 0")
     assert r"\neq" in model.latex
     assert "≠" not in str(scene(spring=vk.CustomSpring("x + x**3"), noise=vk.WhiteNoise(1e-3)).model)
+
+
+def test_a_guard_at_its_value_leaves_fixed_steps():
+    guarded = vk.CustomSpring("x - a/max(1 - x, least)**2", a=0.1, least=0.2)
+    assert isinstance(ensemble_stepper(scene(spring=guarded), Flow.STATE), vk.RK4)
+    assert isinstance(ensemble_stepper(scene(spring=vk.CustomSpring("x - a/(1 - x)**2", a=0.1)), Flow.STATE), vk.Order8)
+
+
+def test_poles_of_the_noise_end_noisy_motion_only():
+    osc = scene(noise=vk.StateDependentNoise(1e-3, "1/(2 - x)"))
+    assert not osc.model.borders
+    assert [border.pole for border in osc.model.noise_borders] == [True]
+    assert "crossed" in kernel_for(osc, Flow.NOISY, vk.RK4()).scene.source
+    assert "crossed" not in kernel_for(osc, Flow.STATE, vk.RK4()).scene.source
