@@ -18,6 +18,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.structure import Structure
+from vibrokit.structure.borders import apart
 from vibrokit.structure.scales import turns_of
 
 _CHECKS_WITHOUT_SECTION = 16  # exit tests per unit of time where no section sets them
@@ -170,7 +171,8 @@ class LeaveBasin(Exit):
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """The saddles on basin boundaries, this basin's first; then target basins to which none of its own leads."""
         own, others = [], []
-        wanted = [attractor.label for attractor in self.targets(structure, source)]
+        start, allowed = float(structure.attractors[source].points[0, 0]), self.targets(structure, source)
+        wanted = [each.label for each in allowed if not apart(osc, start, float(each.points[0, 0]))]
         # Without a wanted one, motion that leaves the region counts too. What did not settle is no exit.
         counting = {*wanted, *(() if self.to is not None else (ESCAPED,))}
         for number, saddle in enumerate(structure.saddles):

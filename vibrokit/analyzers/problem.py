@@ -22,6 +22,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.structure import Structure
+from vibrokit.structure.borders import apart
 from vibrokit.structure.orbits import Orbit, refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -65,8 +66,9 @@ class ExitProblem:
 
     @cached_property
     def targets(self) -> tuple[Attractor, ...]:
-        """The attractors that may be reached."""
-        return self.exit.targets(self.structure, self.source)
+        """The attractors that may be reached: none beyond a pole."""
+        start, targets = float(self.attractor.points[0, 0]), self.exit.targets(self.structure, self.source)
+        return tuple(target for target in targets if not apart(self.osc, start, float(target.points[0, 0])))
 
     @property
     def has_bystanders(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 import warnings
@@ -52,7 +53,7 @@ def ensemble_stepper(scene: Scene, flow: Flow) -> Stepper:
         return LOCATED
     if flow is Flow.HAMILTONIAN_VARIATIONAL and scene.barriers and kernel_for(scene, flow, RK4()).module.BENDS:
         return LOCATED  # fixed steps have its derivatives where p = 0 only
-    if flow is not Flow.NOISY and kernel_for(scene, flow, RK4()).module.BORDERED:
+    if flow is not Flow.NOISY and kernel_for(scene, flow, RK4()).module.BORDERED and _has_borders(scene):
         return LOCATED
     turns = max(1.0, _turns(scene))
     if flow is Flow.NOISY:  # if these are too few, integration warns
@@ -106,6 +107,14 @@ def _steps_per_contact(exponent: float) -> int:
     if exponent > 1.25:
         return 16
     return 32 if exponent > 0.75 else 64
+
+
+@functools.lru_cache(maxsize=64)
+def _has_borders(scene: Scene) -> bool:
+    """Whether forces have poles or end somewhere, at the parameters of the scene; formulas alone may not tell."""
+    from vibrokit.symbolic.model import Model  # only here is SymPy needed
+
+    return bool(Model(scene).conditions)
 
 
 def _power_of_two(needed: float) -> int:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stopping import DIVERGED, STALLED
 from vibrokit.kernels.tasks import carry, processors
 from vibrokit.parts.scene import Scene
 from vibrokit.progress import TRAJECTORIES, advance, count
@@ -228,6 +229,8 @@ def advance_block(
         stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
         ended.states, ended.intervals, ended.status, ended.label, ended.visits,
     )  # fmt: skip
+    if kernel.module.BORDERED:  # next to a pole time does not go on: the motion ends there
+        status[status == STALLED] = DIVERGED
     return ended
 
 

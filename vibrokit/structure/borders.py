@@ -48,6 +48,11 @@ def between_borders(osc: Oscillator, region: Region, places: Sequence[float] = (
     return dataclasses.replace(region, x=(low, high)) if (low, high) != region.x else region
 
 
+def apart(osc: Oscillator, one: float, other: float) -> bool:
+    """Return whether a border lies between two places (m), which no motion crosses, with noise or without."""
+    return osc.model.domain.around(one) != osc.model.domain.around(other)
+
+
 def intervals_within(osc: Oscillator, low: float, high: float) -> list[tuple[float, float]]:
     """Return the parts of a range of x (m) between borders; those that end at a border end a little before it."""
     found = []

@@ -17,6 +17,7 @@ _RATIOS = {
     sympy.sec: lambda u: 1 / sympy.cos(u),
     sympy.csc: lambda u: 1 / sympy.sin(u),
 }
+_BOUNDED = (sympy.sin, sympy.cos, sympy.tanh, sympy.sign)
 _WITHIN_ONE = (sympy.asin, sympy.acos, sympy.atanh)
 _WITH_ITS_ZEROS = (sympy.Abs, sympy.sinh, sympy.tanh, sympy.asin, sympy.atan, sympy.asinh, sympy.sign)
 
@@ -140,7 +141,8 @@ def _bounded(terms: sympy.Expr, variable: sympy.Symbol, place: sympy.Expr) -> bo
 
 
 def _has_roots(gauge: sympy.Expr) -> bool:
-    """Whether an expression has real zeros; True where it is no polynomial with numbers as coefficients."""
-    if len(gauge.free_symbols) != 1 or not gauge.is_polynomial(*gauge.free_symbols):
-        return True
-    return bool(sympy.Poly(sympy.nsimplify(gauge, rational=True)).count_roots())
+    """Whether an expression has real zeros: as far as the numbers of a polynomial, or the bounds of a sine, tell."""
+    if len(gauge.free_symbols) == 1 and gauge.is_polynomial(*gauge.free_symbols):
+        return bool(sympy.Poly(sympy.nsimplify(gauge, rational=True)).count_roots())
+    bounded = gauge.replace(lambda node: isinstance(node, _BOUNDED), lambda node: sympy.AccumBounds(-1, 1))
+    return not (isinstance(bounded, sympy.AccumBounds) and (bounded.min > 0 or bounded.max < 0))

@@ -32,10 +32,11 @@ class Domain:
     """
 
     def __init__(self, borders: Iterable[Border], x: sympy.Symbol) -> None:
-        self._gauges = [(_gauge(b, x), _zeros(b, x), b.pole) for b in borders if b.exists and b.gauge.has(x)]
+        found = [(_gauge(b, x), _zeros(b, x), b.pole) for b in borders if b.exists and b.gauge.has(x)]
+        self._gauges = [(g, zeros, pole) for g, zeros, pole in found if zeros(-math.inf, math.inf)]
 
     def __bool__(self) -> bool:
-        """Whether there are borders at all."""
+        """Whether there are borders at all; a formula without a value anywhere counts as one without."""
         return bool(self._gauges)
 
     def borders(self, low: float = -math.inf, high: float = math.inf) -> list[float]:

@@ -12,7 +12,6 @@ from vibrokit.kernels.templates.scene import ERROR, FACTOR, LANES, LENGTH, ROW, 
 from vibrokit.kernels.templates.steps import (
     AIM,
     CLOCK,
-    COUNT,
     END,
     EPSILON,
     FIRST,
@@ -67,8 +66,8 @@ def judge(lane, memory, pushing, theta, settings, lanes, room):
     new = shortened(error, lanes[FACTOR + lane], tiny, lane, memory, settings, lanes)
     if new != 0.0:
         return ask(new, lane, memory, settings, lanes)
-    if not np.isfinite(error) or (tiny and memory[COUNT] > settings[1]):
-        return DIVERGED  # next to a singular force time does not go on: the motion ends there
+    if not np.isfinite(error):
+        return DIVERGED
     memory[TAKEN] = lanes[FACTOR + lane]
     if STOPS:
         return watch(length, tiny, lane, memory, pushing, theta, settings, lanes, room)

@@ -11,6 +11,8 @@ from vibrokit.parts.spring.spring import Spring
 class CustomSpring(FormulaPart, Spring):
     """Spring given as a formula in ``x`` and ``v``, nonlinear damping included.
 
+    Motion ends at the poles of the formula and at the edges of its domain.
+
     Dry friction is given in a smooth form: ``f*tanh(v/w)`` with a small width w, not ``f*sign(v)``, which is refused.
 
     Parameters

@@ -48,9 +48,10 @@ def wells(
         label = _label(attractors, x, _SAME * (high - low))
         first, middle, last = np.searchsorted(places, [left, x, right])
         before, bottom, after = potential[[first, middle, last]]
-        depth = min(before, after) - bottom
         falls = bool(np.all(inside[first:middle] > 0) and np.all(inside[middle:last] < 0))
-        error = float(np.abs(halved - work)[first:last].sum())  # large where a force is singular
+        with np.errstate(invalid="ignore"):  # beyond a pole nothing is known
+            depth = min(before, after) - bottom
+            error = float(np.abs(halved - work)[first:last].sum())  # large where a force is singular
         if label is None or not falls or not error <= 0.1 * _BELOW * depth:
             continue
         limit = bottom + (1 - _BELOW) * depth
