@@ -117,7 +117,7 @@ print(f"    this is {touch.value / clear.value:.2f} of the energy of leaving the
 # 6. The long term
 #
 # The energies of all transitions determine which state is the most stable, which is left first, and the exponents of
-# the stationary weights. Prefactors, which depend only weakly on D, are not known here.
+# the stationary weights. Prefactors are not known here, so that no share of time follows.
 
 transitions = vk.Transitions.of(result)
 print(transitions)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.problem import ExitProblem as ExitProblem
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
+    from vibrokit.comparison.occupancies import occupancies as occupancies
     from vibrokit.comparison.stationary import StationaryDensity as StationaryDensity
-    from vibrokit.comparison.stationary import occupancies as occupancies
     from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
@@ -87,7 +87,7 @@ _MODULES = {
     "MFET": "vibrokit.analyzers.mean_exit_times",
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
-    "occupancies": "vibrokit.comparison.stationary",
+    "occupancies": "vibrokit.comparison.occupancies",
     "StationaryDensity": "vibrokit.comparison.stationary",
     "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",

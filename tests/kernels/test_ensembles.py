@@ -343,3 +343,14 @@ def test_states_of_another_flow_are_refused(flow):
     """A kernel would read and write beyond them."""
     with pytest.raises(ValueError, match=r"shape \(count, \d+\), got \(3, 5\)"):
         run_ensemble(impacting(), flow, RK, np.zeros((3, 5)))
+
+
+def test_bounds_hold_in_every_fixed_step():
+    """Half a turn of a free oscillator leads beyond the bound and back, at rest both at the start and at the end."""
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, noise=vk.WhiteNoise(0.0))
+    for start, low, status in ((1.0, -0.9, LEFT_REGION), (1.0, -1.001, COMPLETED), (1.0, -0.99999, LEFT_REGION)):
+        ended = run_ensemble(
+            osc, Flow.NOISY, RK, np.array([[start, 0.0]]), streams=streams_of(1, np.arange(1)),
+            stop=Stop(region=np.array([[low, np.inf], EVERYWHERE]), between=True),
+        )  # fmt: skip
+        assert ended.status.tolist() == [status]

@@ -120,7 +120,7 @@ def test_a_result_has_energies_all_paths_transitions_and_findings():
         "9e-05", "9e-05", "0.00011",
     ]  # fmt: skip
     assert "from \\ to" in text
-    assert "Stationary weights at D = 2e-05" in text
+    assert "ln of the stationary weights at D = 2e-05" in text
 
 
 def test_transitions_that_do_not_follow_are_one_sentence():

@@ -15,6 +15,7 @@ import xarray
 
 from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.exits import Exit, LeaveBasin
+from vibrokit.analyzers.metastability import metastability
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
 from vibrokit.construction import Constructed
@@ -280,7 +281,8 @@ class Analyzer(ABC, metaclass=Constructed):
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
         self._check_returned(found, problem)
-        return found
+        data, limits = metastability(problem, found.data)
+        return dataclasses.replace(found, data=data, findings=(*found.findings, *limits))
 
     def _revisited(self, problem: ExitProblem, analyses: Mapping[int, Analysis]) -> Analysis:
         """The analysis of one attractor, anew if what was found of the others changes it; kept if that fails."""

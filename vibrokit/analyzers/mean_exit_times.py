@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.mfet.dataset import dataset_of
 from vibrokit.analyzers.mfet.importance import Importance
 from vibrokit.analyzers.mfet.measurement import AtIntensity, Measurement
@@ -127,7 +128,8 @@ class MFET(Analyzer):
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
         attractors = problem.structure.attractors
         measured: list[AtIntensity] = []
-        findings: list[Finding] = []
+        wanted, limits = with_states(problem, wanted)
+        findings = list(limits)
         complete = True
         covariances = {a.label: covariances_of(problem, a) for a in attractors}
         stepper = problem.ensemble_stepper(Flow.NOISY)

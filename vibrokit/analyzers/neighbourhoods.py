@@ -12,7 +12,10 @@ from scipy.spatial import cKDTree
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.region import Region
 from vibrokit.structure.linear_map import gaussian_map
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -21,6 +24,7 @@ CORE_SIZE = 1.0
 """Semi-axes of an attractor's core in standard deviations of the density around it: it holds 39 % of that."""
 
 _FEW = 64  # centres, each with its own ellipse
+_LEAST = 1 / 60  # semi-axes of the core of motion that never repeats, in widths of the region
 _SINGULAR = 1e-12  # 1 − correlation², as rounding errors may leave of 0
 _RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
@@ -37,13 +41,18 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
     StructureError
         The orbit is not stable, or noise does not make it spread.
     """
+    return _covariances(problem.osc, attractor, problem.single_stepper(Flow.LINEARISED))
+
+
+@functools.lru_cache(maxsize=256)
+def _covariances(osc: Oscillator, attractor: Attractor, stepper: Stepper) -> Array:
+    """The same, kept: each attractor is a target of all others, at several intensities."""
     if not attractor.is_fixed:
         return np.zeros((len(attractor.points), 2, 2))
-    stepper = problem.single_stepper(Flow.LINEARISED)
-    orbit = refine_orbit(problem.osc, attractor.points[0], attractor.period, stepper)
-    covariances = [local_potential(problem.osc, orbit, stepper).covariance]
+    orbit = refine_orbit(osc, attractor.points[0], attractor.period, stepper)
+    covariances = [local_potential(osc, orbit, stepper).covariance]
     for point in attractor.points[:-1]:
-        step = gaussian_map(problem.osc, point[None], stepper)
+        step = gaussian_map(osc, point[None], stepper)
         covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
     found = np.array(covariances)[:, :2, :2]
     if not np.all(np.linalg.det(found) > _SINGULAR * found[:, 0, 0] * found[:, 1, 1]):
@@ -62,6 +71,13 @@ def metrics_of(attractor: Attractor, covariances: Array, least: Array) -> Array:
     variances, axes = np.linalg.eigh(covariances / scales)
     widened = np.einsum("nij,nj,nkj->nik", axes, np.maximum(variances, 1.0), axes) * scales
     return np.linalg.cholesky(np.linalg.inv(widened)).transpose(0, 2, 1)
+
+
+def core_of(attractor: Attractor, covariances: Array, intensity: float, region: Region) -> tuple[Array, Array]:
+    """Return the core of an attractor as ellipses: centres c (count, 2) and matrices R, |R (q − c)| ≤ 1 inside."""
+    widths = _LEAST * np.array([np.ptp(region.x), np.ptp(region.v)])
+    least = np.tile(1e-9 * widths if attractor.is_fixed else widths, (len(covariances), 1))
+    return attractor.points[:, :2], metrics_of(attractor, CORE_SIZE**2 * intensity * covariances, least)
 
 
 def relaxation_of(attractor: Attractor, least: float = 1.0) -> float:

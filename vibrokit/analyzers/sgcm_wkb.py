@@ -10,6 +10,7 @@ import xarray
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
@@ -113,6 +114,9 @@ class SGCM(Analyzer):
         orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
         steps = self.steps or steps_for(problem.osc, np.concatenate(orbits))
         wanted = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
+        wanted, limits = with_states(problem, wanted)
+        if not wanted:
+            return Analysis(findings=limits)
         solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
         solved: list[AtIntensity] = []
         stopped: tuple[Finding, ...] = ()
@@ -125,7 +129,7 @@ class SGCM(Analyzer):
         return Analysis(
             _energies(problem, solved),
             _data(problem, solver, solved),
-            (*_findings(problem, solved), *stopped),
+            (*limits, *_findings(problem, solved), *stopped),
             complete=not stopped,
         )
 

@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import logsumexp
 
+from vibrokit.comparison.occupancies import balances, occupancies, shares_text
 from vibrokit.errors import StructureError, shown
-from vibrokit.results.rated import RatedResult
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.structure.validation import pair
-from vibrokit.text_table import text_table
 
 if TYPE_CHECKING:
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
@@ -41,22 +40,25 @@ class StationaryDensity:
     ----------
     intensities : array (count,)
         Noise intensities D (m² s⁻³), descending.
-    log_occupancies : array (count, attractors)
-        ln of the probability of each attractor.
+    log_weights : array (count, attractors)
+        ln of the weight of the density of each attractor.
     log_density : array (count, nx, nv)
         ln p at the nodes; −inf where it is not resolved.
     x, v : array (nx,), (nv,)
         Nodes at equal distances.
     section : Section
         Attractors and saddles.
+    occupancies : xarray.DataArray
+        Probability of each metastable state with its bounds, as `vibrokit.occupancies` returns it.
     """
 
     intensities: Array
-    log_occupancies: Array
+    log_weights: Array
     log_density: Array
     x: Array
     v: Array
     section: Section
+    occupancies: xarray.DataArray
 
     @classmethod
     def of(cls, result: SGCMResult, nodes: tuple[int, int] = (240, 240)) -> StationaryDensity:
@@ -77,20 +79,15 @@ class StationaryDensity:
             raise StructureError(
                 f"SGCM has no density of {', '.join(absent)}; run it without source=, and see the result's findings."
             )
-        occupancies = np.array([log_stationary(one, names) for one in result.log_rates.values])
+        weights = np.array([balance.log_probabilities for balance in balances(result)])
         x, v, parts = _on_one_grid(result, pair("StationaryDensity.of: nodes", nodes, least=2))
-        density = logsumexp(parts + occupancies[:, :, None, None], axis=1)
-        return cls(np.array(known), occupancies, density, x, v, result.section)
+        density = logsumexp(parts + weights[:, :, None, None], axis=1)
+        return cls(np.array(known), weights, density, x, v, result.section, occupancies(result))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the attractors, in the order of their labels."""
         return self.section.names
-
-    @property
-    def occupancies(self) -> xarray.DataArray:
-        """Probability of each attractor, over (intensity, attractor)."""
-        return _by_attractor(self.log_occupancies, self.intensities, self.names)
 
     @property
     def density(self) -> xarray.DataArray:
@@ -127,7 +124,7 @@ class StationaryDensity:
         found = self.quasi_potential.values[chosen]
         half = [0.5 * (axis[1] - axis[0]) for axis in (self.x, self.v)]
         bounds = [(self.x[0] - half[0], self.x[-1] + half[0]), (self.v[0] - half[1], self.v[-1] + half[1])]
-        likeliest = int(np.argmax(self.log_occupancies[chosen]))
+        likeliest = int(np.argmax(self.log_weights[chosen]))
         return quasi_potential_map(
             found,
             bounds,
@@ -155,60 +152,7 @@ class StationaryDensity:
         return _ABOVE * float(there.max()) if there.size else None
 
     def __str__(self) -> str:
-        pairs = zip(self.intensities.tolist(), self.log_occupancies, strict=True)
-        rows = [[f"{d:g}", *(f"{p:.4g}" for p in np.exp(row))] for d, row in pairs]
-        return "\n".join(text_table([["D", *self.names], *rows]))
-
-
-def occupancies(result: RatedResult) -> xarray.DataArray:
-    """Return the stationary probability of each attractor, over (intensity, attractor), from rates alone.
-
-    The rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from 1
-    to 2.
-
-    Raises
-    ------
-    StructureError
-        The result has no rates, or none of the exits of some attractor at some intensity.
-    """
-    if not isinstance(result, RatedResult):
-        raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
-    if not result.rates:
-        raise StructureError("the result has no rates; see its findings.")
-    left = {rate.source for rate in result.rates}
-    absent = [name for label, name in enumerate(result.names) if label not in left]
-    if absent:
-        raise StructureError(f"the result has no rate out of {', '.join(absent)}; run the analyzer without source=.")
-    found = [log_stationary(one, result.names) for one in result.log_rates.values]
-    return _by_attractor(np.array(found), np.array(result.intensities), result.names)
-
-
-def _by_attractor(logs: Array, intensities: Array, names: Sequence[str]) -> xarray.DataArray:
-    coordinates = {"intensity": intensities, "attractor": list(names)}
-    return xarray.DataArray(np.exp(logs), coordinates, ("intensity", "attractor"), "occupancy")
-
-
-def log_stationary(log_rates: Array, names: tuple[str, ...]) -> Array:
-    """Return ln of the stationary probabilities of a Markov chain, from ln of its rates, shape (n, n).
-
-    By elimination without subtractions (Grassmann, Taksar & Heyman, Oper. Res. 33, 1107, 1985), in logarithms: rates of
-    1e-400 are as good as any. Raises StructureError if a state is never left.
-    """
-    rates = np.array(log_rates, dtype=float)
-    np.fill_diagonal(rates, -np.inf)
-    count = len(rates)
-    left = np.full(count, -np.inf)
-    for k in range(count - 1, 0, -1):
-        left[k] = logsumexp(rates[k, :k])
-        if not np.isfinite(left[k]):
-            raise StructureError(f"no exit from {names[k]} was resolved, so that its probability is not known.")
-        through = rates[:k, k, None] + rates[None, k, :k] - left[k]
-        rates[:k, :k] = np.logaddexp(rates[:k, :k], through)
-    found = np.zeros(count)
-    for k in range(1, count):
-        found[k] = logsumexp(found[:k] + rates[:k, k]) - left[k]
-    stationary: Array = found - logsumexp(found)
-    return stationary
+        return shares_text(self.occupancies)
 
 
 def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Array, Array]:

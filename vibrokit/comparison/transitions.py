@@ -24,7 +24,10 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StationaryWeights:
-    """Shares of time spent at each attractor in the long run, from their exponents alone.
+    """Exponents of the shares of time spent at each attractor in the long run, at one noise intensity.
+
+    A share is exp(−w/D) times a prefactor. The activation energies do not determine the prefactor, which may be many
+    powers of ten, so that no share follows from them; `vibrokit.occupancies` has shares, from rates.
 
     Attributes
     ----------
@@ -32,24 +35,25 @@ class StationaryWeights:
         Of the attractors, in the order of their labels.
     intensity : float
         Noise intensity D (m² s⁻³).
-    weights : array (count,)
-        Sum 1; NaN where they are not known.
+    exponents : array (count,)
+        −w/D: ln of each share without its prefactor, 0 for the most stable; −∞ for one that is not reached, NaN where
+        they are not known.
     lower, upper : array (count,)
-        Bounds of each, from those of the energies. They do not include the unknown prefactors.
+        Bounds of each, from those of the energies.
     """
 
     names: tuple[str, ...]
     intensity: float
-    weights: Array
+    exponents: Array
     lower: Array
     upper: Array
 
     def __str__(self) -> str:
-        if np.isnan(self.weights).any():
-            return f"Stationary weights at D = {self.intensity:g} are not known."
-        rows = zip(self.names, self.weights, self.lower, self.upper, strict=True)
-        shares = ", ".join(f"{name} {_share(*numbers)}" for name, *numbers in rows)
-        return f"Stationary weights at D = {self.intensity:g}, without prefactors: {shares}."
+        if np.isnan(self.exponents).any():
+            return f"Exponents of the stationary weights at D = {self.intensity:g} are not known."
+        rows = zip(self.names, self.exponents, self.lower, self.upper, strict=True)
+        shown = ", ".join(f"{name} {_shown(*numbers)}" for name, *numbers in rows if numbers[0] > -math.inf)
+        return f"ln of the stationary weights at D = {self.intensity:g}, up to unknown prefactors: {shown}."
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -194,7 +198,7 @@ class Transitions:
         return tuple(reversed(route))
 
     def stationary_weights(self, intensity: float) -> StationaryWeights:
-        """Return the stationary weights at a noise intensity D (m² s⁻³), from their exponents alone.
+        """Return the exponents of the stationary weights at a noise intensity D (m² s⁻³).
 
         Raises
         ------
@@ -203,14 +207,10 @@ class Transitions:
         """
         if not (math.isfinite(intensity) and intensity > 0):
             raise StructureError(f"the noise intensity must be positive and finite, got {intensity!r}.")
-        if not self.known:
-            return StationaryWeights(self.names, intensity, self.weights, self.weights, self.weights)
-        low, high = self._differences
-        with np.errstate(invalid="ignore", over="ignore"):
-            value = self.weights[:, None] - self.weights[None]
-            value[np.isnan(value)] = 0.0  # of two that are not reached: either way the weight is 0
-            shares = [np.exp(-np.logaddexp.reduce(some / intensity, axis=1)) for some in (value, high, low)]
-        return StationaryWeights(self.names, intensity, *shares)
+        low, high = self.weight_bounds
+        with np.errstate(over="ignore"):
+            exponents, lower, upper = (0.0 - w / intensity for w in (self.weights, high, low))
+        return StationaryWeights(self.names, intensity, exponents, lower, upper)
 
     @property
     def verdict(self) -> str:
@@ -279,7 +279,3 @@ def _shown(value: float, lower: float, upper: float) -> str:
     if math.isinf(value):
         return "no exit" if math.isinf(lower) else "not found"
     return f"{value:.5g}" if upper - lower <= 1e-4 * abs(value) else f"{value:.4g} ({lower:.3g} to {upper:.3g})"
-
-
-def _share(value: float, low: float, high: float) -> str:
-    return f"{value:.3g}" if np.isclose(low, high, rtol=1e-3, atol=0) else f"{value:.3g} ({low:.2g} to {high:.2g})"

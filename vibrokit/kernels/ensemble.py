@@ -38,7 +38,8 @@ class Stop:
     region : array (2, 2)
         Bounds of x and of v; a trajectory outside has left the region.
     between : bool
-        Whether x may not leave its bounds between two tests either, which a cubic through both decides.
+        Whether the bounds hold between two tests too: after each fixed step, and for x within it, where a cubic
+        through both ends decides. Steppers without fixed steps have the cubic through both tests.
     every : int
         Intervals from section to section: labels and points are tested on the section only.
     area : array (2, 2), labels : int16 array (nx, nv)

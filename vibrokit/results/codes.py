@@ -250,6 +250,16 @@ class Code(StrEnum):
         "{state} is left after {ratio:.2g} relaxation times on average at D = {intensity:g}, below {least:g}: it "
         "is not metastable.", "Lower the noise intensity.",
     )  # fmt: skip
+    CORE_EXCEEDS_BASIN = (
+        "core-exceeds-basin", WARNING,
+        "Only {share:.0%} of the core that noise makes around {state} at D = {intensity:g} lies in its basin: it is no "
+        "state of its own there, and has no rates.", "Lower the noise intensity.",
+    )  # fmt: skip
+    TARGET_EXCEEDS_BASIN = (
+        "target-exceeds-basin", WARNING,
+        "Only {share:.0%} of the core that noise makes around {goal} at D = {intensity:g} lies in its basin: exits "
+        "from {state} do not count as having reached it.", "Lower the noise intensity.",
+    )  # fmt: skip
     TARGET_NOT_METASTABLE = (
         "target-not-metastable", WARNING,
         "Only {share:.0%} of the walkers started on {goal} are still there after five relaxation times at "

@@ -19,13 +19,18 @@ from vibrokit.results.result import Result
 if TYPE_CHECKING:
     from vibrokit.plots.exit_times import ExitTimeArtists, ExitTimes, SlopeArtists
 
+_DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
+
 
 class RatedResult(Result):
     """Exit rates at finite noise, and activation energies.
 
     `data` has, along ``source``: ``log_rate`` and ``log_rate_error`` over (``intensity_index``, ``exit_index``),
     ``rate_target`` over ``exit_index``, ``rate_intensity`` and ``rate_method`` over ``intensity_index``, and
-    ``rate_event``.
+    ``rate_event``. A method may add ``log_rate_lower`` and ``log_rate_upper``, with the dimensions of ``log_rate``.
+    Every analysis adds what decides which attractors are states of their own at that noise: ``relaxation_time`` (s)
+    over ``core_source``, and ``core_share`` over (``intensity_index``, ``core_source``, ``core_label``), the share of
+    the core of each attractor that lies in the basin of each; NaN where that is not known.
     """
 
     kind: ClassVar[str] = "rates"
@@ -72,6 +77,30 @@ class RatedResult(Result):
                 values[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
         coordinates = {"intensity": known, "source": names, "target": names}
         return xarray.DataArray(values, coordinates, ("intensity", "source", "target"), "log_rates")
+
+    @property
+    def log_rate_bounds(self) -> tuple[xarray.DataArray, xarray.DataArray]:
+        """Lower and upper bounds of `log_rates`; −∞ and ∞ where nothing is known.
+
+        They are the method's 95 % interval if it has one, otherwise two error estimates on each side.
+        """
+        known, size = self.intensities, len(self.names)
+        bounds = [np.full((len(known), size, size), end) for end in (-np.inf, np.inf)]
+        data = self.data.transpose("source", "intensity_index", "exit_index", ...)
+        values, errors = data["log_rate"].values, data["log_rate_error"].values
+        with np.errstate(invalid="ignore"):  # of a rate that was not seen
+            intervals = [values - _DEVIATIONS * errors, values + _DEVIATIONS * errors]
+        if "log_rate_lower" in data and "log_rate_upper" in data:
+            intervals = [data["log_rate_lower"].values, data["log_rate_upper"].values]
+        sources, targets, intensities = (data[name].values for name in ("source", "rate_target", "rate_intensity"))
+        for s, i, k in np.argwhere(~np.isnan(intervals[0]) & ~np.isnan(intervals[1])).tolist():
+            if targets[s, k] >= 0:
+                for ends, interval in zip(bounds, intervals, strict=True):
+                    ends[known.index(intensities[s, i]), sources[s], targets[s, k]] = interval[s, i, k]
+        dims = ("intensity", "source", "target")
+        coordinates = {"intensity": known, "source": list(self.names), "target": list(self.names)}
+        lower, upper = (xarray.DataArray(ends, coordinates, dims) for ends in bounds)
+        return lower.rename("lower"), upper.rename("upper")
 
     def arrhenius(self, source: int | str, target: int | str | None = None) -> ArrheniusFit:
         """Fit the Arrhenius law to the rates of one exit.

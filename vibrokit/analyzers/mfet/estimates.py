@@ -50,9 +50,9 @@ def rate_of(exits: Exits, count: int) -> RateEstimate:
 
     With no exit at all, the estimate is −∞ and the upper end a bound.
     """
-    tail = (1.0 - CONFIDENCE) / 2.0
     if count == 0:
-        return RateEstimate(-math.inf, math.inf, -math.inf, math.log(-math.log(2.0 * tail) / exits.at_risk))
+        return rate_unseen(0.0, exits.at_risk)
+    tail = (1.0 - CONFIDENCE) / 2.0
     value = math.log(count / len(exits) / mean_tests(exits))
     lower = stats.chi2.ppf(tail, 2 * count) / 2.0 / count
     upper = stats.chi2.ppf(1.0 - tail, 2 * count + 2) / 2.0 / count
@@ -64,6 +64,11 @@ def rate_around(log_value: float, relative_error: float, count: int) -> RateEsti
     factor = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1))
     spread = math.log1p(factor * relative_error)
     return RateEstimate(log_value, relative_error, log_value - spread, log_value + spread)
+
+
+def rate_unseen(log_total: float, count: int) -> RateEstimate:
+    """Return what is known of exits that none of a number of independent estimates of all exits has seen: a bound."""
+    return RateEstimate(-math.inf, math.inf, -math.inf, log_total + math.log(-math.log1p(-CONFIDENCE) / count))
 
 
 def exponential_p_value(exits: Exits, seed: int) -> float:

@@ -12,8 +12,16 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.checkpoint import Slot
 from vibrokit.analyzers.exits import LeaveBasin
+from vibrokit.analyzers.metastability import METASTABLE, targets_at
 from vibrokit.analyzers.mfet.direct import DirectRun, Escapes, Exits
-from vibrokit.analyzers.mfet.estimates import RateEstimate, exponential_p_value, mean_tests, rate_around, rate_of
+from vibrokit.analyzers.mfet.estimates import (
+    RateEstimate,
+    exponential_p_value,
+    mean_tests,
+    rate_around,
+    rate_of,
+    rate_unseen,
+)
 from vibrokit.analyzers.mfet.importance import Importance, from_distances
 from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
@@ -28,7 +36,6 @@ from vibrokit.results.finding import Finding
 # relaxations), times what its importance function and its density cost: they break even near Λ = 7.
 _DIRECT = math.exp(7.0)
 _SEEN = 30.0  # exits at that limit after which the choice is made
-_METASTABLE = 10.0  # relaxations in a mean exit time: with fewer the state is left before it has formed
 _IDLE = 5.0  # relaxations in which no walker has time to leave
 _STEP_SHARE = 4  # a part of the exits is simulated with half the steps
 _LEAST_CHECKED = 25
@@ -173,7 +180,7 @@ class Measurement:
 
     def _from_direct(self, run: DirectRun, coarser: DirectRun | None) -> AtIntensity:
         walk, exits = self.walk, run.exits()
-        targets = np.unique(exits.targets).tolist()
+        targets = {*np.unique(exits.targets).tolist(), *self._awaited}
         rates = {t: _in_seconds(rate_of(exits, int((exits.targets == t).sum())), walk) for t in targets}
         p_value = exponential_p_value(exits, walk.key(12))
         change, change_error = math.nan, math.nan
@@ -181,11 +188,11 @@ class Measurement:
             other = coarser.exits()
             change = math.log(mean_tests(exits) / mean_tests(other))
             change_error = math.hypot(len(exits) ** -0.5, len(other) ** -0.5)
-        findings = tuple(self._found(exits, p_value, change, change_error))
         return AtIntensity(
             walk.intensity, "direct", rates, exits, walk.interval, p_value, change, change_error,
             run.escapes(self.settings.escapes) if self.settings.escapes and run.left else None,
-            all(finding.code is not Code.NOT_METASTABLE for finding in findings), findings,
+            not len(exits) or mean_tests(exits) >= METASTABLE * walk.relaxation * walk.checks,
+            tuple(self._found(exits, p_value, change, change_error)),
         )  # fmt: skip
 
     def _found(self, exits: Exits, p_value: float, change: float, change_error: float) -> list[Finding]:
@@ -199,9 +206,6 @@ class Measurement:
             bound = math.exp(-_in_seconds(rate_of(seen, 0), walk).log_upper)
             found.append(Finding.of(Code.NO_EXIT_SEEN, source, intensity=intensity, time=bound))
             return found
-        mean = mean_tests(exits) / walk.checks / walk.relaxation
-        if mean < _METASTABLE:
-            found.append(Finding.of(Code.NOT_METASTABLE, source, intensity=intensity, ratio=mean, least=_METASTABLE))
         if p_value < _UNLIKELY:
             found.append(Finding.of(Code.NOT_EXPONENTIAL, source, intensity=intensity, p_value=p_value))
         if abs(change) > _SIGNIFICANT * change_error:
@@ -214,14 +218,21 @@ class Measurement:
                 found.append(Finding.of(Code.TARGET_NOT_METASTABLE, source, target, intensity=intensity, share=share))
         return found
 
+    @property
+    def _awaited(self) -> tuple[int, ...]:
+        """Labels of the targets for which something is said even if no exit leads there: a bound."""
+        if self.problem.exit.by_position:
+            return ()
+        return tuple(target.label for target in targets_at(self.problem, self.walk.intensity))
+
     def _kept(self, target: int) -> float:
         """Share of walkers that stay at a target for a few relaxations of it."""
         structure = self.problem.structure
-        other = dataclasses.replace(self.problem, attractor=structure.attractors[target])
+        other = dataclasses.replace(self.problem, attractor=structure.attractors[target], exit=LeaveBasin())
         walk = dataclasses.replace(self.walk, problem=other)
-        left = walk.around(LeaveBasin().targets(structure, target))
+        left = walk.arrival
         begun = walk.from_orbit(other.attractor, 200, 13)
-        ended = walk.advance(begun, math.ceil(_METASTABLE / 2 * walk.relaxation), left)
+        ended = walk.advance(begun, math.ceil(METASTABLE / 2 * walk.relaxation), left)
         return float((ended.status == COMPLETED).mean())
 
     def _from_splitting(self, run: SplittingRun) -> AtIntensity:
@@ -233,6 +244,9 @@ class Measurement:
                 both = math.hypot(estimates.error, spread / share)
                 whole = rate_around(estimates.log_mean + math.log(share), both, count)
                 rates[target] = _in_seconds(whole, walk, tests=walk.checks)
+        for target in self._awaited if rates else ():
+            unseen = rate_unseen(estimates.log_mean, count)
+            rates.setdefault(target, _in_seconds(unseen, walk, tests=walk.checks))
         findings = list[Finding]()
         source, wanted, error = self.problem.source, self.settings.target_error, estimates.error
         if not rates:

@@ -10,23 +10,27 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.neighbourhoods import CORE_SIZE, metrics_of, nearest, relaxation_of
+from vibrokit.analyzers.metastability import targets_at
+from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import UNBOUNDED, Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.kernels.streams import streams_of
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.symbolic.flow_kind import Flow
 
-_LEAST = 1 / 60  # semi-axes of the core of motion that never repeats, in widths of the region
 _FORGETS = 5.0  # relaxations after which the start on the orbit is forgotten to e⁻⁵ of the deviations
 _ATTEMPTS = 20  # to get so far without leaving: 0.95 of the walks succeed if the mean exit time is one relaxation
 # Looks at an excursion in a relaxation, in units of the depth. On a double well of damping 0.2 and ΔU/D = 25, ln of the
 # estimates of replicas spreads by 1.8 with 0.5, 1.0 with 1, 0.8 with 2 and 0.8 with 4; each takes half as long again.
 _LOOKS = 2.0
+# √(D h) that a Brownian motion seen at steps of h has passed a bound by on average, −ζ(½)/√(2π) (Broadie, Glasserman &
+# Kou, Math. Finance 7, 325, 1997).
+_LATE = 0.5826
 _POWERS = tuple(2**n for n in range(9))
 _SHORTEST = 0.05  # section intervals of a relaxation that is followed
 _MOST_STEPS = 2e8  # of all walks between two reports: a second or two
@@ -78,8 +82,8 @@ class Walk:
 
     @cached_property
     def scene(self) -> Oscillator:
-        """The oscillator with this intensity."""
-        osc = self.problem.osc
+        """The oscillator with this intensity; where position decides, without what is felt only after the exit."""
+        osc = self.problem.scene
         assert osc.noise is not None  # every analyzer checks that
         return dataclasses.replace(osc, noise=dataclasses.replace(osc.noise, intensity=self.intensity))
 
@@ -103,15 +107,37 @@ class Walk:
         """The test for the exit."""
         exit_ = self.problem.exit
         if exit_.by_position:
-            return dataclasses.replace(self.problem.stop, between=True, every=self.checks)
+            bounds = self.problem.stop.region + self._seen_late
+            return dataclasses.replace(self.problem.stop, region=bounds, between=True, every=self.checks)
         if exit_.at_boundary:
             return dataclasses.replace(self.problem.stop, region=UNBOUNDED)
         return self.arrival
 
+    @property
+    def _seen_late(self) -> Array:
+        """How much nearer the bounds of x and v have to be for what fixed steps do not see, shape (2, 2).
+
+        Where white noise drives v, it is a Brownian motion, which may pass a bound within a step and return: the exit
+        is that of a bound 0.5826 √(D h) farther away, to the order of h. The displacement has no such error.
+        """
+        scene, bounds = self.scene, self.problem.stop.region
+        shift, faces = np.zeros((2, 2)), np.flatnonzero(np.isfinite(bounds[1]))
+        if not len(faces):
+            return shift
+        states = np.repeat(self.problem.attractor.points[:1], len(faces), axis=0)
+        states[:, 1] = bounds[1, faces]
+        kick, field = np.zeros_like(states), VectorField(scene)
+        still = field.hamiltonian_rate(states, kick)[:, 1]
+        kick[:, 1] = 1.0
+        strength = self.intensity * np.maximum(field.hamiltonian_rate(states, kick)[:, 1] - still, 0.0)
+        step = self.interval / max(1, self.stepper.steps_in(scene, self.interval))
+        shift[1, faces] = _LATE * np.sqrt(strength * step) * np.where(faces == 0, 1.0, -1.0)
+        return shift
+
     @cached_property
     def arrival(self) -> Stop:
         """The test for being in the core of an attractor that may be reached, on the section."""
-        return self.around(self.problem.targets)
+        return self.around(targets_at(self.problem, self.intensity))
 
     @cached_property
     def own(self) -> Stop:
@@ -253,14 +279,12 @@ class Walk:
 
     def around(self, attractors: Sequence[Attractor]) -> Stop:
         """Return the test for being in the core of one of some attractors, on the section."""
-        region = self.problem.structure.basins.region
-        widths = _LEAST * np.array([np.ptp(region.x), np.ptp(region.v)])
         points, metrics = [np.empty((0, 2))], [np.empty((0, 2, 2))]
         labels = [np.empty(0, dtype=np.int64)]
+        region = self.problem.structure.basins.region
         for attractor in attractors:
-            covariances = CORE_SIZE**2 * self.intensity * self.covariances[attractor.label]
-            least = np.tile(1e-9 * widths if attractor.is_fixed else widths, (len(covariances), 1))
-            points.append(attractor.points[:, :2])
-            metrics.append(metrics_of(attractor, covariances, least))
-            labels.append(np.full(len(covariances), attractor.label, dtype=np.int64))
+            centres, roots = core_of(attractor, self.covariances[attractor.label], self.intensity, region)
+            points.append(centres)
+            metrics.append(roots)
+            labels.append(np.full(len(centres), attractor.label, dtype=np.int64))
         return Stop(points=np.concatenate(points), point_labels=np.concatenate(labels), metrics=np.concatenate(metrics))

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.metastability import targets_at
 from vibrokit.analyzers.neighbourhoods import CORE_SIZE, covariances_of, metrics_of, nearest, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
@@ -66,9 +67,10 @@ class Cores:
         if self.problem.exit.by_position:
             return CoreSets(own, {}, entry)
         others = self.problem.targets
+        settled = targets_at(self.problem, intensity) or others  # exploration may take more noise than is asked for
         if self.problem.exit.at_boundary:
             return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
-        return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in others}, entry)
+        return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in settled}, entry)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""

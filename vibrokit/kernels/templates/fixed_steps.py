@@ -21,7 +21,7 @@ from numba import njit
 from vibrokit.kernels.links import prepare, step_lanes, tabulate
 from vibrokit.kernels.options import CONTRACTED
 from vibrokit.kernels.pointers import offset_by, pointer_to
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, left_in_step, stop_status
 from vibrokit.kernels.templates.drawing import draw_lanes
 
 # --- scene above, stepper below ---
@@ -42,7 +42,8 @@ def memory_of(states, parameters, settings, streams):
     tabulated = np.zeros(max(intervals * int(settings[0]) * nodes, 1))
     stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
     holder, done = np.full(lanes, -1), np.zeros(lanes, dtype=np.int64)
-    return z, before, work, tabulated, stream, drawn, holder, done, np.array([0, 0, -1, 0])
+    outside = np.zeros(lanes, dtype=np.bool_)
+    return z, before, work, tabulated, stream, drawn, holder, done, outside, np.array([0, 0, -1, 0])
 
 
 @njit(**CONTRACTED)
@@ -79,6 +80,7 @@ def advance(
     drawn,
     holder,  # (lanes,): the trajectory in each lane, −1 for none
     done,  # (lanes,): intervals that it has passed
+    outside,  # (lanes,): whether it has been outside in the interval under way
     place,
     most,  # steps before it returns
 ):
@@ -87,6 +89,7 @@ def advance(
     # Intervals after which the forcing repeats; 0 if it never does.
     cycle = int(settings[1]) if forced else 1
     h = interval / steps
+    begun = np.zeros((2, lanes))
     block, room, table, normals = pointer_to(z), pointer_to(work), pointer_to(tabulated), pointer_to(drawn)
     theta = offset_by(pointer_to(parameters), int(parameters[0]))
     waiting, active, elapsed, step, used = place[0], place[1], place[2], place[3], 0
@@ -128,22 +131,29 @@ def advance(
         if step == 0:
             if cycle == 0:
                 tabulate(start_time + elapsed * interval, h, steps, theta, table)
-            for e in range(equations):
-                for lane in range(lanes):
+            for lane in range(lanes):
+                outside[lane] = False
+                for e in range(equations):
                     before[e, lane] = z[e, lane]
         forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
         end = min(step + MOST_STEPS, steps)
         used += end - step
-        if noisy:
-            for now in range(step, end):
+        at_once = 1 if noisy or between else end - step
+        for now in range(step, end, at_once):
+            if noisy:
                 draw_lanes(stream, drawn, lanes)
                 if given.shape[0] > 0:
                     drawn[0] = given[done[0] * steps + now, 0]
                     drawn[lanes] = given[done[0] * steps + now, 1]
-                step_lanes(block, forces, normals, theta, room, h, 1)
-                forces = offset_by(forces, nodes)
-        else:
-            step_lanes(block, forces, normals, theta, room, h, end - step)
+            if between:
+                for lane in range(lanes):
+                    begun[0, lane], begun[1, lane] = z[0, lane], z[1, lane]
+            step_lanes(block, forces, normals, theta, room, h, at_once)
+            if between:
+                for lane in range(lanes):
+                    x, v = z[0, lane], z[1, lane]
+                    outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, region)
+            forces = offset_by(forces, nodes)
         step = end if end < steps else 0
         if step > 0:
             continue
@@ -169,10 +179,8 @@ def advance(
                 status, label = stop_status(
                     z[0, lane], z[1, lane], at_section, region, area, labels, home, points, point_labels, metrics
                 )
-                if between and status == COMPLETED:
-                    ends = before[0, lane], before[1, lane], z[0, lane], z[1, lane]
-                    if turned_outside(ends[0], ends[1], ends[2], ends[3], interval, region):
-                        status = LEFT_REGION
+                if status == COMPLETED and outside[lane]:
+                    status = LEFT_REGION
                 if status == COMPLETED and done[lane] < budget[index]:
                     continue
             for e in range(equations):
