@@ -104,15 +104,14 @@ def _poles(divisor: sympy.Expr) -> Iterator[Border]:
     elif not isinstance(divisor, sympy.exp | sympy.cosh):
         numerator = sympy.fraction(sympy.together(divisor))[0] if divisor.is_Add else divisor
         try:
-            factors = [factor for factor, _ in sympy.factor_list(numerator)[1]]
+            factors = sympy.factor_list(numerator)[1]
         except sympy.PolynomialError:
-            factors = [numerator]
-        for factor in factors:
-            yield from (
-                [Border(factor, pole=True)]
-                if factor in (divisor, numerator, -divisor) or factor.is_Add
-                else (_poles(factor))
-            )
+            factors = [(numerator, 1)]
+        if len(factors) == 1 and factors[0][1] == 1:  # as it was written
+            yield Border(divisor, pole=True)
+        else:
+            for factor, _ in factors:
+                yield from _poles(factor)
 
 
 def _without_removable(
