@@ -106,7 +106,7 @@ def test_lines_cross_where_they_must_and_gaps_are_no_crossings():
         ({"search": [0.3]}, ParameterError, "0.3 is none of them"),
         ({"analyzer": vk.ActionPlot()}, StructureError, "must be a LeastAction"),
         ({"osc": 3}, SceneError, "must be an Oscillator"),
-        ({"osc": WELLS.replace(noise=None)}, StructureError, "no noise"),
+        ({"osc": WELLS.replace(noise=None)}, SceneError, "no noise"),
     ],
 )
 def test_what_is_refused(changed, kind, text):

@@ -82,6 +82,8 @@ def energy_continuation(
     ------
     ParameterError
         An unknown or ambiguous parameter, one that shapes the equations, or values that are not numbers.
+    SceneError
+        The scene has no noise.
     StructureError
         The analyzer is no `LeastAction`, or no exit path was found at any searched value.
 
