@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,11 @@ from scipy.optimize import brentq, minimize_scalar
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.borders import length_between_borders
+from vibrokit.structure.harmonic_balance import Balance, balances_of
+from vibrokit.structure.roots import bracketed_roots
 
 _RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
-_AMPLITUDES, _PHASES = 400, 128  # of the trial motions of harmonic balance
-_LEAST_SWING, _MOST_SWING = 1e-3, 1e3  # of the deflection: range of amplitudes, where the damping does not bound it
+_PHASES = 128  # of the trial motions
 _SAMPLES, _LEAST_SAMPLES = 64, 512  # of a force in 2π/ω_n, and in all; its maximum is refined from the largest
 _LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its period is longer
 _LEAST_GAIN = 1e-9  # of the power exchanged in a turn: less of it, gained or lost, is rounding
@@ -40,19 +42,19 @@ def length_of(osc: Oscillator) -> float:
     have poles or other borders, no motion about x = 0 is larger than the distance to the nearest, which takes the place
     of amplitudes. A linear spring has no length scale; the length is 1 then.
     """
-    field, push, swing = VectorField(osc), 0.0, 0.0
+    field, push = VectorField(osc), 0.0
     for index, part in enumerate(osc.excitations):
         resonant = len(osc.barriers) < 2 and part.period is not None
         largest = _largest_force(field, index, part.period, 2 * math.pi / osc.natural_frequency)
         push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
-        swing += largest / osc.natural_frequency**2 if part.period is None else _swing(osc, field, largest, part.period)
     stops = (2 * abs(barrier.position) for barrier in osc.barriers)
     if osc.model.domain:
         return max([push, length_between_borders(osc), *stops]) or 1.0
-    length = max([push, swing, _self_sustained(osc, field), *stops])
+    length = max([push, _self_sustained(osc, field), *stops])
     if not length or _pushes_away(osc, field):
         length = max(length, _bending(osc, field))
-    return length or 1.0
+    length = length or 1.0
+    return max(length, _swing(balances_of(osc, length)))
 
 
 def turns_of(osc: Oscillator) -> float:
@@ -85,25 +87,12 @@ def size_of(osc: Oscillator) -> float:
     return length_of(osc) * math.hypot(1.0, osc.natural_frequency)
 
 
-def _swing(osc: Oscillator, field: VectorField, force: float, period: float) -> float:
-    """Largest amplitude A at which a force at most as large keeps up x = A cos(2πt/T), by harmonic balance; else 0.
-
-    A bistable resonance has several amplitudes; the largest one is limited by the damping (A. H. Nayfeh and D. T. Mook,
-    "Nonlinear Oscillations", 1979, section 4.1).
-    """
-    frequency, natural = 2 * math.pi / period, osc.natural_frequency
-    deflection, damping = force / natural**2, 2 * osc.damping_ratio * natural * frequency
-    most = min(_MOST_SWING * deflection, force / damping if damping else math.inf)
-    if not most > 0:
-        return 0.0
-    phases = 2 * math.pi / _PHASES * np.arange(_PHASES)
-    amplitudes = np.geomspace(min(most, deflection) * _LEAST_SWING, most, _AMPLITUDES)[:, None]
-    motion = np.stack([amplitudes * np.cos(phases), -amplitudes * frequency * np.sin(phases)], axis=-1)
-    steady = sum(field.excitation(index, 0.0) for index in range(len(osc.excitations)))
-    rates = field.rate(states_at(osc, motion.reshape(-1, 2)))[:, 1].reshape(motion.shape[:2]) - steady
-    missing = 2 * np.mean((amplitudes * frequency**2 * np.cos(phases) + rates) * np.exp(-1j * phases), axis=1)
-    balanced = amplitudes[np.abs(missing) <= force, 0]
-    return float(balanced.max()) if balanced.size else 0.0
+def _swing(balances: Iterable[Balance]) -> float:
+    """Largest distance from x = 0 of motions that tones keep up, those of all tones together."""
+    widest = dict[float, float]()
+    for one in balances:
+        widest[one.frequency] = max(widest.get(one.frequency, 0.0), one.amplitude)
+    return sum(widest.values()) + max((abs(one.centre) for one in balances), default=0.0)
 
 
 def _self_sustained(osc: Oscillator, field: VectorField) -> float:
@@ -121,19 +110,13 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
         with np.errstate(all="ignore"):  # a force may be singular
             powers = field.rate(states_at(osc, motion))[:, 1] * motion[:, 1]
         gained, exchanged = float(powers.mean()), float(np.abs(powers).mean())
-        return gained if abs(gained) > _LEAST_GAIN * exchanged else 0.0
+        return 0.0 if abs(gained) <= _LEAST_GAIN * exchanged else gained / exchanged
 
-    places = np.linspace(-_DECADES, _DECADES, 8 * _DECADES + 1) * math.log(10)
-    found, last, before = list[float](), math.nan, 0.0
-    for place in places:
-        here = gain(place)
-        if not math.isfinite(here) or len(found) == _MOST_CYCLES:
-            break
-        if here * before < 0:
-            found.append(math.exp(brentq(gain, last, place)))
-        if here:
-            last, before = place, here
-    return float(f"{max(found, default=0.0):.9g}")
+    places = np.linspace(-_DECADES, _DECADES, 16 * _DECADES + 1) * math.log(10)
+    gains = np.array([gain(place) for place in places])
+    known = (gains != 0) & np.isfinite(gains).cumprod().astype(bool)
+    found = bracketed_roots(gain, places[known], gains[known])[:_MOST_CYCLES]
+    return float(f"{math.exp(max(found, default=-math.inf)):.9g}")
 
 
 def _pushes_away(osc: Oscillator, field: VectorField) -> bool:

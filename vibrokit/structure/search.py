@@ -25,6 +25,7 @@ from vibrokit.structure.attractors.describe import describe_orbit, describe_wand
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.wells import wells
+from vibrokit.structure.known_motions import known_motions
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -89,6 +90,9 @@ class Search:
                 self.at_rest = tuple(equilibria(self.osc, *self.region.x))
                 for rest in self.at_rest:
                     self._add_orbit(rest.point, 1)
+            else:
+                for start in known_motions(self.osc):
+                    self._add_orbit(start, 1)
             for periods in _rounds(wait):
                 states = self.unsettled = self._add_orbits(self._after(states, periods), LONGEST_PERIOD)
                 report(self.starts - len(states))
