@@ -85,16 +85,30 @@ def bifurcations_between(family: Family, before: Stage, after: Stage) -> list[Lo
     barriers = family.at(before.member.value).barriers
     for stop, (left, right) in enumerate(zip(before.depths, after.depths, strict=True)):
         counts = sorted((int(np.sum(left > 0)), int(np.sum(right > 0))))
-        side = barriers[stop].side
-        found += [interval.located(GRAZING, _depth(stop, turn), side) for turn in range(*counts)]
+        found += [_grazing_between(interval, stop, turn, barriers[stop].side) for turn in range(*counts)]
     return [bifurcation for bifurcation in found if bifurcation is not None]
+
+
+def _grazing_between(interval: _Interval, stop: int, turn: int, side: str) -> Located | None:
+    """Locate where a turn of a motion touches a stop between two members; None if it is no grazing."""
+    family, depth = interval.family, _depth(interval.family, stop, turn)
+    if turn:
+        return interval.located(GRAZING, depth, side)
+    short = _short_of_touch(family, stop)
+    found = dataclasses.replace(interval, family=short).located(GRAZING, depth, side)
+    if found is None or not found.bracketed or short is family:
+        return found
+    clear = min(interval.before, interval.after, key=lambda each: float(each.depths[stop].max()))
+    towards = clear if clear is interval.before else dataclasses.replace(clear, tangent=-clear.tangent)
+    return _passed(short, towards, depth, side) or found
 
 
 def grazing_ahead(family: Family, here: Stage) -> list[Located]:
     """Locate grazing just beyond the last stage that a family could be followed to.
 
     Beyond grazing with a stiff stop an orbit may no longer exist, or turn back too soon to be followed; short of it,
-    the family is smooth. The depth is therefore extrapolated to 0, from members ever closer to it.
+    the family is smooth. An orbit that does not touch the stop is followed through it; of one that touches it at other
+    turns, the depth is extrapolated to 0, from members ever closer to it.
     """
     found = []
     if not here.stable:
@@ -102,8 +116,39 @@ def grazing_ahead(family: Family, here: Stage) -> list[Located]:
     for stop, barrier in enumerate(family.at(here.member.value).barriers):
         turn = int(np.sum(here.depths[stop] > 0))
         if turn < len(here.depths[stop]) and here.depths[stop][turn] > -_NEXT_TO * family.sizes[0]:
-            found.append(_extrapolated(family, here, _depth(stop, turn), barrier.side))
+            short = family if turn else _short_of_touch(family, stop)
+            locate = _extrapolated if short is family else _passed
+            found.append(locate(short, here, _depth(family, stop, turn), barrier.side))
     return [grazing for grazing in found if grazing is not None]
+
+
+def _short_of_touch(family: Family, stop: int) -> Family:
+    """Return the family with a stop out of its way: the same one short of the first touch, and smooth beyond it.
+
+    A family that follows a parameter of the stop itself is returned as it is.
+    """
+    barrier = family.osc.barriers[stop]
+    if family.path.startswith(f"barriers.{stop}."):
+        return family
+    away = barrier.position + barrier.sign * float(family.sizes[0])
+    return dataclasses.replace(family, osc=family.osc.replace({f"barriers.{stop}.position": away}))
+
+
+def _passed(family: Family, here: Stage, depth: Callable[[Family, Member], float], side: str) -> Located | None:
+    """Locate the root of a depth between a stage and a member of a smooth family just ahead; None if it is not there.
+
+    The distance to that member is doubled until the depth is positive.
+    """
+    distance = _SHARP
+    try:
+        while distance <= _JUST_AHEAD:
+            ahead = family.corrected(here.member.place + distance * here.tangent, here.slope, here.tangent)
+            if depth(family, ahead) > 0:
+                return _Interval(family, here, stage(family, ahead, here.tangent)).located(GRAZING, depth, side)
+            distance *= 2
+    except VibrokitError:
+        pass  # no such member exists
+    return None
 
 
 def _extrapolated(
@@ -156,9 +201,11 @@ def _test(name: str) -> Callable[[Family, Member], float]:
     return lambda family, member: _tests(family, member, _rates(family, member))[name]
 
 
-def _depth(stop: int, turn: int) -> Callable[[Family, Member], float]:
+def _depth(owner: Family, stop: int, turn: int) -> Callable[[Family, Member], float]:
+    """Return the depth of a member at one of its turns in a stop where that is in the scenes of the owner."""
+
     def depth(family: Family, member: Member) -> float:
-        depths = turning_depths(family, member, family.at(member.value).barriers[stop])
+        depths = turning_depths(family, member, owner.at(member.value).barriers[stop])
         return float(depths[turn]) if turn < len(depths) else -float(family.sizes[0])
 
     return depth
