@@ -107,6 +107,11 @@ class Attractor:
         return np.stack([self.orbit.min(axis=0), self.orbit.max(axis=0)], axis=1)
 
     @property
+    def growth(self) -> float:
+        """Rate (s⁻¹) at which the fastest deviation grows: the largest Lyapunov exponent; negative if all decay."""
+        return float(np.max(self.exponents.real))
+
+    @property
     def repeats(self) -> bool:
         """Whether it is an orbit or an equilibrium: points, multipliers and residual are those of one."""
         return self.kind in ("periodic", "equilibrium", "limit cycle")
@@ -125,6 +130,7 @@ class Attractor:
         return (
             self.kind,
             f"period {self.period}" if self.repeats else "never repeats",
+            *([] if self.repeats else [f"Lyapunov exponent {self.growth:.3g} ± {self.exponent_error:.1g} s⁻¹"]),
             f"{self.impacts:.4g} stop hits",
             f"basin fraction {self.basin_fraction:.4f} ± {self.basin_fraction_error:.1g}",
         )

@@ -75,7 +75,8 @@ class Code(StrEnum):
         "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
     )  # fmt: skip
     STARTS_UNSETTLED = (
-        "starts-unsettled", WARNING, "At least {count:start} did not settle on an equilibrium or a limit cycle.",
+        "starts-unsettled", WARNING,
+        "{count} of {starts} starts did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,
     )  # fmt: skip
     SURVIVAL = (
@@ -149,7 +150,9 @@ class Code(StrEnum):
         "Set edge_budget, an argument of find_structure, to more, or search on a smaller region.",
     )  # fmt: skip
     LARGE_RESIDUAL = (
-        "large-residual", WARNING, "The largest residual of an unstable orbit is {residual:.1e}, above {accepted:g}.",
+        "large-residual", WARNING,
+        "The largest residual of an unstable orbit, less what its multipliers enlarge it by, is {residual:.1e}, above "
+        "{accepted:g}.",
         _FINER_STEPPER,
     )  # fmt: skip
     SADDLES_OUTSIDE = (

@@ -46,6 +46,9 @@ class Saddle:
         How far the first point moves when the integration is tightened; NaN for a chaotic set.
     embedded : bool
         Whether it is one of the orbits inside a chaotic set, which is a saddle of its own.
+    orbit : array (samples, 2)
+        (x, v) along the whole orbit at equal time steps, its start repeated at the end; one point of an equilibrium,
+        none of a chaotic set.
     """
 
     kind: str
@@ -59,11 +62,21 @@ class Saddle:
     residual: float
     error: float
     embedded: bool = False
+    orbit: NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def on_boundary(self) -> bool:
         """Whether its branches lead to different attractors."""
         return len(set(self.leads_to)) > 1
+
+    @property
+    def displacement(self) -> float:
+        """About how far its points lie from the exact orbit, in units of the scene's motions; NaN for a chaotic set.
+
+        Motion beside an orbit grows from node to node, and the residual with it.
+        """
+        growth = float(np.abs(self.multipliers).max(initial=1.0))
+        return float(self.residual / growth ** (1.0 / max(1, len(self.nodes))))
 
     @property
     def at_equal_times(self) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from vibrokit.results.fields import PLANE, STATE, Flag, Length, Number, Series, 
 from vibrokit.results.labels import label_of
 from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record
+from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.results.summary import Summary
 from vibrokit.results.survival import Survival
@@ -34,6 +35,7 @@ _SADDLES = Table(
         "duration": Number("time after which the motion repeats; NaN for a chaotic set", "s"),
         "points": ATTRACTOR_FIELDS["points"],
         "nodes": Vectors(Length("node", "nodes along the orbit"), STATE),
+        "orbit": ATTRACTOR_FIELDS["orbit"],
         **{name: ATTRACTOR_FIELDS[name] for name in ("multipliers", "exponents")},
         "leads_to": Series(
             Length("side", "sides"), "label of the attractor that each unstable branch reaches; negative as in basin",
@@ -91,6 +93,11 @@ class Structure(Record):
     budget: int
     stepper: str
     shift: float = 0.0
+
+    @property
+    def region(self) -> Region:
+        """The region of (x, v) that the basins cover."""
+        return self.basins.region
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.attractors.names import labelled
+from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import followed_parameter, ordered_values
@@ -243,11 +243,13 @@ class _Run:
         places = {value: index for index, value in enumerate(self.tracing.values)}
         for at in self.found:
             index = places.get(at.value)
-            attractors = [] if index is None else self.tracing.found[index]
+            pairs = [] if index is None else list(zip(self.tracing.found[index], numbered[index], strict=True))
+            pairs.sort(key=lambda pair: order_of(pair[0]))  # as find_structure does, for the same names
+            named = labelled([attractor for attractor, _ in pairs], has_stops=bool(self.osc.barriers))
             yield SteadyStates(
                 at.value,
-                labelled([thinned(attractor) for attractor in attractors], has_stops=bool(self.osc.barriers)),
-                () if index is None else tuple(numbered[index]),
+                tuple(thinned(attractor) for attractor in named),
+                tuple(branch for _, branch in pairs),
                 (*at.findings, *self.cell_findings.get(at.value, ())),
             )
 

@@ -25,7 +25,7 @@ from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.attractors.names import labelled
+from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN
@@ -126,7 +126,7 @@ class Finder:
         kept, self.shift = (
             (self.search.attractors, 0.0) if self.region else without_copies(self.osc, self.search.attractors)
         )
-        found = sorted(kept, key=lambda a: (not a.repeats, a.impacts, a.period, tuple(a.points[0])))
+        found = sorted(kept, key=order_of)
         self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
 
     @cached_property

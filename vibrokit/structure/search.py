@@ -178,18 +178,18 @@ class Search:
 
     def _add_cycles(self, states: Array) -> None:
         """Add the limit cycles that states lie on."""
-        unsettled = 0
+        failures = 0
         for state in states:
-            known = [a.orbit for a in self.attractors if a.kind == "limit cycle"]
-            if any(_is_on(orbit, state) for orbit in known):
-                continue
-            unsettled += not self._add_cycle(state, known)
-            if unsettled == _FAILURES:
-                break
+            if failures < _FAILURES and not self._on_cycle(state):
+                failures += not self._add_cycle(state)
+        unsettled = sum(not self._on_cycle(state) for state in states)
         if unsettled:
-            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
+            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled, starts=self.starts))
 
-    def _add_cycle(self, state: Array, known: Sequence[Array]) -> bool:
+    def _on_cycle(self, state: Array) -> bool:
+        return any(_is_on(known.orbit, state) for known in self.attractors if known.kind == "limit cycle")
+
+    def _add_cycle(self, state: Array) -> bool:
         """Add the limit cycle that a state lies on, if it is new; return whether there is a stable one."""
         try:
             longest = _LONGEST_CYCLE * self.osc.section_interval
@@ -198,7 +198,7 @@ class Search:
             return False
         if np.sort(np.abs(cycle.multipliers))[-2:][0] >= 1:
             return False
-        if not any(_is_on(orbit, cycle.point) for orbit in known):
+        if not self._on_cycle(cycle.point):
             self.attractors.append(describe_orbit(self.osc, cycle, self.orbit_stepper))
         return True
 

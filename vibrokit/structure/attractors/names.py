@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +18,17 @@ _PLACES: Mapping[int, tuple[str, ...]] = {2: ("left", "right"), 3: ("left", "mid
 
 
 def labelled(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[Attractor, ...]:
-    """Return attractors with their places as labels, and with names."""
+    """Return attractors with their places as labels, and with names, which depend on their order."""
     names = names_of(attractors, has_stops=has_stops)
     return tuple(
         dataclasses.replace(attractor, label=label, name=name)
         for label, (attractor, name) in enumerate(zip(attractors, names, strict=True))
     )
+
+
+def order_of(attractor: Attractor) -> tuple[Any, ...]:
+    """Return what attractors are sorted by before they are named: those clear of the stops first."""
+    return not attractor.repeats, attractor.impacts, attractor.period, tuple(attractor.points[0])
 
 
 def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, ...]:

@@ -101,7 +101,7 @@ class SaddleSearch:
         orbits = [saddle for saddle in self._found if saddle.kind != "chaotic"]
         found = [Finding.of(Code.SADDLES, count=sum(not saddle.embedded for saddle in orbits)), *self._findings]
         found += [_on_boundary(Code.BOUNDARY_LOST, pair) for pair in self._lost]
-        largest = max([saddle.residual for saddle in orbits], default=0.0)
+        largest = max([saddle.displacement for saddle in orbits], default=0.0)
         if largest > _RESIDUAL:
             found.append(Finding.of(Code.LARGE_RESIDUAL, residual=largest, accepted=_RESIDUAL))
         return tuple(found)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError, StructureError
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
@@ -26,6 +27,7 @@ _ON_A_BRANCH = 16
 _ROUND = 32  # directions from a repeller
 _TIGHTENED = 2  # times, for the error
 _FINER = 4
+_SAMPLES = 1024  # along one section interval
 
 Array = NDArray[np.float64]
 
@@ -43,7 +45,8 @@ def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper
     if len(orbit.nodes) > 1:
         pieces = _FINER * len(orbit.nodes) // period
         orbit = refine_orbit(osc, states_along(osc, orbit.nodes, period, stepper, pieces), period, stepper)
-    if orbit.residual > _RESIDUAL:
+    growth = float(np.abs(orbit.multipliers).max()) ** (1.0 / len(orbit.nodes))  # of a residual, from node to node
+    if orbit.residual > _RESIDUAL * max(1.0, growth):
         finer = refine_orbit(osc, orbit.nodes, period, stepper.refined().refined())
         orbit = min(orbit, finer, key=lambda found: found.residual)
     return least_period(osc, orbit, stepper)
@@ -75,7 +78,21 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         leads_to=leads_to,
         residual=orbit.residual,
         error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
+        orbit=_along(osc, orbit, stepper),
     )
+
+
+def _along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
+    """(x, v) along an orbit at equal times, its start repeated at the end; each piece starts at a node."""
+    if orbit.kind == "equilibrium":
+        return orbit.nodes[:, :2]
+    pieces = -(-_SAMPLES * max(1, round(orbit.duration / osc.section_interval)) // len(orbit.nodes))
+    span = orbit.duration / len(orbit.nodes)
+    each = [
+        record(osc, Flow.STATE, stepper, node, at * span, span / pieces, pieces)[:pieces]
+        for at, node in enumerate(orbit.nodes)
+    ]
+    return np.concatenate([*each, orbit.nodes[:1]])[:, :2]
 
 
 def _kind_of(multipliers: NDArray[np.complex128]) -> str:
