@@ -24,6 +24,7 @@ from vibrokit.results.fields import (
     Whole,
     Word,
 )
+from vibrokit.results.summary import counted
 from vibrokit.results.survival import Survival
 from vibrokit.results.table import Table
 
@@ -72,6 +73,9 @@ class Attractor:
         Change of the first point when the integration is tightened; NaN for motion that never repeats.
     survival : tuple of Survival
         For motion that never repeats: the evidence that it lasts, at two accuracies of integration.
+    turns : int
+        Where the force of the spring repeats along x: by how many of its periods x advances in one orbit; 0 for motion
+        that comes back.
     name : str
         Short name from what it does, such as ``"clear"`` or ``"hammering"``; distinct among the attractors of a
         structure.
@@ -95,6 +99,7 @@ class Attractor:
     error: float
     survival: tuple[Survival, ...] = ()
     name: str = ""
+    turns: int = 0
 
     @property
     def impacts(self) -> float:
@@ -131,6 +136,7 @@ class Attractor:
             self.kind,
             f"period {self.period}" if self.repeats else "never repeats",
             *([] if self.repeats else [f"Lyapunov exponent {self.growth:.3g} ± {self.exponent_error:.1g} s⁻¹"]),
+            *([counted(self.turns, "turn")] if self.turns else []),
             f"{self.impacts:.4g} stop hits",
             f"basin fraction {self.basin_fraction:.4f} ± {self.basin_fraction_error:.1g}",
         )
@@ -157,6 +163,7 @@ ATTRACTOR_FIELDS: Mapping[str, Field] = {
     "peak_force": BySide("largest push of each stop", "m s-2"),
     "basin_fraction": Number("share of the region's cells that lead to the attractor", "1", 0.0, 1.0),
     "basin_fraction_error": Number("standard error of the share", "1", 0.0, 1.0),
+    "turns": Whole("periods of the spring's force by which x advances in one orbit", low=-(10**9)),
     "residual": Number("distance between the first point and its image after one orbit", "1"),
     "error": Number("change of the first point when the integration is tightened"),
 }

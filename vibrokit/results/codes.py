@@ -63,9 +63,15 @@ class Code(StrEnum):
     )  # fmt: skip
     SHIFTED_COPIES = (
         "shifted-copies", INFO,
-        "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, the "
-        "one nearest to x = 0 is kept; motion that ends at a copy of it has left the region.",
-        "Give a region to keep all of them.",
+        "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, those "
+        "in the region are kept; motion that ends at a copy elsewhere has left the region.",
+        "Give a wider region to keep more of them.",
+    )  # fmt: skip
+    ON_CIRCLE = (
+        "on-circle", INFO,
+        "A shift by {shift:.6g} m along x leaves the motion unchanged, and some motion turns over and over: x is taken "
+        "modulo that, and states that far apart count as one.",
+        "Give a region wider than that to tell them apart.",
     )  # fmt: skip
     STARTS_DIVERGED = (
         "starts-diverged", WARNING, "{count} of {starts:start} diverged.",

@@ -79,7 +79,10 @@ class Structure(Record):
     stepper : str
         Stepper of the basin grid, as `vibrokit run --stepper` reads it: ``"rk4:256"``.
     shift : float
-        Distance along x (m) by which a state may be moved without a change of its motion; 0 for none.
+        Distance along x (m) by which a state may be moved without a change of its motion, that is, one turn; 0 for
+        none.
+    circle : bool
+        Whether states a turn apart count as one; if not, motion that ends at a copy of an attractor has escaped.
     """
 
     kind: ClassVar[str] = "structure"
@@ -93,6 +96,7 @@ class Structure(Record):
     budget: int
     stepper: str
     shift: float = 0.0
+    circle: bool = False
 
     @property
     def region(self) -> Region:
@@ -171,6 +175,11 @@ class Structure(Record):
                 "settling": ((), self.settling, about),
                 "budget": ((), self.budget, longest),
                 "stepper": ((), self.stepper, {"long_name": "stepper of the basin grid"}),
+                "circle": (
+                    (),
+                    int(self.circle),
+                    {"long_name": "whether states a shift apart count as one", "units": "1"},
+                ),
                 "shift": (
                     (),
                     self.shift,
@@ -198,6 +207,7 @@ class Structure(Record):
             budget=int(arrays.wholes("budget", ())),
             stepper=arrays.words("stepper", ())[0],
             shift=float(arrays.numbers("shift", (), 0.0, 1e300)),
+            circle=bool(arrays.wholes("circle", (), 0, 1)),
             **provenance,
         )
 

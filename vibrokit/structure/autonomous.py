@@ -195,7 +195,7 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
             "motion for longer, take a finer stepper, or give the scene damping."
         )
     cycle = Cycle(turning_point(unknowns)[None], 1, float(unknowns[1]), monodromy[None], float(residual))
-    _check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
+    check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
     return cycle
 
 
@@ -225,8 +225,11 @@ def turning_point(unknowns: Array) -> Array:
     return point
 
 
-def _check_cycle(cycle: Cycle, rate: Array, size: float, stepper: Stepper) -> None:
-    """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself."""
+def check_cycle(cycle: Orbit, rate: Array, size: float, stepper: Stepper) -> None:
+    """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself.
+
+    A StructureError is raised for both.
+    """
     speed = float(np.linalg.norm(rate))
     place = tuple(np.round(cycle.point, 6).tolist())
     if speed * cycle.duration < _AT_REST * (size + float(np.linalg.norm(cycle.point))):

@@ -30,8 +30,9 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SaddleSearch
+from vibrokit.structure.circle import turn_of
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
-from vibrokit.structure.regions import frame_of, lies_in, search_region, with_barrier_tops, without_copies
+from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, search_region, with_barrier_tops
 from vibrokit.structure.scales import states_at
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request
@@ -64,7 +65,7 @@ class Finder:
         self.searched = self.region or search_region(osc)
         self.search = Search(osc, self.searched, _SEARCH_SETTLING, self._search_stepper(), self.orbit_stepper, executor)
         self.attractors: tuple[Attractor, ...] = ()
-        self.shift = 0.0  # along x, between copies of the attractors (m); 0 for none
+        self.circle = False  # whether states a turn apart along x are one
         self.grid: BasinGrid | None = None
         self.saddle_search: SaddleSearch | None = None
         self.manifolds: tuple[Manifold, ...] = ()
@@ -123,10 +124,9 @@ class Finder:
         """Sort the attractors and name them, unless that was done."""
         if self.attractors:
             return
-        kept, self.shift = (
-            (self.search.attractors, 0.0) if self.region else without_copies(self.osc, self.search.attractors)
-        )
-        found = sorted(kept, key=order_of)
+        self.circle = on_circle(self.osc, self.search.attractors, self.region)
+        one_each = self.circle or self.region is None
+        found = sorted(copies_in(self.osc, self.search.attractors, self.frame, one_each=one_each), key=order_of)
         self.attractors = labelled(found, has_stops=bool(self.osc.barriers))
 
     @cached_property
@@ -147,7 +147,7 @@ class Finder:
         """Finds the attractor that a state leads to."""
         return BasinClassifier(
             self.osc, self.attractors, self.frame, self.settling, self.budget, self.stepper, self.executor,
-            shift=self.shift,
+            circle=self.circle,
         )  # fmt: skip
 
     def _find_basins(self) -> None:
@@ -212,7 +212,8 @@ class Finder:
             settling=self.settling,
             budget=self.budget,
             stepper=name_of(self.stepper),
-            shift=self.shift,
+            shift=turn_of(self.osc),
+            circle=self.circle,
             complete=self.stopped is None,
             scene=scene_data(self.osc),
             settings=self.request.settings,
@@ -225,8 +226,8 @@ class Finder:
     def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
         search, saddles = self.search, self.saddle_search
         found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
-        if self.shift:
-            found.append(Finding.of(Code.SHIFTED_COPIES, shift=self.shift))
+        if shift := turn_of(self.osc):
+            found.append(Finding.of(Code.ON_CIRCLE if self.circle else Code.SHIFTED_COPIES, shift=shift))
         where = self.osc.model.conditions
         if search.diverged and where:
             found.append(Finding.of(Code.STARTS_ENDED, count=search.diverged, starts=search.starts, where=where))

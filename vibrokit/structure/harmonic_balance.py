@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.borders import intervals_within
 from vibrokit.structure.roots import bracketed_roots
 
 _AMPLITUDES, _PHASES = 200, 128  # of the trial motions
@@ -97,9 +98,12 @@ class SteadyForce:
         def at_rest(x: float) -> float:
             return float(self(np.array([[x, 0.0]]))[0])
 
-        places = np.linspace(-_FARTHEST * length, _FARTHEST * length, _PLACES)
-        values = self(np.stack([places, np.zeros_like(places)], axis=1))
-        return sorted(sorted(bracketed_roots(at_rest, places, values), key=abs)[:_MOST_RESTS])
+        found = list[float]()
+        for low, high in intervals_within(self.osc, -_FARTHEST * length, _FARTHEST * length):
+            places = np.linspace(low, high, _PLACES)
+            values = self(np.stack([places, np.zeros_like(places)], axis=1))
+            found += bracketed_roots(at_rest, places, values)
+        return sorted(sorted(found, key=abs)[:_MOST_RESTS])
 
 
 @functools.lru_cache(maxsize=256)

@@ -19,6 +19,7 @@ from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
+from vibrokit.structure.circle import wrapped
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.scales import units_of
@@ -100,7 +101,9 @@ def section_equations(
 
     def evaluate(points: Array) -> Evaluation:
         found = linear_map(osc, points, stepper, intervals=period, executor=executor)
-        return Evaluation(found.images - points, found.derivatives - np.eye(points.shape[1]), found.derivatives)
+        return Evaluation(
+            wrapped(osc, found.images - points), found.derivatives - np.eye(points.shape[1]), found.derivatives
+        )
 
     return evaluate
 
@@ -119,7 +122,7 @@ def _node_equations(osc: Oscillator, count: int, interval: float, stepper: Stepp
         each, following = np.arange(count), np.roll(np.arange(count), -1)
         jacobian[each, :, each] = found.derivatives
         jacobian[each, :, following] -= np.eye(n)
-        residuals = found.images - nodes[following]
+        residuals = wrapped(osc, found.images - nodes[following])
         return Evaluation(residuals.reshape(1, -1), jacobian.reshape(1, count * n, count * n), found.derivatives[None])
 
     return evaluate
@@ -215,7 +218,8 @@ def unstable_direction(osc: Oscillator, nodes: Array, period: int, stepper: Step
 
 def same_point(osc: Oscillator, point: Array, known: Array, tolerance: float) -> bool:
     """Whether a point is one of some known points (count, n), to a tolerance relative to the size of the motion."""
-    near = np.abs(known - point) < tolerance * (units_of(osc) + np.abs(known).max(axis=0))
+    sizes = units_of(osc) + np.abs(wrapped(osc, known)).max(axis=0)
+    near = np.abs(wrapped(osc, known - point)) < tolerance * sizes
     return bool(near.all(axis=1).any())
 
 

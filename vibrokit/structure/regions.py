@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -17,13 +18,15 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.borders import between_borders
+from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.harmonic_balance import SteadyForce
 from vibrokit.structure.scales import length_of, states_at, units_of
 
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
 _SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
-_PLACES = 64  # in x, at which the force is compared with that of another place
-_SAME_PLACE = 1e-6  # relative: difference of two places, or forces, that are the same
+_PLACES = 64  # in a turn, for the mean force
+_SAME_PLACE = 1e-6  # relative: difference of two places that are the same
 _FARTHEST, _TRIED = 30.0, 600  # sizes of a motion within which tops of barriers are searched for, and places tried
 
 Array = NDArray[np.float64]
@@ -32,8 +35,18 @@ Array = NDArray[np.float64]
 def search_region(osc: Oscillator) -> Region:
     """Return a region for starts: it contains the stops, and the reach of a linear oscillator under the same forces."""
     reach = length_of(osc)
-    region = Region((-reach, reach), (-reach * osc.natural_frequency, reach * osc.natural_frequency))
-    return _without_deep_contact(osc, between_borders(osc, region))
+    speed = max(reach * osc.natural_frequency, _speed_of_turning(osc))
+    return _without_deep_contact(osc, between_borders(osc, Region((-reach, reach), (-speed, speed))))
+
+
+def _speed_of_turning(osc: Oscillator) -> float:
+    """Largest of the mean speeds (m/s) that a steady force or one turn in each period of the forcing gives; or 0."""
+    turn, damping = turn_of(osc), 2 * osc.damping_ratio * osc.natural_frequency
+    if not turn:
+        return 0.0
+    places = np.stack([np.linspace(0.0, turn, _PLACES, endpoint=False), np.zeros(_PLACES)], axis=1)
+    drift = abs(float(SteadyForce(osc)(places).mean())) / damping if damping else 0.0
+    return (1 + 2 * _MARGIN) * max(drift, turn / osc.section_interval)
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
@@ -42,11 +55,13 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     It contains the largest speed of each attractor at any phase, since other motions pass the section there. It is at
     least as wide as the gap between two stops. Without two stops it is at least as wide as the widest motion,
     or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
-    largest speed can reach. Where a shift along x leaves the motion unchanged, as of a pendulum that turns over, it
-    contains the copy of each attractor that is nearest to x = 0, and is at least as wide as the shift. Without stops it
-    contains the tops of the potential barriers around the attractors.
+    largest speed can reach. Where the force of the spring repeats along x, as that of a pendulum, it contains the copy
+    of each attractor that is nearest to x = 0, and is at least one turn wide; exactly that if an attractor turns over.
+    Without stops it contains the tops of the potential barriers around the attractors.
     """
-    attractors, shift = without_copies(osc, attractors)
+    attractors, turn = without_copies(osc, attractors), turn_of(osc)
+    if on_circle(osc, attractors, None):
+        return _turn_around(osc, attractors)
     points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
     points = np.concatenate([points, *cycles])
@@ -58,7 +73,7 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
         low, high = with_barrier_tops(osc, low, high)
     swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
     widest = max(swings)
-    least = 0.5 * max(gap, shift) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
+    least = 0.5 * max(gap, turn) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
@@ -97,30 +112,59 @@ def with_barrier_tops(osc: Oscillator, low: float, high: float) -> tuple[float, 
     return extended(low, -1.0), extended(high, 1.0)
 
 
-def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> tuple[list[Attractor], float]:
-    """Return attractors of which none is another one shifted along x, and the least such shift (m); 0 for none."""
-    kept, least = list[Attractor](), math.inf
+def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Attractor]:
+    """Return attractors of which none is another one moved along x by whole turns; those nearest to x = 0."""
+    kept = list[Attractor]()
     for one in sorted(attractors, key=lambda each: abs(float(each.points[:, 0].mean()))):
-        shifts = [shift for other in kept if (shift := _shift(osc, other, one))]
-        least = min([least, *shifts])
-        kept += [] if shifts else [one]
-    return kept, least if math.isfinite(least) else 0.0
+        if not any(_is_copy(osc, one, other) for other in kept):
+            kept.append(one)
+    return kept
 
 
-def _shift(osc: Oscillator, one: Attractor, other: Attractor) -> float:
-    """Distance along x from an attractor to another one, if that shift leaves the motion unchanged; else 0."""
-    if osc.barriers or one.points.shape != other.points.shape:
-        return 0.0
-    units, moved = units_of(osc), other.points - one.points
-    shift = float(moved[0, 0])
-    moved[:, 0] -= shift
-    if not np.all(np.abs(moved) < _SAME_PLACE * units):
-        return 0.0
-    x, v = np.meshgrid(np.linspace(-shift, shift, _PLACES), [-units[1], 0.0, units[1]])
-    here = np.stack([x.ravel(), v.ravel()], axis=1)
-    rates = [VectorField(osc).rate(states_at(osc, places))[:, 1] for places in (here, here + np.array([shift, 0.0]))]
-    unchanged = np.abs(rates[1] - rates[0]).max() < _SAME_PLACE * np.abs(rates[0]).max()
-    return abs(shift) if unchanged else 0.0
+def _is_copy(osc: Oscillator, one: Attractor, other: Attractor) -> bool:
+    if not turn_of(osc) or one.points.shape != other.points.shape:
+        return False
+    return bool(np.all(np.abs(wrapped(osc, one.points - other.points)) < _SAME_PLACE * units_of(osc)))
+
+
+def copies_in(osc: Oscillator, attractors: Sequence[Attractor], region: Region, *, one_each: bool) -> list[Attractor]:
+    """Return each attractor in the turn around the middle of a region, or once for each turn in which it is there.
+
+    Motion that turns over, and motion that never repeats, is one attractor however often it is met.
+    """
+    turn = turn_of(osc)
+    if not turn:
+        return list(attractors)
+    middle, found = float(np.mean(region.x)), list[Attractor]()
+    most = 0 if one_each else math.ceil(region.widths[0] / turn)
+    for one in without_copies(osc, attractors):
+        anywhere = bool(one.turns) or not one.repeats
+        nearest = _moved(one, -turn * float(turns_to(osc, one.points[:1], middle)[0]))
+        moved = [_moved(nearest, turn * away) for away in range(-most, most + 1)]
+        found += [nearest] if anywhere else [each for each in moved if lies_in(region, each)] or [nearest]
+    return found
+
+
+def _moved(one: Attractor, distance: float) -> Attractor:
+    """Return an attractor moved along x."""
+    return dataclasses.replace(one, points=shifted(one.points, distance), orbit=shifted(one.orbit, distance))
+
+
+def on_circle(osc: Oscillator, attractors: Sequence[Attractor], region: Region | None) -> bool:
+    """Whether states a turn apart along x count as one: motion turns over, and the region is one turn or none."""
+    turn = turn_of(osc)
+    narrow = region is None or region.widths[0] <= turn * (1 + _SAME_PLACE)
+    return bool(turn) and narrow and any(each.turns for each in attractors)
+
+
+def _turn_around(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
+    """Return one turn along x around the attractors that do not turn over, to half a turn, and all their speeds."""
+    turn = turn_of(osc)
+    resting = [each for each in attractors if not each.turns] or attractors
+    middle = 0.5 * turn * round(float(resting[0].points[:, 0].mean()) / (0.5 * turn))
+    fastest = max(float(np.abs(each.orbit[:, 1]).max()) for each in attractors)
+    speed = (1 + 2 * _MARGIN) * max(fastest, osc.natural_frequency * 0.5 * turn)
+    return Region((middle - 0.5 * turn, middle + 0.5 * turn), (-speed, speed))
 
 
 def _without_deep_contact(osc: Oscillator, region: Region, kept: tuple[float, float] = (math.inf, -math.inf)) -> Region:

@@ -16,6 +16,7 @@ from scipy.optimize import brentq, minimize_scalar
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.borders import length_between_borders
+from vibrokit.structure.circle import turn_of
 from vibrokit.structure.harmonic_balance import Balance, balances_of
 from vibrokit.structure.roots import bracketed_roots
 
@@ -40,7 +41,8 @@ def length_of(osc: Oscillator) -> float:
     nor forces, it includes the deflection at which the nonlinear part of the spring's force is as large as the linear
     part. Where damping changes its sign with the amplitude, it includes the amplitude at which it does. Where forces
     have poles or other borders, no motion about x = 0 is larger than the distance to the nearest, which takes the place
-    of amplitudes. A linear spring has no length scale; the length is 1 then.
+    of amplitudes. A linear spring has no length scale; the length is 1 then. Where the force of the spring repeats
+    along x, it is half a turn or more.
     """
     field, push = VectorField(osc), 0.0
     for index, part in enumerate(osc.excitations):
@@ -54,7 +56,7 @@ def length_of(osc: Oscillator) -> float:
     if not length or _pushes_away(osc, field):
         length = max(length, _bending(osc, field))
     length = length or 1.0
-    return max(length, _swing(balances_of(osc, length)))
+    return max(length, _swing(balances_of(osc, length)), 0.5 * turn_of(osc))
 
 
 def turns_of(osc: Oscillator) -> float:

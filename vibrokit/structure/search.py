@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -25,8 +26,10 @@ from vibrokit.structure.attractors.describe import describe_orbit, describe_wand
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.wells import wells
+from vibrokit.structure.circle import shifted, turn_of, wrapped
 from vibrokit.structure.known_motions import known_motions
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
+from vibrokit.structure.rotations import find_rotation
 from vibrokit.structure.scales import turns_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -116,7 +119,10 @@ class Search:
 
     def _arrival(self) -> Stop:
         """The test for having reached a known attractor, or a state from which motion cannot leave the well of one."""
-        reached = arrival_at({index: known.points for index, known in enumerate(self.attractors)}, self.distances)
+        copies = [known.points for known in self.attractors]
+        if turn := turn_of(self.osc):  # at the ends of a turn, motion is near the copies in the turns beside it
+            copies = [np.concatenate([shifted(points, away) for away in (-turn, 0.0, turn)]) for points in copies]
+        reached = arrival_at(dict(enumerate(copies)), self.distances)
         trapped = wells(self.osc, self.attractors, self.region)
         return reached if trapped is None else reached.or_in_cells(trapped.region.bounds, trapped.labels)
 
@@ -128,9 +134,9 @@ class Search:
         arrival, end = self._arrival(), self.periods + periods
         while self.periods < end:
             stretch = min(max(1, _LONGER * self.periods), end - self.periods)
-            ended, labels = follow(self.osc, states, arrival, stretch, self.stepper, self.executor)
+            ended, _, labels = follow(self.osc, states, arrival, stretch, self.stepper, self.executor)
             self.diverged += int(np.sum(labels == ESCAPED))
-            states = self.unsettled = ended.states[labels == UNSETTLED]
+            states = self.unsettled = ended[labels == UNSETTLED]
             self.periods += stretch
         return states
 
@@ -140,7 +146,8 @@ class Search:
     def _add_orbits(self, states: Array, longest: int) -> Array:
         """Add the new stable orbits that states lie on; return the states that lie on none."""
         path = _section_path(self.osc, states, self.stepper, longest)
-        distance = np.linalg.norm((path[1:] - path[0]) / (units_of(self.osc) + np.abs(path).max(axis=0)), axis=2)
+        sizes = units_of(self.osc) + np.abs(wrapped(self.osc, path)).max(axis=0)
+        distance = np.linalg.norm(wrapped(self.osc, path[1:] - path[0]) / sizes, axis=2)
         close = distance < _RECURRENCE
         settled = close.any(axis=0)
         for index in np.flatnonzero(settled):
@@ -187,14 +194,16 @@ class Search:
             self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled, starts=self.starts))
 
     def _on_cycle(self, state: Array) -> bool:
-        return any(_is_on(known.orbit, state) for known in self.attractors if known.kind == "limit cycle")
+        return any(_is_on(self.osc, known, state) for known in self.attractors if known.kind == "limit cycle")
 
     def _add_cycle(self, state: Array) -> bool:
         """Add the limit cycle that a state lies on, if it is new; return whether there is a stable one."""
-        try:
-            longest = _LONGEST_CYCLE * self.osc.section_interval
-            cycle = find_cycle(self.osc, state, self.orbit_stepper, longest=longest)
-        except StructureError:
+        longest, cycle = _LONGEST_CYCLE * self.osc.section_interval, None
+        for find in (find_rotation, find_cycle) if turn_of(self.osc) else (find_cycle,):
+            with contextlib.suppress(StructureError):
+                cycle = find(self.osc, state, self.orbit_stepper, longest=longest)
+                break
+        if cycle is None:
             return False
         if np.sort(np.abs(cycle.multipliers))[-2:][0] >= 1:
             return False
@@ -219,7 +228,7 @@ class Search:
         if not len(survivors):
             return
         osc, finer = self.osc, self.stepper.refined()
-        clouds = list(_section_path(osc, survivors, finer, _VISITS - 1).transpose(1, 0, 2))
+        clouds = list(wrapped(osc, _section_path(osc, survivors, finer, _VISITS - 1)).transpose(1, 0, 2))
         for group in separate([cloud[:, :2] / self.distances for cloud in clouds], _OVERLAP):
             periods = _measuring_time(osc)
             few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
@@ -262,11 +271,16 @@ def _lasting(osc: Oscillator) -> int:
     return min(_LONG_PERIODS, max(_FEW_PERIODS, math.ceil(_MANY_TURNS / turns_of(osc))))
 
 
-def _is_on(orbit: Array, point: Array) -> bool:
-    """Whether a point lies on a closed curve, within the spacing of its samples."""
-    extent = np.ptp(orbit, axis=0)
+def _is_on(osc: Oscillator, cycle: Attractor, point: Array) -> bool:
+    """Whether a point lies on a limit cycle, within the spacing of its samples."""
+    orbit, extent = cycle.orbit, np.ptp(cycle.orbit, axis=0)
+    if cycle.turns:  # on which of its turns, only the speed can tell
+        turn = turn_of(osc)
+        first = orbit[:, 0].min() + (point[0] - orbit[:, 0].min()) % turn
+        places = first + turn * np.arange(abs(cycle.turns))
+        point = np.stack([places, np.full(len(places), point[1])], axis=1)[:, None]
     spacing = np.linalg.norm(np.diff(orbit, axis=0) / extent, axis=1).max()
-    return bool(np.linalg.norm((orbit - point[:2]) / extent, axis=1).min() <= spacing)
+    return bool(np.linalg.norm((orbit - point[..., :2]) / extent, axis=-1).min() <= spacing)
 
 
 def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> Stepper:
@@ -285,7 +299,7 @@ def _persist(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper,
     counts = [len(states) for states in starts]
     ends = run_ensemble(osc, Flow.STATE, stepper, np.concatenate(starts), np.repeat(periods, counts)).states
     each = zip(attractors, np.split(ends, np.cumsum(counts)[:-1]), strict=True)
-    return all(_is_still_on(known, end, distances) for known, end in each)
+    return all(_is_still_on(osc, known, end, distances) for known, end in each)
 
 
 def _starts_on(known: Attractor) -> Array:
@@ -293,9 +307,10 @@ def _starts_on(known: Attractor) -> Array:
     return known.points[:1] if known.repeats else known.points[:: max(1, len(known.points) // _WATCHED)]
 
 
-def _is_still_on(known: Attractor, ends: Array, distances: Array) -> bool:
+def _is_still_on(osc: Oscillator, known: Attractor, ends: Array, distances: Array) -> bool:
     """Whether motions (count, n) that started on an attractor are on it."""
     if known.kind == "limit cycle":
-        return _is_on(known.orbit, ends[0])
-    apart = np.linalg.norm((ends[:, None, :2] - known.points[None, :, :2]) / distances, axis=2).min(axis=1)
+        return _is_on(osc, known, ends[0])
+    offsets = wrapped(osc, ends[:, None, :2] - known.points[None, :, :2])
+    apart = np.linalg.norm(offsets / distances, axis=2).min(axis=1)
     return bool(np.mean(apart <= 2.0) > 0.9)

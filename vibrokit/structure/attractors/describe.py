@@ -20,6 +20,7 @@ from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.wandering import LyapunovEstimate
 from vibrokit.structure.autonomous import equilibrium_exponents
+from vibrokit.structure.circle import turns_to, wrapped
 from vibrokit.structure.orbits import Orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -47,7 +48,8 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
         kind="equilibrium" if resting else orbit.kind,
         period=orbit.period,
         duration=0.0 if resting else orbit.duration,
-        points=visited(osc, orbit, stepper),
+        points=wrapped(osc, visited(osc, orbit, stepper)),
+        turns=int(turns_to(osc, path.states[-1:] - path.states[:1])[0]),
         multipliers=orbit.multipliers,
         exponents=equilibrium_exponents(osc, orbit.point) if resting else orbit.exponents,
         residual=orbit.residual,

@@ -36,7 +36,8 @@ def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, 
 
     ``clear`` runs clear of the stops, ``hammering`` hits them, ``pressed`` stays in contact with one. In a scene
     without stops an orbit is an ``oscillation``. An equilibrium clear of the stops is ``rest``, a limit cycle
-    ``cycle``; motion that never repeats is ``quasiperiodic`` or ``chaotic``. The period follows if it is not 1:
+    ``cycle``; motion that turns over is ``running``, with its turns in a period if these are more than one; motion that
+    never repeats is ``quasiperiodic`` or ``chaotic``. The period follows if it is not 1:
     ``hammering-period-4``. Two or three attractors of one name become ``small-``, ``medium-`` and ``large-`` by
     amplitude, or ``left-``, ``middle-`` and ``right-`` by place. Where neither distinguishes them, or where there are
     more, all but the first are numbered.
@@ -56,6 +57,10 @@ def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, 
 def _base(attractor: Attractor, has_stops: bool) -> str:
     if attractor.kind in ("quasiperiodic", "chaotic"):
         return attractor.kind
+    if attractor.turns:
+        often = abs(attractor.turns) / attractor.period
+        name = "running" if often <= 1 else f"running-{often:.3g}-turns"
+        return name if attractor.period == 1 else f"{name}-period-{attractor.period}"
     if attractor.kind == "limit cycle":
         return "cycle"
     touches = any(depth > 0 for depth in attractor.peak_depth.values())
@@ -70,9 +75,12 @@ def _base(attractor: Attractor, has_stops: bool) -> str:
 
 def _distinguishing(group: Sequence[Attractor]) -> tuple[str, ...]:
     """Words that distinguish attractors of one name; empty if there are none."""
-    widths = [float(np.ptp(one.orbit[:, 0])) for one in group]
+    widths = [0.0 if one.turns else float(np.ptp(one.orbit[:, 0])) for one in group]
     if len(group) in _SIZES and all(large > _RATIO * small > 0 for small, large in itertools.pairwise(sorted(widths))):
         return _in_order(_SIZES[len(group)], widths)
+    if all(one.turns for one in group):
+        middles = [float(np.sign(one.turns)) for one in group]
+        return _in_order(_PLACES[2], middles) if sorted(middles) == [-1.0, 1.0] else ()
     middles = [float(one.orbit[:, 0].mean()) for one in group]
     least = _SHIFT * max(*widths, 1e-9 * max(map(abs, middles)), 0.0)
     if len(group) in _PLACES and all(right - left > least for left, right in itertools.pairwise(sorted(middles))):

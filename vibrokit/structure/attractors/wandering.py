@@ -15,12 +15,14 @@ from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
+from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.survival import Survival
+from vibrokit.structure.basins.landings import landed
+from vibrokit.structure.circle import advanced, turn_of, wrapped
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -41,14 +43,40 @@ def follow(
     periods: int,
     stepper: Stepper,
     executor: concurrent.futures.Executor | None = None,
-) -> tuple[Ensemble, NDArray[np.int64]]:
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
     """Follow starts (count, n) on the section until they arrive at a known orbit, or for some periods.
 
-    The labels are those of the arrival test; UNSETTLED where no orbit was reached, ESCAPED where the motion diverged.
+    Returned are where they end, after how many periods, and the labels of the arrival test; UNSETTLED where no orbit
+    was reached, ESCAPED where the motion diverged. Where x repeats, motion is moved back by whole turns.
     """
+    if turn_of(osc):
+        return _follow_on_circle(osc, states, stop, periods, stepper, executor)
     ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
     without = np.where(ended.status == COMPLETED, UNSETTLED, ESCAPED)
-    return ended, np.where(np.isin(ended.status, (REACHED, LEFT_BASIN)), ended.label, without)
+    labels = np.where(np.isin(ended.status, (REACHED, LEFT_BASIN)), ended.label, without)
+    return ended.states, ended.intervals, labels
+
+
+def _follow_on_circle(
+    osc: Oscillator,
+    states: Array,
+    stop: Stop,
+    periods: int,
+    stepper: Stepper,
+    executor: concurrent.futures.Executor | None,
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    here, alive = wrapped(osc, states), np.arange(len(states))
+    intervals = np.zeros(len(states), dtype=np.int64)
+    labels = np.full(len(states), UNSETTLED, dtype=np.int64)
+    for _ in range(periods):
+        ended, _turns = advanced(osc, stepper, here[alive], executor=executor)
+        here[alive] = ended.states
+        intervals[alive] += 1
+        labels[alive] = np.where(ended.status == COMPLETED, landed(stop, ended.states), ESCAPED)
+        alive = alive[labels[alive] == UNSETTLED]
+        if not alive.size:
+            break
+    return here, intervals, labels
 
 
 def watch(
@@ -74,10 +102,9 @@ def watch(
         stretch = min(longest - periods, math.ceil(exposure / alive.size) - quiet)
         if stretch <= 0:
             break
-        ended, labels = follow(osc, here[alive], stop, stretch, stepper, executor)
-        here[alive] = ended.states
+        here[alive], intervals, labels = follow(osc, here[alive], stop, stretch, stepper, executor)
         settled = labels != UNSETTLED
-        settled_after[alive[settled]] = periods + ended.intervals[settled]
+        settled_after[alive[settled]] = periods + intervals[settled]
         alive, periods = alive[~settled], periods + stretch
     lifetime, error = fit_decay(settled_after, periods)
     survival = Survival(

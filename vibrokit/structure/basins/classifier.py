@@ -13,15 +13,17 @@ from numpy.typing import NDArray
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.staying import staying
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, REACHED, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
+from vibrokit.structure.basins.landings import Landings, landed
 from vibrokit.structure.basins.stop_cells import MARGIN, AttractorMask, core_of, is_extended, mask_of
 from vibrokit.structure.basins.wells import wells
+from vibrokit.structure.circle import advanced, shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -31,7 +33,6 @@ CELLS = "cells"
 _FIRST_STRETCH = 8  # sections after which the trajectories still under way are packed together again
 _LONGEST_STRETCH = 64  # with an extended attractor: the sections of a stretch are kept in memory
 _CONFIRMED = 64  # sections that a trajectory must stay near an extended attractor
-_FAR = 32  # shifts away from the region after which motion counts as escaped: it passes from copy to copy
 _MISSES = 6  # of these sections that may fall into gaps of the attractor's sample
 
 Array = NDArray[np.float64]
@@ -62,9 +63,9 @@ class BasinClassifier:
     executor : concurrent.futures.Executor, optional
     core : Basins, optional
         Cells that classify trajectories which are in them at a section; negative labels for cells that do not.
-    shift : float
-        Distance along x (m) by which a state may be moved without a change of its motion; 0 for none. A state that
-        leads to a copy of an attractor elsewhere has escaped.
+    circle : bool
+        Whether states a turn apart along x are one, where the force of the spring repeats. If not, a state that leads
+        to a copy of an attractor which is not among the attractors has escaped.
     """
 
     osc: Oscillator
@@ -75,7 +76,7 @@ class BasinClassifier:
     stepper: Stepper
     executor: concurrent.futures.Executor | None = None
     core: Basins | None = None
-    shift: float = 0.0
+    circle: bool = False
 
     @classmethod
     def of(
@@ -88,7 +89,7 @@ class BasinClassifier:
         """Return the classifier with the attractors, the region and the budget of a structure."""
         return cls(
             osc, structure.attractors, structure.basins.region, structure.settling, structure.budget, stepper, executor,
-            shift=structure.shift,
+            circle=structure.circle,
         )  # fmt: skip
 
     def labels(self, states: Array, start_time: float = 0.0) -> Whole:
@@ -108,7 +109,7 @@ class BasinClassifier:
         """
         trajectories = _Trajectories(self, states, found)
         trajectories.to_section(start_time)
-        longest = self.budget if self.mask is None and not self.shift else _LONGEST_STRETCH
+        longest = self.budget if self.mask is None else _LONGEST_STRETCH
         stretch, known = _FIRST_STRETCH, 0
         while (active := trajectories.active()).size:
             trajectories.follow(active, stretch)
@@ -120,7 +121,7 @@ class BasinClassifier:
 
     def sharing(self, basins: Basins, margin: int = MARGIN) -> BasinClassifier:
         """Return a faster classifier, which uses a finished grid; see `vibrokit.structure.basins.stop_cells`."""
-        core = core_of(self.osc, self.stepper, basins, margin, self.executor)
+        core = core_of(self.osc, self.stepper, basins, margin, self.executor, circle=self.circle)
         trapped = wells(self.osc, self.attractors, self.region, basins.labels.shape)
         if trapped is not None:
             core = Basins(core.region, np.where(trapped.labels == UNSETTLED, core.labels, trapped.labels))
@@ -129,8 +130,13 @@ class BasinClassifier:
     @cached_property
     def points(self) -> Stop:
         """The test for having reached an orbit or an equilibrium."""
-        orbits = {place: a.points for place, a in enumerate(self.attractors) if not is_extended(a)}
-        return arrival_at(orbits, self.settling * self.region.widths)
+        points = [each.points[: 0 if is_extended(each) else None] for each in self.attractors]
+        return arrival_at(dict(self.landings.samples(points)), self.settling * self.region.widths)
+
+    @cached_property
+    def landings(self) -> Landings:
+        """The attractors as motion meets them that is moved back along x."""
+        return Landings(self.osc, self.attractors, self.region, circle=self.circle)
 
     @cached_property
     def arriving(self) -> Stop:
@@ -141,7 +147,7 @@ class BasinClassifier:
     @cached_property
     def mask(self) -> AttractorMask | None:
         """The cells around extended attractors; None if there are none."""
-        return mask_of(self.attractors, self.region, self.settling * self.region.widths)
+        return mask_of(self.landings, self.region, self.settling * self.region.widths)
 
 
 class _Trajectories:
@@ -149,13 +155,14 @@ class _Trajectories:
 
     def __init__(self, classifier: BasinClassifier, states: Array, found: Whole) -> None:
         self.classifier = classifier
-        self.states = np.array(states, dtype=float)
+        self.middle = classifier.landings.middle
+        self.turns = turns_to(classifier.osc, np.asarray(states), self.middle).astype(np.int64)  # that were taken back
+        self.states = wrapped(classifier.osc, np.array(states, dtype=float), self.middle)
         extended = 0 if classifier.mask is None else len(classifier.mask.places)
         self.remaining = np.full(len(states), classifier.budget + _CONFIRMED * bool(extended), dtype=np.int64)
         self.found = found
         # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
         self.stayed, self.missed = np.zeros((2, len(states), extended), dtype=np.int64)
-        self.shifts = np.zeros(len(states), dtype=np.int64)  # by which the states were moved back into the region
         self.sections = 0  # of all together
 
     def active(self) -> Whole:
@@ -171,37 +178,45 @@ class _Trajectories:
                 osc, Flow.STATE, self.classifier.stepper, self.states, start_time=phase, interval=rest,
                 executor=self.classifier.executor,
             )  # fmt: skip
-            self.states = ended.states
+            self.turns += turns_to(osc, ended.states, self.middle).astype(np.int64)
+            self.states = wrapped(osc, ended.states, self.middle)
             self.found[ended.status == DIVERGED] = ESCAPED
 
     def follow(self, which: Whole, most: int) -> None:
         """Integrate some trajectories by at most so many sections, and note what they reach."""
         classifier, mask = self.classifier, self.classifier.mask
-        budget = np.minimum(self.remaining[which], most)
-        ended = run_ensemble(
-            classifier.osc, Flow.STATE, classifier.stepper, self.states[which], budget,
-            stop=classifier.arriving, visits=0 if mask is None else most, executor=classifier.executor,
-        )  # fmt: skip
+        ended = self._on_circle(which) if turn_of(classifier.osc) else self._on_line(which, most)
         self.states[which] = ended.states
         self.sections += int(ended.intervals.sum())
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
         self.found[which[ended.status == DIVERGED]] = ESCAPED
         reached = np.isin(ended.status, (REACHED, LEFT_BASIN))
-        self.found[which[reached]] = ended.label[reached]
+        self._arrive(which[reached], ended.label[reached])
         if mask is not None:
             self._stay(which, ended, mask)
-        self.found[which[(self.shifts[which] != 0) & (self.found[which] >= 0)]] = ESCAPED
-        if classifier.shift:
-            self._move_back(which)
 
-    def _move_back(self, which: Whole) -> None:
-        """Move states along x into the middle of the region, where copies of attractors are recognised."""
-        shift, middle = self.classifier.shift, float(np.mean(self.classifier.region.x))
-        away = np.rint(np.nan_to_num((self.states[which, 0] - middle) / shift))
-        self.states[which, 0] -= shift * away
-        self.shifts[which] += away.astype(np.int64)
-        self.found[which[(np.abs(self.shifts[which]) > _FAR) & (self.found[which] == NOT_FOLLOWED)]] = ESCAPED
+    def _on_line(self, which: Whole, most: int) -> Ensemble:
+        classifier = self.classifier
+        return run_ensemble(
+            classifier.osc, Flow.STATE, classifier.stepper, self.states[which],
+            np.minimum(self.remaining[which], most), stop=classifier.arriving,
+            visits=0 if classifier.mask is None else most, executor=classifier.executor,
+        )  # fmt: skip
+
+    def _on_circle(self, which: Whole) -> Ensemble:
+        """Integrate over one section, and move motion back to the turn around the middle of the region."""
+        classifier = self.classifier
+        ended, turns = advanced(
+            classifier.osc, classifier.stepper, self.states[which], self.middle, classifier.executor
+        )  # fmt: skip
+        self.turns[which] += turns
+        label = np.where(ended.status == COMPLETED, landed(classifier.arriving, ended.states), UNSETTLED)
+        return dataclasses.replace(ended, label=label, status=np.where(label >= 0, REACHED, ended.status))
+
+    def _arrive(self, which: Whole, labels: Whole) -> None:
+        """Note what some trajectories have reached, by the labels of the test."""
+        self.found[which] = self.classifier.landings.labels(labels, self.turns[which])
 
     def _stay(self, which: Whole, ended: Ensemble, mask: AttractorMask) -> None:
         """Note which trajectories have stayed near an extended attractor, by the sections that they passed."""
@@ -212,10 +227,12 @@ class _Trajectories:
         )  # fmt: skip
         self.stayed[which], self.missed[which] = stayed, missed
         confirmed = (found >= 0) & (self.found[which] == NOT_FOLLOWED)
-        self.found[which[confirmed]] = mask.places[found[confirmed]]
+        self._arrive(which[confirmed], mask.places[found[confirmed]])
 
     def close(self) -> None:
         """Label the trajectories whose budget is spent."""
         over = np.flatnonzero((self.found == NOT_FOLLOWED) & (self.remaining <= 0))
-        inside = self.classifier.region.contains(self.states[over]) & (self.shifts[over] == 0)
+        classifier = self.classifier
+        away: Array = (not classifier.circle) * turn_of(classifier.osc) * self.turns[over].astype(float)
+        inside = classifier.region.contains(shifted(self.states[over], away))
         self.found[over] = np.where(inside, UNSETTLED, ESCAPED)

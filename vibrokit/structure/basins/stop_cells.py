@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,8 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.basins.landings import Landings
+from vibrokit.structure.circle import wrapped
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -35,19 +36,26 @@ Array = NDArray[np.float64]
 
 
 def core_of(
-    osc: Oscillator, stepper: Stepper, basins: Basins, margin: int, executor: concurrent.futures.Executor | None = None
+    osc: Oscillator,
+    stepper: Stepper,
+    basins: Basins,
+    margin: int,
+    executor: concurrent.futures.Executor | None = None,
+    *,
+    circle: bool = False,
 ) -> Basins:
     """Return the cells whose neighbourhood leads to one attractor, as far as the grid resolves; UNSETTLED for others.
 
     All cells up to `margin` away must have the cell's label, and the same must hold for the cells that it and its
     neighbours are mapped to in the next two sections. The second test detects tongues of another basin too thin for
     the grid: the flow widens them. Without it the small basin of ``hertz-0.570`` lost 13% of its area on a grid of
-    400 × 400 over [−1, 1]²; with it, not one cell.
+    400 × 400 over [−1, 1]²; with it, not one cell. On the circle of one turn, motion is moved back to the region.
     """
     certain = agreeing(basins.labels, margin)
     cells, shape, labels = np.flatnonzero(certain), certain.shape, basins.labels.flat
     ended = run_ensemble(osc, Flow.STATE, stepper, centres(osc, basins.region, shape, cells), executor=executor)
-    reached, inside = basins.region.cells_at(ended.states, shape)
+    ends = wrapped(osc, ended.states, float(np.mean(basins.region.x))) if circle else ended.states
+    reached, inside = basins.region.cells_at(ends, shape)
     targets = np.ravel_multi_index(tuple(reached.T), shape)
     held = inside & (ended.status == COMPLETED) & (labels[targets] == labels[cells])
     for _ in range(_AHEAD):
@@ -76,7 +84,7 @@ class AttractorMask:
     """The cells that contain extended attractors, and those around them."""
 
     frame: Region  # the region of the basins, and all of the attractors
-    places: Whole  # of these attractors among all
+    places: Whole  # their labels, as of `Landings.samples`
     entered: Mask  # (attractors, nx, nv): cells that contain points of the attractor's sample, and their neighbours
     near: Mask  # (attractors, nx, nv): these, and a border as wide as the gaps of the sample
 
@@ -86,9 +94,11 @@ def is_extended(attractor: Attractor) -> bool:
     return attractor.kind == "limit cycle" or not attractor.repeats
 
 
-def mask_of(attractors: Sequence[Attractor], region: Region, spacing: Array) -> AttractorMask | None:
+def mask_of(landings: Landings, region: Region, spacing: Array) -> AttractorMask | None:
     """Mark the extended attractors on a grid whose cells are about as wide as `spacing`; None if there are none."""
-    samples = {place: _sample(a, spacing) for place, a in enumerate(attractors) if is_extended(a)}
+    none = np.empty((0, 2))
+    own = [_sample(each, spacing) if is_extended(each) else none for each in landings.attractors]
+    samples = {place: sample for place, sample in landings.samples(own) if len(sample)}
     if not samples:
         return None
     frame = Region.around(np.concatenate([region.bounds.T, *samples.values()]), margin=0.01)
@@ -96,7 +106,8 @@ def mask_of(attractors: Sequence[Attractor], region: Region, spacing: Array) -> 
     cells = (int(nx), int(nv))
     entered, near = [], []
     for place, sample in samples.items():
-        width = 1 if attractors[place].kind == "limit cycle" else _gaps(sample, frame, cells)
+        cycle = landings.attractor(place).kind == "limit cycle"
+        width = 1 if cycle else _gaps(sample, frame, cells)
         entered.append(ndimage.binary_dilation(_cells_with(sample, frame, cells), _SQUARE))
         near.append(ndimage.binary_dilation(entered[-1], _SQUARE, width))
     return AttractorMask(frame, np.array(list(samples)), np.array(entered), np.array(near))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.circle import shifted, turn_of, turns_to
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -145,6 +146,9 @@ class Straddles:
         states = self.ends.reshape(-1, self.ends.shape[-1])
         ended = run_ensemble(osc, Flow.STATE, stepper, states, start_time=self.time, interval=self.interval)
         self.ends = ended.states.reshape(self.ends.shape)
+        if self.classifier.circle:
+            turns = turns_to(osc, self.ends.mean(axis=1), self.classifier.landings.middle)
+            self.ends = shifted(self.ends, -turn_of(osc) * turns[:, None])
         after = self._widths()
         with np.errstate(divide="ignore", invalid="ignore"):
             self._stretches.append(np.log(after / before))

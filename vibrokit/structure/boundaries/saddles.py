@@ -17,6 +17,7 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.codes import Code
@@ -29,6 +30,7 @@ from vibrokit.structure.boundaries.chaotic_set import chaotic_set, growth
 from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, meeting_cells
 from vibrokit.structure.boundaries.returns import almost_repeats, closing, recurrence, same_place
 from vibrokit.structure.boundaries.unstable import branch_limits, describe_unstable, refine_unstable
+from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import EQUAL
 from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
@@ -264,7 +266,8 @@ class SaddleSearch:
         unstable = np.abs(orbit.multipliers).max() > 1
         if not unstable or self.region.apart(orbit.point, here) > _FARTHEST:
             return False
-        if any(same_place(self.region.scaled(orbit.point[None]), places, EQUAL) for places in self._places):
+        point = wrapped(self.osc, orbit.point, self.plain.landings.middle) if self.plain.circle else orbit.point
+        if any(same_place(self.region.scaled(point[None]), places, EQUAL) for places in self._places):
             return True
         limits = branch_limits(self.classifier, orbit)
         if len(set(limits)) < 2 or UNSETTLED in limits:
@@ -288,6 +291,8 @@ class SaddleSearch:
         return True
 
     def _add(self, saddle: Saddle) -> None:
+        if self.plain.circle:
+            saddle = _in_turn(self.osc, saddle, self.plain.landings.middle)
         self._found.append(saddle)
         self._places.append(self.region.scaled(saddle.points))
 
@@ -334,6 +339,15 @@ class SaddleSearch:
 
     def _repeats(self, points: Array) -> bool:
         return almost_repeats(self.region.scaled(points), _FEW_POINTS, _LONGEST_PERIOD, _NEAR)
+
+
+def _in_turn(osc: Oscillator, saddle: Saddle, middle: float) -> Saddle:
+    """Return a saddle moved along x by whole turns, its points to the turn around a place."""
+    away = -turn_of(osc) * float(turns_to(osc, saddle.points[:1], middle)[0])
+    points = wrapped(osc, saddle.points, middle)
+    return dataclasses.replace(
+        saddle, points=points, nodes=shifted(saddle.nodes, away), orbit=shifted(saddle.orbit, away)
+    )
 
 
 def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:
