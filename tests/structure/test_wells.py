@@ -31,7 +31,7 @@ def scene(name, friction=0.0):
     spring, damping, stops = SCENES[name]
     return vk.Oscillator(
         natural_frequency=1.0, damping_ratio=damping, barriers=stops,
-        spring=vk.CustomSpring(f"{spring} + c*x**2*v", c=friction),
+        spring=vk.CustomSpring(f"{spring} + c*sin(x)**2*v", c=friction),
     )  # fmt: skip
 
 

@@ -76,7 +76,12 @@ class ExitProblem:
         return len(self.targets) + 1 < len(self.structure.attractors)
 
     def check_basin(self) -> None:
-        """Refuse an attractor that the basin grid puts into another basin; raises StructureError."""
+        """Refuse an attractor that turns over, or that the grid puts into another basin; raises StructureError."""
+        if self.attractor.turns:
+            raise StructureError(
+                f"{self.attractor.name} turns over and over, and how such motion is left is not computed; choose "
+                "another source."
+            )
         basins = self.structure.basins
         if not self.exit.by_position and basins.lost(self.attractor, self.source):
             cells = " × ".join(map(str, basins.labels.shape))

@@ -98,6 +98,12 @@ class Code(StrEnum):
         "Starts that still approach an orbit of period above {period}, or one with a multiplier close to 1: {count}.",
         _RAISE_BUDGET,
     )  # fmt: skip
+    REGION_TOO_SMALL = (
+        "region-too-small", WARNING,
+        "Steady states outside the region: {count}; {x_min:.6g} to {x_max:.6g} m and {v_min:.6g} to {v_max:.6g} m/s "
+        "contain all that are known.",
+        "Give that region, or none.",
+    )  # fmt: skip
     CELLS_UNSETTLED = (
         "cells-unsettled", WARNING, "{fraction:.2%} of the cells did not settle within the budget.", _RAISE_BUDGET,
     )  # fmt: skip

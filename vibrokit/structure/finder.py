@@ -18,6 +18,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Work, stage
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.manifold import Manifold
@@ -28,7 +29,7 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
-from vibrokit.structure.basins.stop_cells import MARGIN
+from vibrokit.structure.basins.stop_cells import MARGIN, centres
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.circle import turn_of
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
@@ -46,6 +47,7 @@ _EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a moti
 _MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS, _STEPS_LOCATED = 10**7, 5 * 10**9, 1000  # of edge tracking: 10 to 20 s
 _SEARCH_SETTLING = 1e-3
 _CLEAR = 0.25  # of the distance between two equilibria
+_WIDENINGS, _FOLLOWED_ON = 2, 64  # of the region, and cells whose motion is followed on to see whether it needs one
 _MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
 _MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
 
@@ -103,13 +105,17 @@ class Finder:
         self._order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
             raise StructureError(_none_inside(self.region, self.attractors))
+        self._choose_stepper()
+        lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
+        if self.request.budget is None and lifetimes:
+            self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
+
+    def _choose_stepper(self) -> None:
+        """Choose a stepper with which every attractor persists, unless one is given."""
         if self.request.stepper is None:
             self.stepper = persistent_stepper(
                 self.osc, self.attractors, self.stepper, self.settling * self.frame.widths
             )
-        lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
-        if self.request.budget is None and lifetimes:
-            self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
 
     def _start_regions(self) -> list[Region]:
         """Regions of starts: that of the expected motion, and one that contains the tops of barriers around it."""
@@ -151,7 +157,31 @@ class Finder:
         )  # fmt: skip
 
     def _find_basins(self) -> None:
-        """Classify every cell of the grid, and set the basin fraction of each attractor."""
+        """Classify every cell of the grid, and set the basin fraction of each attractor.
+
+        Motion that ends outside the region, or has not settled, is followed on. Where it shows an attractor, the region
+        is widened to contain that, unless it was given, and the grid is filled again.
+        """
+        for _ in range(_WIDENINGS):
+            self._fill_grid()
+            if not self._find_more():
+                return
+            self.attractors = ()
+            for cached in ("frame", "settling"):
+                vars(self).pop(cached, None)
+            self._order()
+            self._choose_stepper()
+        self._fill_grid()
+
+    def _find_more(self) -> bool:
+        """Search from cells that lead to no attractor; return whether there is one more."""
+        assert self.grid is not None
+        labels, region = self.grid.basins.labels, self.grid.basins.region
+        lost = np.flatnonzero(np.isin(labels, (ESCAPED, UNSETTLED)))
+        some = lost[:: -(-len(lost) // _FOLLOWED_ON)] if len(lost) else lost
+        return self.search.go_on(centres(self.osc, region, labels.shape, some), self.budget)
+
+    def _fill_grid(self) -> None:
         request = self.request
         self.grid = BasinGrid(self.classifier, request.cells, margin=request.margin, refine=request.refine)
         try:
@@ -235,6 +265,14 @@ class Finder:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
         if self.stopped and self.doing == "attractors":
             found.append(search.progress)
+        outside = sum(not lies_in(grid.basins.region, attractor) for attractor in self.attractors)
+        if outside:
+            (x_min, x_max), (v_min, v_max) = frame_of(self.osc, self.attractors).bounds.tolist()
+            found.append(
+                Finding.of(
+                    Code.REGION_TOO_SMALL, count=outside, x_min=x_min, x_max=x_max, v_min=v_min, v_max=v_max
+                )
+            )  # fmt: skip
         found += search.findings
         found += [_survival_finding(survival) for survival in search.survival]
         found += grid.findings

@@ -107,6 +107,16 @@ class Search:
                 self._watch(states)
             report(self.starts)
 
+    def go_on(self, states: Array, wait: int) -> bool:
+        """Follow more states; return whether some come to an attractor that was not known."""
+        known, diverged = len(self.attractors), self.diverged
+        with stage("motion without an attractor", unit="starts", total=len(states)):
+            states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD) if len(states) else states
+            if self.osc.autonomous:
+                self._try_cycles(states)
+        self.diverged = diverged
+        return len(self.attractors) > known
+
     @property
     def progress(self) -> Finding:
         """What the starts were doing after the last round."""
@@ -185,13 +195,16 @@ class Search:
 
     def _add_cycles(self, states: Array) -> None:
         """Add the limit cycles that states lie on."""
+        self._try_cycles(states)
+        unsettled = sum(not self._on_cycle(state) for state in states)
+        if unsettled:
+            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled, starts=self.starts))
+
+    def _try_cycles(self, states: Array) -> None:
         failures = 0
         for state in states:
             if failures < _FAILURES and not self._on_cycle(state):
                 failures += not self._add_cycle(state)
-        unsettled = sum(not self._on_cycle(state) for state in states)
-        if unsettled:
-            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled, starts=self.starts))
 
     def _on_cycle(self, state: Array) -> bool:
         return any(_is_on(self.osc, known, state) for known in self.attractors if known.kind == "limit cycle")
