@@ -110,10 +110,10 @@ class Search:
     def go_on(self, states: Array, wait: int) -> bool:
         """Follow more states; return whether some come to an attractor that was not known."""
         known, diverged = len(self.attractors), self.diverged
-        with stage("motion without an attractor", unit="starts", total=len(states)):
-            states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD) if len(states) else states
-            if self.osc.autonomous:
-                self._try_cycles(states)
+        if len(states):
+            states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD)
+        if self.osc.autonomous:
+            self._try_cycles(states)
         self.diverged = diverged
         return len(self.attractors) > known
 

@@ -1,0 +1,119 @@
+"""Forces that repeat along x: running states, copies of attractors, and shares on the circle."""
+
+import math
+
+import numpy as np
+import pytest
+
+import vibrokit as vk
+from vibrokit.results.basins import ESCAPED
+from vibrokit.results.codes import Code
+from vibrokit.structure.circle import turn_of
+
+
+def pendulum(*excitations, damping=0.1, force="sin(x)", **constants):
+    return vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=damping / 2, spring=vk.CustomSpring(force, **constants),
+        excitations=excitations,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("force", "constants", "turn"),
+    [
+        ("sin(x)", {}, 2 * math.pi),
+        ("sin(x)/b", {"b": 4.0}, 2 * math.pi),
+        ("k*sin(a*x) + sin(2*a*x + 1)*v", {"k": 2.0, "a": 0.5}, 4 * math.pi),
+        ("sin(x)**2", {}, math.pi),
+        ("exp(cos(q*x))*sin(q*x)", {"q": 1e6}, 2e-6 * math.pi),
+        ("x + sin(x)", {}, 0.0),
+        ("sin(x)*x", {}, 0.0),
+        ("sin(x) + sin(sqrt(2)*x)", {}, 0.0),
+        ("sin(x**2)", {}, 0.0),
+        ("x**3 - x", {}, 0.0),
+    ],
+)
+def test_the_turn_of_a_force_is_recognised(force, constants, turn):
+    assert turn_of(pendulum(force=force, **constants)) == pytest.approx(turn, rel=1e-12)
+
+
+def test_between_stops_motion_does_not_turn_over():
+    osc = pendulum()
+    assert turn_of(osc.replace(barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"),))) == 0.0
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """The driven pendulum of bSTAB's first case (Stender & Hoffmann, Nonlinear Dyn. 107, 2022)."""
+    rest = math.asin(0.5)
+    region = ((rest - math.pi, rest + math.pi), (-10.0, 10.0))
+    return vk.find_structure(pendulum(vk.Constant(0.5)), region=region, cells=(100, 100), manifolds=False)
+
+
+@pytest.mark.slow
+def test_a_driven_pendulum_rests_or_runs(driven):
+    running, rest = driven.attractors
+    assert (running.name, running.turns, rest.name, rest.turns) == ("running", 1, "rest", 0)
+    assert rest.basin_fraction == pytest.approx(0.152, abs=0.004 + 3 * rest.basin_fraction_error)
+    assert running.basin_fraction + rest.basin_fraction == pytest.approx(1.0, abs=1e-3)
+    assert driven.circle
+    assert driven.shift == pytest.approx(2 * math.pi)
+    (saddle,) = driven.saddles
+    assert saddle.points[0] == pytest.approx([math.pi - math.asin(0.5), 0.0], abs=1e-12)
+    assert set(saddle.leads_to) == {0, 1}
+
+
+@pytest.mark.slow
+def test_a_running_state_balances_damping_and_drive(driven):
+    """In one turn the drive does the work 2π·0.5, which damping 0.1 takes: 0.1 ∫ v dx."""
+    x, v = driven.attractor("running").orbit.T
+    assert x[-1] - x[0] == pytest.approx(2 * math.pi, abs=1e-9)
+    assert np.trapezoid(v, x) == pytest.approx(2 * math.pi * 0.5 / 0.1, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_what_leaves_a_running_state_is_refused(driven):
+    noisy = pendulum(vk.Constant(0.5)).replace(noise=vk.WhiteNoise(0.01))
+    result = vk.ActionGraph(source="running", nodes=(32, 32)).run(noisy, driven)
+    assert not result.energies
+    assert any("turns over" in str(finding) for finding in result.findings)
+
+
+@pytest.mark.slow
+def test_a_mirrored_pendulum_runs_the_other_way():
+    found = vk.find_structure(
+        pendulum(vk.Constant(-0.25), force="-sin(k*x)/k", k=2.0), cells=(40, 40), manifolds=False
+    )  # fmt: skip
+    assert {one.name: one.turns for one in found.attractors}.get("running") == -1
+    assert np.ptp(found.region.x) == pytest.approx(math.pi)
+
+
+@pytest.mark.slow
+def test_without_running_states_copies_are_escape():
+    """Strongly damped, motion over a barrier comes to rest in the next well."""
+    osc = pendulum(vk.Constant(1.8), damping=2.0, force="sin(x)/b", b=0.5)
+    found = vk.find_structure(osc, cells=(40, 40), manifolds=False)
+    (rest,) = found.attractors
+    assert rest.points[0, 0] == pytest.approx(math.asin(0.9))
+    assert not found.circle
+    assert ESCAPED in {label for saddle in found.saddles for label in saddle.leads_to}
+    assert found.found(Code.SHIFTED_COPIES)
+
+
+@pytest.mark.slow
+def test_copies_in_a_wide_region_are_told_apart():
+    osc = pendulum(damping=0.4)
+    found = vk.find_structure(osc, region=((-3 * math.pi, 3 * math.pi), (-2.0, 2.0)), cells=(60, 40), saddles=False)
+    places = sorted(float(one.points[0, 0]) for one in found.attractors)
+    assert places == pytest.approx([-2 * math.pi, 0.0, 2 * math.pi], abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_a_forced_pendulum_librates_or_rotates_either_way():
+    osc = pendulum(vk.Harmonic(1.66, 1.0), damping=0.2)
+    region = ((-math.pi, math.pi), (-4.0, 4.0))
+    found = vk.find_structure(osc, region=region, cells=(100, 100), saddles=False)
+    assert sorted(np.sign(one.turns) for one in found.attractors) == [-1, 0, 1]
+    (librating,) = (one for one in found.attractors if not one.turns)
+    assert librating.basin_fraction == pytest.approx(0.23, abs=0.02)
