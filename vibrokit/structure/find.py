@@ -37,10 +37,12 @@ def find_structure(
     """Find the steady states of the noise-free system, their basins, the saddles between them and their manifolds.
 
     Starts on a grid are followed until they recur; each orbit is refined by Newton's method on the variational
-    equations. Motion that does not recur is followed at two accuracies of integration, until the survivors together
-    have gone on for 200000 periods since the last start settled, or for 20000 periods each. It is an attractor only if
-    it survives both; its largest Lyapunov exponent determines its kind. Basins are found on a grid, saddles by tracking
-    the basins' boundaries, manifolds from the saddles.
+    equations. What is known in closed form is refined too: equilibria, linear responses, and harmonic balances. Motion
+    that does not recur is followed at two accuracies of integration, until the survivors together have gone on for
+    200000 periods since the last start settled, or for 20000 periods each. It is an attractor only if it survives both;
+    its largest Lyapunov exponent determines its kind. Basins are found on a grid; motion that ends outside is followed
+    on, and the region is widened to what it comes to, unless it was given. Saddles are found by tracking the basins'
+    boundaries, manifolds from the saddles.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete. If that is
     during the search for attractors, a finding says what the starts were doing.
@@ -50,8 +52,9 @@ def find_structure(
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
         Where to search; by default a region that contains the steady states and the stops with a margin around them,
-        and, if the motion repeats along x, as that of a pendulum does, one copy of each steady state. Motion
-        that ends at a copy of an attractor elsewhere has then left the region.
+        and, if the force of the spring repeats along x, as that of a pendulum does, one copy of each steady state. If
+        some motion turns over and over, the region is one turn wide, and x is taken modulo a turn; so it is in a given
+        region that is no wider. Otherwise, motion that ends at a copy of an attractor elsewhere has left the region.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
         are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map. The number

@@ -81,7 +81,7 @@ def _equations(osc: Oscillator, place: float, stepper: Stepper) -> Callable[[Arr
 
 
 def find_rotation(osc: Oscillator, state: Array, stepper: Stepper, *, longest: float) -> Rotation:
-    """Find the rotation that the motion from a state settles on, by its passages of one place on the circle.
+    """Find the rotation that the motion from a state settles on, by its passages of x = 0 on the circle.
 
     The motion is followed for twice `longest`, the longest duration of a rotation (s). A StructureError is raised if it
     does not advance by whole turns and repeat within that time.
@@ -91,18 +91,18 @@ def find_rotation(osc: Oscillator, state: Array, stepper: Stepper, *, longest: f
         osc, Flow.STATE, stepper, np.array(state, dtype=float), 0.0, spacing, math.ceil(2 * longest / spacing)
     )
     x, v = path[:, 0], path[:, 1]
-    turns = np.floor((x - x[0]) / turn) if turn else np.zeros(len(x))
+    turns = np.floor(x / turn) if turn else np.zeros(len(x))
     passed = np.flatnonzero(np.diff(turns))[-_MOST_TURNS - 1 :]
     settled = len(passed) > 1 and len(set(np.sign(np.diff(turns)[passed]).tolist())) == 1
     if settled:
-        levels = x[0] + turn * np.maximum(turns[passed], turns[passed + 1])
+        levels = turn * np.maximum(turns[passed], turns[passed + 1])
         parts = (levels - x[passed]) / (x[passed + 1] - x[passed])
         speeds = v[passed] + parts * (v[passed + 1] - v[passed])
         times = spacing * (passed + parts)
         for back in range(2, len(passed) + 1):
             if abs(speeds[-1] - speeds[-back]) < _RECURRENCE * np.abs(speeds).max():
                 start = path[passed[-1]].copy()
-                start[:2] = x[0], speeds[-1]
+                start[:2] = 0.0, speeds[-1]
                 return refine_rotation(osc, start, float(times[-1] - times[-back]), stepper)
     raise StructureError(
         f"the motion from {tuple(np.round(state, 6).tolist())} does not turn over and repeat within {longest:.6g} s; "

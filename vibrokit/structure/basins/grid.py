@@ -20,6 +20,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
 from vibrokit.structure.basins.stop_cells import MARGIN, agreeing, centres
+from vibrokit.structure.regions import on_circle
 from vibrokit.structure.search import persistent_stepper
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
@@ -218,5 +219,7 @@ def basin_fractions(
     chosen = stepper or persistent_stepper(
         osc, attractors, ensemble_stepper(osc, Flow.STATE), _SETTLING * region.widths
     )
-    basins = classify_grid(BasinClassifier(osc, attractors, region, _SETTLING, budget, chosen), cells)
+    circle = on_circle(osc, attractors, region)
+    classifier = BasinClassifier(osc, attractors, region, _SETTLING, budget, chosen, circle=circle)
+    basins = classify_grid(classifier, cells)
     return with_fractions(attractors, basins), cell_findings(basins)

@@ -102,7 +102,7 @@ class Tracing:
 
     def _follow(self, at: int, index: int, to: int) -> None:
         attractor, start, target = self.found[at][index], self.values[at], self.values[to]
-        if not attractor.repeats:
+        if not attractor.repeats or (attractor.turns and self.osc.autonomous):
             return
         try:
             followed = follow(self.osc, self.path, attractor, start, target, self.size, self.stepper)
