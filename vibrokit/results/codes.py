@@ -98,6 +98,11 @@ class Code(StrEnum):
         "Starts that still approach an orbit of period above {period}, or one with a multiplier close to 1: {count}.",
         _RAISE_BUDGET,
     )  # fmt: skip
+    FOLLOWED_ON = (
+        "followed-on", INFO,
+        "Motions from cells without an attractor that were followed on: {followed}. Of these, {diverged} left for "
+        "good, {settled} ended at known steady states or copies of them, and {moving} had not settled.",
+    )  # fmt: skip
     REGION_TOO_SMALL = (
         "region-too-small", WARNING,
         "Steady states outside the region: {count}; {x_min:.6g} to {x_max:.6g} m and {v_min:.6g} to {v_max:.6g} m/s "

@@ -265,6 +265,9 @@ class Finder:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
         if self.stopped and self.doing == "attractors":
             found.append(search.progress)
+        if followed := search.beyond["followed"]:
+            settled = followed - search.beyond["diverged"] - search.beyond["moving"]
+            found.append(Finding.of(Code.FOLLOWED_ON, settled=settled, **search.beyond))
         outside = sum(not lies_in(grid.basins.region, attractor) for attractor in self.attractors)
         if outside:
             (x_min, x_max), (v_min, v_max) = frame_of(self.osc, self.attractors).bounds.tolist()

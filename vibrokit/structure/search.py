@@ -79,6 +79,7 @@ class Search:
         self.unsettled = np.empty((0, 2))  # states of the starts that have not settled, after so many periods
         self.periods = 0
         self.findings: list[Finding] = []
+        self.beyond = {"followed": 0, "diverged": 0, "moving": 0}  # motions that were followed on, and how these ended
 
     def run(self, states: Array, wait: int, patient: bool) -> None:
         """Follow the states (count, n) until each recurs, diverges, or has not settled for a long time.
@@ -109,12 +110,14 @@ class Search:
 
     def go_on(self, states: Array, wait: int) -> bool:
         """Follow more states; return whether some come to an attractor that was not known."""
-        known, diverged = len(self.attractors), self.diverged
-        if len(states):
+        known, diverged, followed = len(self.attractors), self.diverged, len(states)
+        if followed:
             states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD)
         if self.osc.autonomous:
             self._try_cycles(states)
-        self.diverged = diverged
+            states = states[[not self._on_cycle(state) for state in states]]
+        gone, self.diverged = self.diverged - diverged, diverged
+        self.beyond = {"followed": followed, "diverged": gone, "moving": len(states)}
         return len(self.attractors) > known
 
     @property
