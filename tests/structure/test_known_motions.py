@@ -140,3 +140,15 @@ def test_grazing_is_located_by_the_frequency_as_by_the_amplitude(law, frequency)
         found = vk.continuation(osc, parameter, values, cells=(8, 8), starts=(6, 6))
         touches = [one.value for one in found.bifurcations if one.kind == "grazing"]
         assert min(abs(value - there) for value in touches) < 1e-12
+
+
+@pytest.mark.slow
+def test_a_structure_says_how_motion_without_an_attractor_ended():
+    """Over the tops of the softening beam motion leaves for good; of an overdamped pendulum it ends at copies."""
+    (beyond,) = vk.find_structure(beam(), cells=(30, 30), saddles=False).found(Code.FOLLOWED_ON)
+    assert beyond.values["diverged"] == beyond.values["followed"] > 10
+    steep = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=1.0, spring=vk.CustomSpring("2*sin(x)"), excitations=(vk.Constant(1.8),)
+    )
+    (copies,) = vk.find_structure(steep, cells=(30, 30), saddles=False).found(Code.FOLLOWED_ON)
+    assert copies.values["settled"] == copies.values["followed"] > 10
