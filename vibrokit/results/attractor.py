@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import ResultFileError
+from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import (
     PLANE,
@@ -24,7 +24,6 @@ from vibrokit.results.fields import (
     Whole,
     Word,
 )
-from vibrokit.results.summary import counted
 from vibrokit.results.survival import Survival
 from vibrokit.results.table import Table
 
