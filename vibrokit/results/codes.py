@@ -81,8 +81,7 @@ class Code(StrEnum):
         "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
     )  # fmt: skip
     STARTS_UNSETTLED = (
-        "starts-unsettled", WARNING,
-        "{count} of {starts} starts did not settle on an equilibrium or a limit cycle.",
+        "starts-unsettled", WARNING, "{count:start} did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,
     )  # fmt: skip
     SURVIVAL = (

@@ -201,7 +201,7 @@ class Search:
         self._try_cycles(states)
         unsettled = sum(not self._on_cycle(state) for state in states)
         if unsettled:
-            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled, starts=self.starts))
+            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
 
     def _try_cycles(self, states: Array) -> None:
         failures = 0
