@@ -4,8 +4,8 @@ import pytest
 
 from vibrokit import progress
 from vibrokit.display import Display
-from vibrokit.errors import StructureError
-from vibrokit.progress import Deadline, Work, advance, compiling, count, current, report, stage, working
+from vibrokit.errors import OutOfTime, StructureError, VibrokitError
+from vibrokit.progress import Deadline, Work, advance, compiling, count, current, put_off, report, stage, working
 
 
 @pytest.fixture
@@ -88,6 +88,33 @@ def test_a_time_limit_is_raised_once_also_in_inner_work(clock):
         with pytest.raises(Deadline):
             advance()
         advance()
+
+
+def out_of_time(clock):
+    """Work that goes on after its limit, whatever errors its steps raise."""
+    with working(time_limit=10), working(), stage("graph"):
+        clock.now += 11
+        try:
+            advance()
+        except Exception:
+            pytest.fail("a time limit is no failure of a step")
+
+
+def test_users_see_a_time_limit_without_a_result_as_an_error_of_ours(clock):
+    with pytest.raises(OutOfTime) as raised:
+        out_of_time(clock)
+    assert isinstance(raised.value, VibrokitError)
+    assert isinstance(raised.value, TimeoutError)
+    assert not isinstance(raised.value, KeyboardInterrupt)
+
+
+def test_limits_can_be_put_off_but_not_forgotten(clock):
+    with working(time_limit=10), working():
+        with put_off():
+            clock.now += 11
+            advance()
+        with pytest.raises(Deadline):
+            advance()
 
 
 def test_an_interrupt_is_raised_once_at_the_next_report():

@@ -134,7 +134,7 @@ class Work:
         self.outer = outer
         self.began = time.perf_counter()
         self.deadline = math.inf if time_limit is None else self.began + time_limit
-        self.interrupted = False
+        self.interrupted = self.held = False
         self.counts: Counter[str] = Counter()
         self.spent: defaultdict[str, float] = defaultdict(float)  # s, by stage
         self.stages: list[_Stage] = []
@@ -168,6 +168,8 @@ class Work:
 
     def check(self) -> None:
         """Raise Deadline after a time limit, and interrupts that were asked for; each once, so that all is kept."""
+        if self.held:
+            return
         if self.interrupted:
             self.interrupted = False
             raise KeyboardInterrupt
@@ -220,6 +222,17 @@ def opened(work: Work) -> Iterator[Work]:
     finally:
         _CURRENT.reset(token)
         work.close()
+
+
+@contextlib.contextmanager
+def put_off() -> Iterator[None]:
+    """Put off interrupts and time limits to the end of what is short and without which nothing can be returned."""
+    work = current()
+    work.held = True
+    try:
+        yield
+    finally:
+        work.held = False
 
 
 @contextlib.contextmanager

@@ -323,6 +323,40 @@ def test_a_time_limit_leaves_what_was_found(well, share):
     assert part.complete == (not part.found(Code.STOPPED))
 
 
+RESTLESS = {  # rf-driven Josephson junction (Phys. Rev. A 36, 2455); megastable oscillator; a ball on a stiff table
+    "running": {"spring": vk.CustomSpring("sin(x)"), "excitations": (vk.Constant(1.878), vk.Harmonic(10.198, 1.0))},
+    "megastable": {
+        "damping_ratio": 0.0,
+        "spring": vk.CustomSpring("w2*x - v*cos(x)", w2=0.1089),
+        "excitations": (vk.Harmonic(1.0, 0.73),),
+    },
+    "bouncing": {
+        "damping_ratio": 0.0,
+        "spring": vk.LinearSpring(0.0),
+        "barriers": (vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=1e8, c=1400.0), 0.0, "left"),),
+        "excitations": (vk.Constant(-1.0), vk.Harmonic(1.2, 1.0)),
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RESTLESS)
+def test_a_search_without_an_answer_says_what_its_starts_were_doing(name, tmp_path):
+    osc = vk.Oscillator(**({"natural_frequency": 1.0, "damping_ratio": 0.1} | RESTLESS[name]))
+    vk.find_structure(osc, time_limit=0.1)  # so that what comes first is compiled
+    part = vk.find_structure(osc, time_limit=2.0)
+    assert not part.complete
+    assert part.seconds < 6.0
+    (counts,) = [dict(one.values) for one in part.found(Code.SEARCH_STOPPED)]
+    assert counts["periods"] > 0
+    assert counts["settled"] + counts["moving"] + counts["left"] + counts["diverged"] == counts["starts"] == 576
+    part.save(tmp_path / "part.nc")
+    assert vk.load_result(tmp_path / "part.nc").attractors == part.attractors
+    part.plot()
+    with pytest.raises(StructureError, match="no attractors"):
+        vk.LeastAction().run(osc.replace(noise=vk.WhiteNoise(1e-3)), part)
+
+
 def test_enough_time_changes_nothing(well):
     osc, whole, _ = well
     part = vk.find_structure(osc, **WELL, time_limit=1e6)

@@ -18,7 +18,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
-from vibrokit.progress import Progress, Work, advance, stage, working
+from vibrokit.progress import Progress, Work, advance, put_off, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
@@ -120,7 +120,8 @@ def continuation(
     with working(progress, time_limit) as work:
         run = _Run(osc, entry, numbers.tolist(), request, executor)
         run.run()
-        return run.record(work)
+        with put_off():
+            return run.record(work)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -163,7 +164,8 @@ class _Run:
             self._find_fractions()
         except KeyboardInterrupt as interrupt:
             self.stopped = Finding.stopped(doing, interrupt)
-            self.tracing.pair_off()
+            with put_off():
+                self.tracing.pair_off()
 
     def record(self, work: Work) -> Continuation:
         """Return the record of all that was found."""

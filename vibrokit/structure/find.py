@@ -9,7 +9,7 @@ import numpy as np
 
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, working
+from vibrokit.progress import Progress, put_off, working
 from vibrokit.results.structure import Structure
 from vibrokit.structure.finder import Finder
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
@@ -107,6 +107,8 @@ def find_structure(
         region, cells, refine, margin, starts, settling, budget, edge_budget, saddles, manifolds, chosen, seed_of(rng)
     )  # fmt: skip
     with working(progress, time_limit) as work:
-        finder = Finder(osc, request, executor)
+        with put_off():
+            finder = Finder(osc, request, executor)
         finder.run()
-        return finder.structure(work)
+        with put_off():
+            return finder.structure(work)

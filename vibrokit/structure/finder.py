@@ -16,7 +16,7 @@ from vibrokit.kernels.named import name_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Work, stage
+from vibrokit.progress import Work, put_off, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.codes import Code
@@ -85,7 +85,8 @@ class Finder:
                 find()
         except KeyboardInterrupt as interrupt:
             self.stopped = Finding.stopped(self.doing, interrupt)
-            self._order()
+            with put_off():
+                self._order()
 
     def _search_stepper(self) -> Stepper:
         """A stepper finer than the basins need: too few steps can destroy a weak attractor."""
