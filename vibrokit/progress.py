@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from typing import Any
 
+import numpy as np
+
 from vibrokit.blas import one_blas_thread
 from vibrokit.errors import StructureError, shown
 from vibrokit.registry import load_attribute
@@ -194,7 +196,8 @@ def current() -> Work:
 def working(progress: Progress = None, time_limit: float | None = None) -> Iterator[Work]:
     """Open a piece of work; inside another one, the listener and the time limit of that stay in force."""
     work = Work(_listener(progress), checked_time_limit(time_limit), _CURRENT.get())
-    with contextlib.nullcontext() if work.outer else one_blas_thread(), opened(work):
+    # What overflows or is no number is tested where it arises; NumPy's warnings would tell a user nothing more.
+    with contextlib.nullcontext() if work.outer else one_blas_thread(), np.errstate(all="ignore"), opened(work):
         yield work
 
 

@@ -23,6 +23,7 @@ from vibrokit.progress import stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
+from vibrokit.results.summary import counted
 from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
@@ -113,8 +114,8 @@ class GraphSearch:
         noise, attractor = problem.osc.noise, problem.attractor
         if noise is not None and noise.extra_states:
             raise SceneError(
-                f"the noise has {len(noise.extra_states)} states of its own, and the graph covers x and v only; use "
-                "ActionPlot."
+                f"the noise has {counted(len(noise.extra_states), 'state')} of its own, and the graph covers x and v "
+                "only; paths of such a scene are found by shooting alone."
             )
         low, high = problem.structure.basins.region.bounds.T
         if np.any((attractor.points[:, :2] < low) | (attractor.points[:, :2] > high)):
