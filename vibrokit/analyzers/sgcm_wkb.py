@@ -72,7 +72,7 @@ class SGCM(Analyzer):
     -----
     A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
     reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Both are extrapolated from two grids, whose spacings differ by a factor of 1.5; their errors fall with its square.
+    Both are extrapolated from two grids, whose spacings differ by a factor of 1.5, by as much as brings them together.
     The error estimate is the difference of density and committor, plus all that the coarser grid changes, plus all that
     steps 1.5 times as long and cores 1.5 times as large (or a new sample) change, plus the iteration error. So a target
     that is not metastable, whose rate depends on its core, has a large error.
@@ -160,8 +160,12 @@ def _energies(
         if len(known) < 2:
             findings.append(Finding.of(Code.ENERGY_NEEDS_RATES, problem.source, target, known=len(known)))
             continue
-        times = [-one.log_rates[target] for one in known]
-        value, error = limit_of([one.intensity for one in known], times, [one.errors[target] for one in known])
+        value, error = limit_of(
+            [one.intensity for one in known],
+            [-one.log_rates[target] for one in known],
+            [one.iteration_error(target) for one in known],
+            np.transpose([one.changes(target) for one in known]).tolist(),
+        )
         error += max(-value, 0.0)  # no energy is negative: a negative limit misses by that much at least
         lower, upper = max(value - error, 0.0), max(value, 0.0) + error
         found.append(

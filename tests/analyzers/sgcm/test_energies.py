@@ -49,3 +49,12 @@ def test_errors_of_rates_are_those_of_the_straight_line():
     _, exact = limit_of(*given, [0.0] * 3)
     _, error = limit_of(*given, [0.0, 0.03, 0.01])
     assert error - exact == pytest.approx(np.hypot(2 * 0.01 * 1, 1 * 0.03 * 2))
+
+
+def test_what_changes_all_rates_alike_changes_the_product_at_the_least_intensity():
+    given = [3.0, 2.0, 1.0], log_times([3.0, 2.0, 1.0], 0.0, 0.0), [0.0] * 3
+    _, exact = limit_of(*given)
+    _, error = limit_of(*given, [[0.5, 0.5, 0.5], [-0.1, -0.15, -0.3]])
+    assert error - exact == pytest.approx(0.5 * 1.0 + 0.3)
+    _, growing = limit_of(*given, [[0.0, 0.0, 0.3]])  # two straight lines through ln τ differ by twice as much
+    assert growing - exact == pytest.approx(0.6)

@@ -19,10 +19,10 @@ COARSER = 1.5
 
 Its whole difference contains an error of an order from 1.7 on; one of first order is twice the difference.
 """
-# Of errors of the grid. On a tube between stiff stops (ω_n 250.7 s⁻¹, ζ 0.008, D = 4e-4), ln of the mean exit time is
-# too large by 0.58, 0.29 by the committor with 200 and 280 nodes along each side, and by 1.46, 0.72 by the density.
-_GAIN = 1.0 / (COARSER**2 - 1.0)
-"""Times what a coarser grid changes: what ever closer nodes would change."""
+# Times what a coarser grid changes: what ever closer nodes change if errors are of second order, as at the edges of
+# thin basins. On a tube between stiff stops (ω_n 250.7 s⁻¹, ζ 0.008, D = 4e-4), ln of the mean exit time is too large
+# by 0.58, 0.29 by the committor with 200 and 280 nodes along each side, and by 1.46, 0.72 by the density.
+_MOST_GAIN = 1.0 / (COARSER**2 - 1.0)
 _STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 
 Array = NDArray[np.float64]
@@ -69,40 +69,50 @@ class AtIntensity:
 
     @property
     def log_rates(self) -> dict[int, float]:
-        """By target: ln of the probability that leaves in one section interval, the mean of density and committor."""
+        """By target: ln of the probability that leaves in one section interval, the mean of density and committor.
+
+        Both are extrapolated to closer nodes, by as much as brings them together.
+        """
         return {target: float(self._extrapolated(target).mean()) for target in self.committors}
 
     @property
     def errors(self) -> dict[int, float]:
-        """By target: error estimate of ln rate.
+        """By target: error estimate of ln rate, the sum of what `changes` has and of what iteration leaves."""
+        return {
+            target: float(np.abs(self.changes(target)).sum()) + self.iteration_error(target)
+            for target in self.committors
+        }
 
-        It is the difference of density and committor, plus what a coarser grid changes, plus what fewer steps and
-        larger cores change, plus what iteration leaves.
+    def changes(self, target: int) -> Array:
+        """Return by how much ln rate changes in three ways, each with its sign, shape (3,); inf where not known.
+
+        It is the difference of density and committor, what a coarser grid changes, and what fewer steps together with
+        larger cores, or coarser basins, change.
         """
-        return {target: self._error(target) for target in self.committors}
-
-    def _error(self, target: int) -> float:
-        if self.coarser is None or self.rougher is None:
-            return math.inf
-        own, coarse = self._pair(target), self.coarser._pair(target)
-        if not np.isfinite([*own, *coarse]).all():
-            return math.inf
-        rough = self.rougher.log_rates.get(target, math.inf)
-        of_sets = abs(rough - self.coarser.found.log_rates[target])
-        of_grid = abs(float((own - coarse).mean()))
-        of_method = abs(float(np.diff(self._extrapolated(target))[0]))
+        own, coarse = self._pair(target), self._coarse_pair(target)
+        if self.rougher is None or not np.isfinite([*own, *coarse]).all():
+            return np.full(3, np.inf)
+        of_sets = self.rougher.log_rates.get(target, math.inf) - coarse[0]
         first_order = 1.0 / (COARSER - 1.0) if self.sharp else 1.0
-        of_iteration = (1.0 + _GAIN) * self._change(target) + _GAIN * self.coarser._change(target)
-        return of_method + of_grid + first_order * of_sets + of_iteration
+        return np.array([_gap(self._extrapolated(target)), (own - coarse).mean(), first_order * of_sets])
+
+    def iteration_error(self, target: int) -> float:
+        """Return the error of ln rate that iteration leaves."""
+        of_coarser = 0.0 if self.coarser is None else self.coarser._change(target)
+        return (1.0 + _MOST_GAIN) * self._change(target) + _MOST_GAIN * of_coarser
 
     def _extrapolated(self, target: int) -> Array:
-        """ln of both rates, by the density and by the committor, as they tend to with ever closer nodes."""
-        own = self._pair(target)
-        coarse = own if self.coarser is None else self.coarser._pair(target)
+        """ln of both rates, by the density and by the committor, extrapolated from both grids."""
+        own, coarse = self._pair(target), self._coarse_pair(target)
         if not np.isfinite([*own, *coarse]).all():
             return own
-        extrapolated: Array = own + _GAIN * (own - coarse)
+        closes = _gap(coarse) - _gap(own)
+        gain = float(np.clip(_gap(own) / closes, 0.0, _MOST_GAIN)) if closes else 0.0
+        extrapolated: Array = own + gain * (own - coarse)
         return extrapolated
+
+    def _coarse_pair(self, target: int) -> Array:
+        return np.full(2, np.nan) if self.coarser is None else self.coarser._pair(target)
 
     def _pair(self, target: int) -> Array:
         """ln of both rates on the own grid; NaN where there is none."""
@@ -112,7 +122,8 @@ class AtIntensity:
 
     def _change(self, target: int) -> float:
         """What iteration leaves of the mean of both rates on the own grid."""
-        return 0.5 * (self.found.change + self.committors[target].change)
+        known = self.committors.get(target)
+        return math.inf if known is None else 0.5 * (self.found.change + known.change)
 
     @property
     def converged(self) -> bool:
@@ -141,3 +152,8 @@ class AtIntensity:
         ratio = (self.intensity / intensity) ** _STEEPER
         committors = {target: grid.resampled(c.log_values, self.grid) * ratio for target, c in self.committors.items()}
         return grid.resampled(self.found.phi, self.grid) * ratio, committors
+
+
+def _gap(pair: Array) -> float:
+    """By how much the density's ln rate is above the committor's."""
+    return float(pair[0] - pair[1])
