@@ -109,6 +109,33 @@ def test_a_grid_that_cannot_resolve_the_density_is_refused_with_the_nodes_it_nee
     assert not found.energies
 
 
+def test_intensities_that_cannot_be_resolved_cost_no_others(structure):
+    given = (2e-2, 1.5e-2, 1.2e-2, 1e-4)
+    found = vk.SGCM(source=0, intensities=given, nodes=(72, 72), steps=8).run(WELL, structure)
+    assert [rate.intensity for rate in found.rates] == list(given[:3])
+    (failed,) = found.found(vk.Code.INTENSITY_FAILED)
+    assert failed.values["intensity"] == 1e-4
+    (energy,) = found.energies
+    assert energy.lower <= 0.05 <= energy.upper  # 4ζω_n times the barrier of 1/4
+
+
+@pytest.mark.slow
+def test_intensities_that_need_too_much_memory_cost_no_others(structure):
+    found = vk.SGCM(source=0, intensities=(2e-2, 1.5e-2, 2e-5), steps=8, max_memory_gib=0.005).run(WELL, structure)
+    assert [rate.intensity for rate in found.rates] == [2e-2, 1.5e-2]
+    (failed,) = found.found(vk.Code.INTENSITY_FAILED)
+    assert failed.values["intensity"] == 2e-5
+
+
+@pytest.mark.parametrize("given", [(2e-2,), (2e-2, 1e-4)])
+def test_one_intensity_gives_no_energy(given, structure):
+    found = vk.SGCM(source=0, intensities=given, nodes=(48, 48), steps=8).run(WELL, structure)
+    assert len(found.rates) == 1
+    assert not found.energies
+    (finding,) = found.found(vk.Code.ENERGY_NEEDS_RATES)
+    assert (finding.source, finding.target, finding.values["known"]) == (0, 1, 1)
+
+
 def test_a_rate_that_depends_on_the_nodes_is_uncertain(structure):
     found = vk.SGCM(source=0, intensities=(4e-3,), nodes=(64, 64), steps=8).run(WELL, structure)
     (rate,) = found.rates

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
 from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
-from vibrokit.analyzers.sgcm.energies import extrapolated
+from vibrokit.analyzers.sgcm.energies import limit_of
 from vibrokit.analyzers.sgcm.propagator import checked_noise
-from vibrokit.analyzers.sgcm.solution import AtIntensity, DensitySolver
+from vibrokit.analyzers.sgcm.solution import DensitySolver
+from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -70,8 +72,14 @@ class SGCM(Analyzer):
     -----
     A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
     reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Its error estimate is their difference, plus a fraction of the change with half the steps (or with a new sample),
-    plus the iteration error. An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ.
+    Both are extrapolated from two grids, whose spacings differ by a factor of 1.5, by as much as brings them together.
+    The error estimate is the difference of density and committor, plus all that the coarser grid changes, plus all that
+    steps 1.5 times as long and cores 1.5 times as large (or a new sample) change, plus the iteration error. So a target
+    that is not metastable, whose rate depends on its core, has a large error.
+
+    An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more;
+    its interval allows for a prefactor that is proportional to D or 1/D, and more if three or more intensities show
+    that. Intensities that the nodes cannot resolve are left out, with a finding.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
     1990), without its matrix of sampled transitions, which cannot contain a probability of 1e-9.
@@ -119,28 +127,45 @@ class SGCM(Analyzer):
             return Analysis(findings=limits)
         solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
         solved: list[AtIntensity] = []
+        unresolved: list[Unresolved] = []
         stopped: tuple[Finding, ...] = ()
         try:
-            solved.extend(solver.solve(wanted))
+            for one in solver.solve(wanted):
+                if isinstance(one, Unresolved):
+                    unresolved.append(one)
+                else:
+                    solved.append(one)
         except KeyboardInterrupt as interrupt:
             if not solved:
                 raise
             stopped = (Finding.stopped("density", interrupt, problem.source),)
+        if not solved:
+            raise StructureError(unresolved[-1].reason)
+        energies, more = _energies(problem, solved)
         return Analysis(
-            _energies(problem, solved),
+            energies,
             _data(problem, solver, solved),
-            (*limits, *_findings(problem, solved), *stopped),
+            (*limits, *_findings(problem, solved, unresolved), *more, *stopped),
             complete=not stopped,
         )
 
 
-def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[ActivationEnergy, ...]:
-    found = []
-    for target in solved[0].errors:
-        if not all(target in one.errors for one in solved):
+def _energies(
+    problem: ExitProblem, solved: list[AtIntensity]
+) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+    """The limits of the exits whose rates are known at two intensities at least."""
+    found, findings = list[ActivationEnergy](), list[Finding]()
+    for target in sorted({target for one in solved for target in one.errors}):
+        known = [one for one in solved if math.isfinite(one.errors.get(target, math.inf))]
+        if len(known) < 2:
+            findings.append(Finding.of(Code.ENERGY_NEEDS_RATES, problem.source, target, known=len(known)))
             continue
-        times = [-one.log_rates[target] for one in solved]
-        value, error = extrapolated([s.intensity for s in solved], times, [one.errors[target] for one in solved])
+        value, error = limit_of(
+            [one.intensity for one in known],
+            [-one.log_rates[target] for one in known],
+            [one.iteration_error(target) for one in known],
+            np.transpose([one.changes(target) for one in known]).tolist(),
+        )
         error += max(-value, 0.0)  # no energy is negative: a negative limit misses by that much at least
         lower, upper = max(value - error, 0.0), max(value, 0.0) + error
         found.append(
@@ -155,7 +180,7 @@ def _energies(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Activati
                 numerical_error=error,
             )
         )
-    return tuple(found)
+    return tuple(found), tuple(findings)
 
 
 def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]) -> xarray.Dataset:
@@ -220,9 +245,12 @@ def _committor(one: AtIntensity, target: int) -> NDArray[np.float64]:
     return np.full(one.grid.shape, np.nan) if known is None else resolved(known.log_values)
 
 
-def _findings(problem: ExitProblem, solved: list[AtIntensity]) -> tuple[Finding, ...]:
+def _findings(problem: ExitProblem, solved: list[AtIntensity], unresolved: list[Unresolved]) -> tuple[Finding, ...]:
     """What limits the rates."""
-    found = []
+    found = [
+        Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=one.intensity, reason=one.reason)
+        for one in unresolved
+    ]
     for one in solved:
         if not one.converged:
             found.append(

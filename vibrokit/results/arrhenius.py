@@ -33,6 +33,9 @@ class ArrheniusFit:
         ln τ and its standard errors.
     curvature, curvature_error : float
         Of ln τ against 1/D (m⁴ s⁻⁶), by a parabola; NaN with fewer than three intensities.
+    systematic : float
+        How far the slope may be from ΔU because the prefactor depends on D (m² s⁻³): what a prefactor proportional to D
+        or 1/D changes, or, if the slope drifts and that is more, the power of D that fits the rates.
     """
 
     slope: float
@@ -44,6 +47,7 @@ class ArrheniusFit:
     errors: Array
     curvature: float
     curvature_error: float
+    systematic: float
 
     @classmethod
     def of(cls, rates: Sequence[ExitRate]) -> ArrheniusFit:
@@ -57,20 +61,26 @@ class ArrheniusFit:
             )
         log_times = np.array([-rate.log_value for rate in known])
         errors = np.maximum([rate.log_error for rate in known], 1e-12)
-        line, spread = _fitted(1 / intensities, log_times, errors, 1)
+        places, powers = 1 / intensities, np.log(intensities)
+        line, spread = _fitted([places**0, places], log_times, errors)
         curvature, curvature_error = math.nan, math.nan
+        systematic = abs(float(_fitted([places**0, places], powers, errors)[0][1]))
         if len(known) > 2:
-            parabola, around = _fitted(1 / intensities, log_times, errors, 2)
+            parabola, around = _fitted([places**0, places, places**2], log_times, errors)
             curvature, curvature_error = 2 * float(parabola[2]), 2 * float(around[2])
+            if abs(curvature) > _DEVIATIONS * curvature_error:
+                of_power = float(_fitted([places**0, places, powers], log_times, errors)[0][1])
+                systematic = max(systematic, abs(of_power - float(line[1])))
         return cls(
             float(line[1]), float(spread[1]), float(line[0]), float(spread[0]),
-            intensities, log_times, errors, curvature, curvature_error,
+            intensities, log_times, errors, curvature, curvature_error, systematic,
         )  # fmt: skip
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The slope's interval of 95 % (m² s⁻³), if the line is straight."""
-        return self.slope - _DEVIATIONS * self.slope_error, self.slope + _DEVIATIONS * self.slope_error
+        """An interval for ΔU (m² s⁻³): that of 95 % for the slope, and what a prefactor that depends on D changes."""
+        error = _DEVIATIONS * self.slope_error + self.systematic
+        return self.slope - error, self.slope + error
 
     @property
     def drifts(self) -> bool:
@@ -84,10 +94,8 @@ class ArrheniusFit:
         return np.diff(self.log_times) / steps, np.hypot(self.errors[1:], self.errors[:-1]) / steps
 
 
-def _fitted(places: Array, values: Array, errors: Array, degree: int) -> tuple[Array, Array]:
-    """Coefficients of a weighted polynomial, the constant first, and their standard errors from the known errors."""
-    scale = places.max()
-    matrix = np.vander(places / scale, degree + 1, increasing=True) / errors[:, None]
-    inverse = np.linalg.pinv(matrix)
-    units = scale ** -np.arange(degree + 1.0)
-    return inverse @ (values / errors) * units, np.linalg.norm(inverse, axis=1) * units
+def _fitted(terms: Sequence[Array], values: Array, errors: Array) -> tuple[Array, Array]:
+    """Coefficients of a weighted sum of terms, and their standard errors from the known errors."""
+    units = np.array([np.abs(term).max() for term in terms])
+    inverse = np.linalg.pinv(np.stack(terms, axis=1) / units / errors[:, None])
+    return inverse @ (values / errors) / units, np.linalg.norm(inverse, axis=1) / units

@@ -257,7 +257,7 @@ class Code(StrEnum):
         "Free some space, or choose another place.",
     )  # fmt: skip
     INTENSITY_FAILED = (
-        "intensity-failed", WARNING, "{state} could not be simulated at D = {intensity:g}: {reason}", _SEE_REASON,
+        "intensity-failed", WARNING, "{state} could not be analyzed at D = {intensity:g}: {reason}", _SEE_REASON,
     )  # fmt: skip
     NO_EXIT_SEEN = (
         "no-exit-seen", WARNING,
@@ -335,6 +335,11 @@ class Code(StrEnum):
         "rate-uncertain", WARNING,
         "ln of the rate from {state} to {goal} at D = {intensity:g} has an error of about {error:.2g}, above "
         "{accepted:g}.", "Raise the number of nodes or of steps, or the noise intensity.",
+    )  # fmt: skip
+    ENERGY_NEEDS_RATES = (
+        "energy-needs-rates", INFO,
+        "The rate from {state} to {goal} is known at {known} of the noise intensities; an activation energy needs two.",
+        "Give several intensities.",
     )  # fmt: skip
     RATE_UNKNOWN = (
         "rate-unknown", WARNING,

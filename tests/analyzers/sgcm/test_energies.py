@@ -3,36 +3,58 @@
 import numpy as np
 import pytest
 
-from vibrokit.analyzers.sgcm.energies import extrapolated
+from vibrokit.analyzers.sgcm.energies import limit_of
 
-INTENSITIES = np.array([3.0, 2.0, 1.0])
-
-
-def test_a_straight_line_is_extrapolated_exactly():
-    value, error = extrapolated(INTENSITIES, (5.0 + 0.7 * INTENSITIES) / INTENSITIES, [0.0] * 3)
-    assert value == pytest.approx(5.0)
-    assert error == pytest.approx(0.0, abs=1e-12)
+ENERGY = 5.0
+LADDERS = [(1.5, 1.2, 1.0), (1.0, 0.7), (2.5, 0.8, 0.4, 0.25), (1.2, 0.3)]
 
 
-@pytest.mark.parametrize("bend", [0.1, -0.1])
-def test_the_error_of_a_parabola_contains_its_limit(bend):
-    value, error = extrapolated(INTENSITIES, (5.0 + 0.7 * INTENSITIES + bend * INTENSITIES**2) / INTENSITIES, [0.0] * 3)
-    assert abs(value - 5.0) <= error
+def log_times(intensities, power, bend):
+    """ln of D^−power exp(ΔU/D) with a correction of first order in D/ΔU, and a prefactor of 300."""
+    d = np.array(intensities)
+    return ENERGY / d - power * np.log(d) + bend * d / ENERGY + np.log(300.0)
+
+
+@pytest.mark.parametrize("intensities", LADDERS)
+def test_a_straight_line_is_extrapolated_exactly(intensities):
+    value, _ = limit_of(intensities, log_times(intensities, 0.0, 0.0), [0.0] * len(intensities))
+    assert value == pytest.approx(ENERGY, rel=1e-12)
+
+
+@pytest.mark.parametrize("intensities", LADDERS)
+@pytest.mark.parametrize("power", [-1.0, -0.5, 0.0, 0.5, 1.0])
+def test_the_error_contains_the_limit_of_a_prefactor_with_a_power_of_the_noise(intensities, power):
+    value, error = limit_of(intensities, log_times(intensities, power, 0.0), [0.0] * len(intensities))
+    assert abs(value - ENERGY) <= error * (1 + 1e-9)
+    assert error <= 1.5 * intensities[-2]
+
+
+@pytest.mark.parametrize("intensities", LADDERS)
+@pytest.mark.parametrize("bend", [1.0, -1.0])
+def test_the_error_contains_the_limit_of_the_next_order_of_kramers_formula(intensities, bend):
+    value, error = limit_of(intensities, log_times(intensities, 0.0, bend), [0.0] * len(intensities))
+    assert abs(value - ENERGY) <= error * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("power", [2.0, -3.0])
+def test_three_intensities_show_a_larger_power(power):
+    intensities = (1.5, 1.2, 1.0)
+    value, error = limit_of(intensities, log_times(intensities, power, 0.0), [0.0] * 3)
+    assert abs(value - ENERGY) <= error * (1 + 1e-9)
+    assert error > intensities[-2]
 
 
 def test_errors_of_rates_are_those_of_the_straight_line():
-    _, error = extrapolated(INTENSITIES, 5.0 / INTENSITIES, [0.0, 0.03, 0.01])
-    assert error == pytest.approx(np.hypot(2 * 0.01 * 1, 1 * 0.03 * 2))
+    given = [3.0, 2.0, 1.0], log_times([3.0, 2.0, 1.0], 0.0, 0.0)
+    _, exact = limit_of(*given, [0.0] * 3)
+    _, error = limit_of(*given, [0.0, 0.03, 0.01])
+    assert error - exact == pytest.approx(np.hypot(2 * 0.01 * 1, 1 * 0.03 * 2))
 
 
-def test_one_intensity_has_an_error_of_three_times_itself():
-    value, error = extrapolated([2.0], [4.0], [0.1])
-    assert (value, error) == (8.0, pytest.approx(6.2))
-
-
-@pytest.mark.parametrize("bend", [0.2, -0.2])
-def test_the_error_from_two_intensities_contains_the_limit_of_a_prefactor_like_kramers(bend):
-    """The first correction of Kramers' formula is of the order of D/ΔU, here 1/5 of D."""
-    d = np.array([1.0, 0.7])
-    value, error = extrapolated(d, (5.0 + 0.01 * d + bend * d**2) / d, [0.0, 0.0])
-    assert abs(value - 5.0) <= error
+def test_what_changes_all_rates_alike_changes_the_product_at_the_least_intensity():
+    given = [3.0, 2.0, 1.0], log_times([3.0, 2.0, 1.0], 0.0, 0.0), [0.0] * 3
+    _, exact = limit_of(*given)
+    _, error = limit_of(*given, [[0.5, 0.5, 0.5], [-0.1, -0.15, -0.3]])
+    assert error - exact == pytest.approx(0.5 * 1.0 + 0.3)
+    _, growing = limit_of(*given, [[0.0, 0.0, 0.3]])  # two straight lines through ln τ differ by twice as much
+    assert growing - exact == pytest.approx(0.6)

@@ -59,9 +59,10 @@ class Cores:
         """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
         return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
 
-    def on(self, grid: DensityGrid, intensity: float, every: int = 1) -> CoreSets:
-        """Return the cores on a grid; of basins, so many cells are made one."""
-        own = self._core(self.problem.attractor, grid, intensity)
+    def on(self, grid: DensityGrid, intensity: float, every: int = 1, larger: float = 1.0) -> CoreSets:
+        """Return the cores on a grid, larger by a factor; of basins, so many cells are made one."""
+        size = larger * CORE_SIZE
+        own = self._core(self.problem.attractor, grid, intensity, size)
         with np.errstate(divide="ignore"):
             entry: Array = self.start(grid, intensity) + np.log(own)
         if self.problem.exit.by_position:
@@ -70,7 +71,7 @@ class Cores:
         settled = targets_at(self.problem, intensity) or others  # exploration may take more noise than is asked for
         if self.problem.exit.at_boundary:
             return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
-        return CoreSets(own, {a.label: self._core(a, grid, intensity) for a in settled}, entry)
+        return CoreSets(own, {a.label: self._core(a, grid, intensity, size) for a in settled}, entry)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
@@ -123,8 +124,8 @@ class Cores:
         covered = grid.covered(lambda states: basins.at(states, every) == attractor.label)
         return np.minimum(covered, 1.0 - own)
 
-    def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float) -> Array:
-        covariances = CORE_SIZE**2 * intensity * self.covariances[attractor.label]
+    def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:
+        covariances = size**2 * intensity * self.covariances[attractor.label]
         ellipses = self._ellipses(attractor, covariances, _LEAST, grid)
         return grid.covered(lambda states: nearest(states, *ellipses) <= 1)
 

@@ -1,4 +1,4 @@
-"""Quasi-stationary densities and committors of an attractor, whose rates differ by what their errors are."""
+"""DensitySolver: quasi-stationary densities and committors of an attractor, on two grids."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sgcm.at_intensity import COARSER, AtIntensity, Unresolved
 from vibrokit.analyzers.sgcm.committor import Committor, committor
 from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
-from vibrokit.analyzers.sgcm.density_grid import DensityGrid, resolved
+from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, Transition, quasi_stationary
 from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
@@ -27,14 +28,10 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _CONVERGED = 1e-2  # change of ln rate that may be left by iteration
 _EXPLORED_TO = 0.1  # the same in exploration
-# Relaxations that must pass with all steps, which begin from the density with half of them. On hertz-0.570 at D = 2e-5,
-# ln of the rate after 2 differs by 0.004 from that after 4, and its error is 0.03.
+# Relaxations that must pass from a density that is solved with fewer steps or nodes. On hertz-0.570 at D = 2e-5, ln of
+# the rate after 2 differs by 0.004 from that after 4, and its error is 0.03.
 _ARRIVED = 2.0
 _EVERY = 2  # cells of the basins that are one for the estimate of what their size changes, which is of first order
-# A share of what halving the steps changes, as of third order; seen on double wells and hertz-0.570: 1/7 to 1/30. Edges
-# of sets that absorb at any time, or that are basins, are of first order, and all of the change counts.
-_STEP_ERROR = 1 / 7
-_STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 _BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
 _SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
 _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
@@ -46,79 +43,9 @@ _LARGEST = 640  # the same if more than the most are needed for the least width
 _EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
 _MARGIN = 3  # nodes around it
-_ALL_FLOWS = 2.6  # memory of all flows together, in units of the one with all steps
+_ALL_FLOWS = 3.2  # memory of all flows together, in units of the one with all steps on the finest grid
 
 Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class AtIntensity:
-    """The density that has not left an attractor, and how fast it leaves, at one intensity.
-
-    Attributes
-    ----------
-    intensity : float
-    grid : DensityGrid
-    found : QuasiStationary
-    transition : Transition
-    cores : CoreSets
-    committors : mapping of int to Committor
-        By target.
-    step_errors : mapping of int to float
-        By target: a share of what halving the steps changes in ln rate; basins are made coarser as well.
-    """
-
-    intensity: float
-    grid: DensityGrid
-    found: QuasiStationary
-    transition: Transition
-    cores: CoreSets
-    committors: Mapping[int, Committor] = dataclasses.field(default_factory=dict)
-    step_errors: Mapping[int, float] = dataclasses.field(default_factory=dict)
-
-    @property
-    def log_rates(self) -> dict[int, float]:
-        """By target: ln of the probability that leaves in one section interval, the mean of density and committor."""
-        return {target: 0.5 * (self.found.log_rates[target] + c.log_rate) for target, c in self.committors.items()}
-
-    @property
-    def errors(self) -> dict[int, float]:
-        """By target: error estimate of ln rate, which is the difference of both, and what steps and iteration add."""
-        return {
-            target: abs(self.found.log_rates[target] - c.log_rate)
-            + self.step_errors[target]
-            + self.found.change
-            + c.change
-            for target, c in self.committors.items()
-        }
-
-    @property
-    def converged(self) -> bool:
-        """Whether all iterations have ended by themselves."""
-        return self.found.converged and all(c.converged for c in self.committors.values())
-
-    @property
-    def log_density(self) -> Array:
-        """ln p; NaN where it is not resolved, because it is at the floor."""
-        return resolved(self.found.phi)
-
-    @property
-    def at_edge(self) -> float:
-        """ln of the probability at the outermost nodes."""
-        phi = self.found.phi
-        outermost = np.ones(phi.shape, dtype=bool)
-        outermost[1:-1, 1:-1] = False
-        return self.grid.mass(phi, outermost)
-
-    def begun(self, grid: DensityGrid, intensity: float) -> tuple[Array, dict[int, Array]]:
-        """Return ln p and, by target, ln of the committor to begin iteration from on another grid, at less noise.
-
-        The shape of −D ln p and of −D ln c depends little on D. Both begin lower than that: what is missing arrives
-        sooner than what is too much leaves, which may stay near a saddle for long.
-        """
-        ratio = (self.intensity / intensity) ** _STEEPER
-        committors = {target: grid.resampled(c.log_values, self.grid) * ratio for target, c in self.committors.items()}
-        return grid.resampled(self.found.phi, self.grid) * ratio, committors
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -144,36 +71,55 @@ class DensitySolver:
     max_memory_gib: float
     samples: int | None = None
 
-    def solve(self, intensities: Sequence[float]) -> Generator[AtIntensity, None, None]:
-        """Yield the solutions at some intensities, which must descend.
+    def solve(self, intensities: Sequence[float]) -> Generator[AtIntensity | Unresolved, None, None]:
+        """Yield what is found at some intensities, which must descend; first those that cannot be resolved.
 
-        Raises StructureError if the nodes are too far apart for the narrowest density, or need too much memory.
+        One cannot if the nodes are too far apart for its density, or need too much memory. Each of the others is solved
+        three times: roughly, on a coarser grid, and on the finest grid, each beginning from the one before.
         """
         with ExitStack() as stack:
             executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
             explored, closer = self.explored(intensities[0], executor)
-            grid = self._grid(closer.region, self._shape(closer, intensities[-1]))
-            self._check(grid, intensities[-1], _ALL_FLOWS)
-            flows = self._flow(grid, self.steps), self._flow(grid, self._half)
-            before, at_boundary = explored, self.problem.exit.at_boundary
-            share = 1.0 if at_boundary or self.problem.exit.by_position else _STEP_ERROR
-            for intensity in intensities:
-                start, committors = before.begun(grid, intensity)
-                transition, other = (self._transition(flow, intensity, executor) for flow in flows)
-                cores = self._cores.on(grid, intensity)
-                coarse = self._cores.on(grid, intensity, _EVERY) if at_boundary else cores
-                relaxation = self._cores.relaxation
-                long = quasi_stationary(other, start, coarse, relaxation, _CONVERGED)
-                found = quasi_stationary(transition, long.phi, cores, relaxation, _CONVERGED, _ARRIVED)
-                steps = {
-                    target: share * abs(rate - long.log_rates[target])
-                    for target, rate in found.log_rates.items()
-                    if target in long.log_rates
-                }
-                solved = self._committors(transition, found, cores, committors, _CONVERGED)
-                known = {target: solved[target] for target in steps}
-                before = AtIntensity(intensity, grid, found, transition, cores, known, steps)
+            grid, left = None, list(intensities)
+            while left and grid is None:
+                grid = self._grid(closer.region, self._shape(closer, left[-1]))
+                try:
+                    self._check(grid, left[-1], _ALL_FLOWS)
+                except StructureError as error:
+                    yield Unresolved(left.pop(), str(error))
+                    grid = None
+            if grid is None:
+                return
+            nx, nv = (math.ceil(count / COARSER) for count in grid.shape)
+            flow = self._flow(grid, self.steps)
+            coarse = self._flow(self._grid(closer.region, (nx, nv)), self.steps)
+            rough = dataclasses.replace(coarse, steps=self._fewer)
+            before = explored
+            for intensity in left:
+                rougher = self._rougher(rough, before, intensity, executor)
+                coarser = self._solved(coarse, before, intensity, executor, start=rougher.phi)
+                before = dataclasses.replace(
+                    self._solved(flow, coarser, intensity, executor), coarser=coarser, rougher=rougher
+                )
                 yield before
+
+    def _rougher(self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor) -> QuasiStationary:
+        """The density with fewer steps and larger cores, or coarser basins."""
+        cores = self._cores.on(flow.grid, intensity, _EVERY, COARSER)
+        transition, (start, _) = self._transition(flow, intensity, executor), before.begun(flow.grid, intensity)
+        return quasi_stationary(transition, start, cores, self._cores.relaxation, _CONVERGED)
+
+    def _solved(
+        self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor, start: Array | None = None
+    ) -> AtIntensity:
+        """The density and the committors on the grid of a flow, begun from those of another one."""
+        transition, cores = self._transition(flow, intensity, executor), self._cores.on(flow.grid, intensity)
+        begun, committors = before.begun(flow.grid, intensity)
+        begun = begun if start is None else start
+        found = quasi_stationary(transition, begun, cores, self._cores.relaxation, _CONVERGED, _ARRIVED)
+        known = self._committors(transition, found, cores, committors, _CONVERGED)
+        sharp = self.problem.exit.at_boundary or self.problem.exit.by_position
+        return AtIntensity(intensity, flow.grid, found, transition, cores, known, sharp=sharp)
 
     def guide(self, intensity: float, executor: Executor) -> AtIntensity:
         """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
@@ -204,7 +150,7 @@ class DensitySolver:
         grid = self._grid(self._cores.region(intensity), shape)
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
-            propagator = Propagator(self._flow(grid, self._half), stronger, executor)
+            propagator = Propagator(self._flow(grid, self._fewer), stronger, executor)
             cores, start = self._cores.on(grid, stronger), self._cores.start(grid, stronger)
             found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
@@ -259,9 +205,9 @@ class DensitySolver:
         return Cores(self.problem)
 
     @property
-    def _half(self) -> int:
-        """Half of the steps, to an even number."""
-        return max(2 * (self.steps // 4), 2)
+    def _fewer(self) -> int:
+        """Two thirds of the steps, or a little less, to an even number."""
+        return max(2 * math.floor(self.steps / (2 * COARSER)), 2)
 
     def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
         stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
