@@ -134,7 +134,7 @@ class _Found:
     budget: int = 0
     findings: tuple[Finding, ...] = ()
     stopped: Finding | None = None
-    refused: bool = False  # whether there is no such scene
+    refused: bool = False  # whether there is no such scene, or none that can have attractors
 
 
 @dataclasses.dataclass(eq=False)
@@ -267,7 +267,8 @@ def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> 
     try:
         structure = find_structure(there, cells=_FEW, saddles=False, manifolds=False, **given)
     except VibrokitError as error:
-        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),))
+        nothing = Finding.of(Code.NOTHING_AT, value=value, reason=str(error))
+        return _Found(value, findings=(nothing,), refused=there.model.undamped)
     # The few cells of this grid do not resolve the basins, which are found once all attractors are known.
     findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
     stopped = next(iter(structure.found(Code.STOPPED)), None)
