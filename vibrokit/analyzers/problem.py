@@ -92,6 +92,12 @@ class ExitProblem:
 
     def check_targets(self, method: str) -> None:
         """Refuse an exit for which a method has no attractor to reach; raises StructureError."""
+        running = [target.name for target in self.targets if target.turns]
+        if running and not self.exit.by_position:
+            raise StructureError(
+                f"{method}: {', '.join(running)} turns over and over, and {method} does not recognise motion that has "
+                "come to it far along x; use LeastAction, or an exit by position such as FirstContact()."
+            )
         if not self.targets and not self.exit.by_position:
             raise StructureError(
                 f"{method}: {self.attractor.name} is left by escape from the region only, and {method} needs another "
