@@ -13,8 +13,8 @@ class NoiseModel(Part):
     """Random force of intensity D, in the Itô sense. Abstract.
 
     White noise drives the velocity: dv = … dt + amplitude(x, v) √D dW. A model with extra states (coloured noise)
-    names them in `extra_states`; then the white noise drives the last of these, `drift` gives their rates without
-    noise, and `force` gives their force on the mass.
+    names them in `extra_states`, as it likes; then the white noise drives the last of these, `drift` gives their rates
+    without noise, and `force` gives their force on the mass.
 
     For developers
     --------------
