@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from vibrokit.parts.contact.contact_law import ContactLaw
 from vibrokit.parts.scene import Scene
 
 _PACKAGES = ("sympy", "numba", "llvmlite", "numpy")
@@ -35,7 +36,9 @@ def scene_fingerprint(scene: Scene) -> str:
     """Return text that is equal for two scenes exactly if the same generated code serves both."""
     rows = [environment()]
     rows += ["" if scene.spring is None else _part(scene.spring)]
-    rows += [f"{barrier.side} {barrier.adhesive} {_part(barrier.law)}" for barrier in scene.barriers]
+    rows += [
+        f"{barrier.side} {barrier.adhesive} {_part(barrier.law)} {_limits(barrier.law)}" for barrier in scene.barriers
+    ]
     rows += [_part(excitation) for excitation in scene.excitations]
     rows += ["" if scene.noise is None else f"{scene.noise.extra_states} {_part(scene.noise)}"]
     rows += [entry.path for entry in scene.entries]
@@ -63,6 +66,12 @@ def _part(part: Any) -> str:
     structural = [(d.name, part.parameters[d.name]) for d in part.declared() if d.structural]
     declared = [(d.name, d.symbol, d.minimum, d.above, d.structural) for d in part.declared()]
     return f"{structural} {declared} {_Walk().describe(type(part))}"
+
+
+def _limits(law: ContactLaw) -> str:
+    """What the limits of a law depend on besides its formula: the signs of its parameters, and where it vanishes."""
+    numbers = [law.parameters[d.name] for d in law.declared() if not d.structural]
+    return f"{[(number > 0) - (number < 0) for number in numbers]} {law.touch()}"
 
 
 class _Walk:

@@ -62,6 +62,11 @@ def parameter_symbols(scene: Scene) -> dict[str, Named]:
     return symbols
 
 
+def is_of_law(path: str) -> bool:
+    """Whether a parameter is one of a contact law."""
+    return ".law." in path
+
+
 def _free(name: str, taken: set[str]) -> str:
     """Return a name that is like no other one, also in generated code, and take it."""
     while plain(name) in taken or _SHOWN.fullmatch(name):
@@ -80,6 +85,8 @@ def _suffix(scene: Scene, entry: Entry) -> str:
 
 
 def _assumptions(entry: Entry) -> dict[str, Any]:
+    if is_of_law(entry.path):  # the limits of a law depend on the signs of its parameters
+        return {"positive": True} if entry.value > 0 else {"negative": True} if entry.value < 0 else {"zero": True}
     above, minimum = entry.declared.above, entry.declared.minimum
     if above is not None and above >= 0:
         return {"positive": True}
