@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import sympy
 
-from vibrokit import ContactLaw, Excitation, NoiseModel, Spring, parameter
-from vibrokit.parts.functions import Max, Rational, cos, sqrt
+from vibrokit import ContactLaw, Excitation, Hertz, NoiseModel, Spring, parameter
+from vibrokit.parts.functions import Rational, cos, sqrt
 
 
 def unchecked(part):
@@ -94,19 +94,6 @@ class IsComplex(ContactLaw):
         return self.stiffness * depth * sqrt(Rational(1, 2) - depth)
 
 
-class PullsAtRelease(ContactLaw):
-    """Tells the model that c ≥ 0, so that it sees nothing to guard, and holds a negative one."""
-
-    stiffness: float = parameter("k", "s^-2", minimum=0)
-    dissipation: float = parameter("c", "s m^-1", minimum=0)
-
-    def __post_init__(self):
-        object.__setattr__(self, "dissipation", -self.dissipation)
-
-    def force(self, depth, rate):
-        return self.stiffness * depth * (1 + self.dissipation * Max(0, -rate))
-
-
 class Staircase(ContactLaw):
     """SymPy has no derivative of it."""
 
@@ -132,50 +119,11 @@ class WrongSlope(ContactLaw):
         return self.stiffness * _Ramp(depth)
 
 
-class JumpsUnseen(ContactLaw):
-    """Tells the model that its exponent is positive and holds 0."""
-
-    stiffness: float = parameter("k", "s^-2", minimum=0)
-    exponent: float = parameter("n", "", above=0)
-
-    def __post_init__(self):
-        object.__setattr__(self, "exponent", 0.0)
-
-    def force(self, depth, rate):
-        return self.stiffness * depth**self.exponent
-
-
-class LosesItsFirstTerm(ContactLaw):
-    """Tells the model that its linear term is there and holds 0."""
-
-    linear: float = parameter("k", "s^-2", above=0)
-    quadratic: float = parameter("q", "m^-1 s^-2", minimum=0)
-
-    def __post_init__(self):
-        object.__setattr__(self, "linear", 0.0)
-
-    def force(self, depth, rate):
-        return self.linear * depth + self.quadratic * depth**2
-
-
-class RootedUnseen(ContactLaw):
-    """Tells the model that its rounding is positive and holds 0, so that a bare root is left."""
-
-    stiffness: float = parameter("k", "m^(1/2) s^-2", minimum=0)
-    rounding: float = parameter("r", "m", above=0)
-
-    def __post_init__(self):
-        object.__setattr__(self, "rounding", 0.0)
-
-    def force(self, depth, rate):
-        return self.stiffness * (sqrt(depth + self.rounding) - sqrt(self.rounding))
-
-
 class DoesNotCompile(ContactLaw):
     stiffness: float = parameter("k", "s^-2", minimum=0)
 
     def force(self, depth, rate):
-        return self.stiffness * sympy.erf(depth)
+        return self.stiffness * sympy.gamma(2 + depth)
 
 
 class _Inflated(sympy.Function):
@@ -269,6 +217,24 @@ class DependsOnTheProcess(ContactLaw):
         return self.stiffness * depth * (1 + os.getpid())
 
 
+class KelvinVoigt(ContactLaw):
+    """A sound law, which jumps at first touch, and pulls at release unless it is guarded."""
+
+    stiffness: float = parameter("k", "s^-2", above=0)
+    dissipation: float = parameter("c", "s^-1", above=0)
+
+    def force(self, depth, rate):
+        return self.stiffness * depth + self.dissipation * rate
+
+
+# The model derives these properties from a law and its values. No law misleads it, so that it is misled here.
+MISLED = [
+    ("never pulls", KelvinVoigt, {"clamped": False}),
+    ("jump at first touch", KelvinVoigt, {"jumps": False}),
+    ("leading power", Hertz, {"exponent": sympy.Integer(2)}),
+    ("smoothness at first touch", Hertz, {"rooted": False}),
+]
+
 LAWS = [
     ("construction", RefusesItsRange),
     ("symbols and units", HasNoUnit),
@@ -280,12 +246,8 @@ LAWS = [
     ("no force at rest at the stop", PushesAtRest),
     ("pushes back", Pulls),
     ("pushes back", IsComplex),
-    ("never pulls", PullsAtRelease),
     ("derivatives", Staircase),
     ("derivatives", WrongSlope),
-    ("jump at first touch", JumpsUnseen),
-    ("leading power", LosesItsFirstTerm),
-    ("smoothness at first touch", RootedUnseen),
     ("compiled", DoesNotCompile),
     ("compiled", CompilesToSomethingElse),
     ("frozen", HoldsAList),
@@ -327,7 +289,7 @@ class SpringThatDoesNotCompile(Spring):
     stiffness: float = parameter("kappa", "s^-2")
 
     def force(self, x, v):
-        return self.stiffness * sympy.erf(x)
+        return self.stiffness * sympy.gamma(2 + x)
 
 
 class SpringOfAProcess(Spring):
@@ -443,7 +405,7 @@ class Uncompiled(Excitation):
     amplitude: float = parameter("f", "m s^-2")
 
     def force(self, t):
-        return self.amplitude * sympy.erf(cos(t))
+        return self.amplitude * sympy.gamma(2 + cos(t))
 
     @property
     def period(self):
@@ -513,7 +475,7 @@ class WrongAmplitudeSlope(NoiseModel):
 
 class UncompiledAmplitude(NoiseModel):
     def amplitude(self, x, v):
-        return sympy.erf(v)
+        return sympy.gamma(2 + v)
 
 
 NOISE_MODELS = [

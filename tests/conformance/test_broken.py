@@ -1,10 +1,14 @@
 """For every check there is a part that is broken in just that way, and the check catches it."""
 
+import dataclasses
+
 import pytest
 
 from tests.conformance import broken
 from vibrokit import Constant, CubicSpring, Hertz, WhiteNoise
 from vibrokit.errors import UnknownNameError
+from vibrokit.kernels import kernel, store
+from vibrokit.symbolic import model
 from vibrokit.testing import (
     ConformanceError,
     check,
@@ -37,8 +41,21 @@ def test_caught(checks, name, part):
     assert text.endswith("."), text
 
 
+@pytest.mark.parametrize(("name", "law", "wrong"), broken.MISLED, ids=[name for name, *_ in broken.MISLED])
+def test_a_wrong_derivation_is_caught(name, law, wrong, tmp_path, monkeypatch):
+    """With a cache of its own: the code is that of no scene."""
+    derived = model.derive_contact
+    monkeypatch.setattr(model, "derive_contact", lambda *of: dataclasses.replace(derived(*of), **wrong))
+    monkeypatch.setattr(store, "cache_directory", lambda: tmp_path)
+    kernel._kernel.cache_clear()
+    with pytest.raises(ConformanceError, match="deriv"):
+        dict(contact_law_checks(law))[name]()
+    kernel._kernel.cache_clear()
+
+
 def test_every_check_of_a_law_has_a_law_that_it_catches():
-    assert {name for name, _ in contact_law_checks(Hertz)} == {name for name, _ in broken.LAWS}
+    caught = {name for name, _ in broken.LAWS} | {name for name, *_ in broken.MISLED}
+    assert {name for name, _ in contact_law_checks(Hertz)} == caught
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The cache of kernels: found again by another process, made anew exactly when the code must differ."""
 
 import functools
+import importlib
 import os
 import subprocess
 import sys
@@ -217,10 +218,27 @@ def module(**members):
     return made
 
 
-def function(text):
+def function(text, **attributes):
     space = {"__name__": "helpers_of_mine"}
     exec(f"def shape(depth):\n    return {text}\n", space)
+    vars(space["shape"]).update(attributes)
     return space["shape"]
+
+
+def enclosing(factor):
+    return lambda depth: factor * depth
+
+
+class Factor:
+    def __init__(self, value):
+        self.value = value
+
+    def times(self, depth):
+        return self.value * depth
+
+
+def callable_class(text):
+    return type("Shape", (), {"__call__": lambda self, depth: function(text)(depth), "__module__": "helpers_of_mine"})
 
 
 def shape_class(text):
@@ -243,6 +261,13 @@ BEHIND = {
     "object": ("thing.of(depth)", shape_class("depth*2")(), shape_class("depth*3")()),
     "other function": ("thing(depth)", sympy.sin, sympy.cos),
     "part": ("thing.stiffness*depth", vk.Hertz(2.0), vk.Hertz(3.0)),
+    "bound method": ("thing(depth)", Factor(2.0).times, Factor(3.0).times),
+    "method of a list": ("depth*thing(0)", [2.0].__getitem__, [3.0].__getitem__),
+    "callable object": ("thing(depth)", callable_class("depth*2")(), callable_class("depth*3")()),
+    "closure": ("thing(depth)", enclosing(2.0), enclosing(3.0)),
+    "default": ("thing(depth)", lambda depth, factor=2.0: factor * depth, lambda depth, factor=3.0: factor * depth),
+    "keyword default": ("thing(depth)", lambda depth, *, n=2.0: n * depth, lambda depth, *, n=3.0: n * depth),
+    "attribute of a function": ("thing.factor*depth", function("depth", factor=2.0), function("depth", factor=3.0)),
 }  # fmt: skip
 
 
@@ -258,6 +283,96 @@ def test_what_a_formula_takes_from_its_module_does(body, one, other):
     assert fingerprint(law) == before
     law.force.__func__.__globals__["unused"] = 3.0
     assert fingerprint(law) == before
+
+
+NOISE = """
+class Coloured(vk.NoiseModel):
+    extra_states = ('NAME',)
+    rate: float = vk.parameter('r', 's^-1', above=0)
+    sign = SIGN
+    def amplitude(self, x, v):
+        return self.rate
+    def force(self, y, push=PUSH):
+        return push * y
+    def drift(self, x, v, y):
+        return (self.sign * self.rate * y,)
+"""
+
+
+@pytest.mark.parametrize("module", [None, "__main__", "builtins", "numpy", "vibrokit", "vibrokit.parts.noise.white"])
+def test_a_class_without_source_is_described_by_its_code(module):
+    """`exec` without a module's name claims builtins; a name may be claimed by anything."""
+
+    def noise(name="y", sign="-1", push="1"):
+        space = {"vk": vk} | ({} if module is None else {"__name__": module})
+        text = NOISE.replace("NAME", name).replace("SIGN", sign).replace("PUSH", push)
+        exec(text, space)
+        return scene_fingerprint(scene(noise=space["Coloured"](0.02, 1.0)))
+
+    assert noise() == noise()
+    assert len({noise(), noise(name="h"), noise(sign="-2"), noise(push="2")}) == 4
+
+
+def test_a_right_class_after_a_wrong_one_gets_its_own_kernel():
+    def end(sign):
+        space = {"vk": vk}
+        exec(NOISE.replace("NAME", "h").replace("SIGN", sign).replace("PUSH", "1"), space)
+        osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, noise=space["Coloured"](0.02, 1.0))
+        return osc.trajectory((0.0, 0.0, 1.0), periods=1, stepper=vk.RK4(steps=64)).x[-1]
+
+    assert abs(end("1")) > 100  # grows like exp t
+    assert abs(end("-1")) < 1
+
+
+@pytest.mark.parametrize("how", ["import helper", "from helper import factor", "from . import helper"])
+def test_a_module_that_a_formula_imports_does(tmp_path, monkeypatch, how):
+    monkeypatch.syspath_prepend(tmp_path)
+    package = tmp_path / "mine_of_test"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    body = f"    def force(self, depth, rate):\n        {how}\n        return self.stiffness*depth*FACTOR"
+    head = "import vibrokit as vk\nclass Law(vk.ContactLaw):\n    stiffness: float = vk.parameter('k', '')\n"
+    (package / "laws.py").write_text(head + body.replace("FACTOR", "factor" if "factor" in how else "helper.factor"))
+    prints = []
+    for value in ("2.0", "30.0"):
+        for name in [name for name in sys.modules if name == "helper" or name.startswith("mine_of_test")]:
+            monkeypatch.delitem(sys.modules, name)
+        (package / "helper.py").write_text(f"factor = {value}")
+        (tmp_path / "helper.py").write_text(f"factor = {value}")
+        prints.append(fingerprint(importlib.import_module("mine_of_test.laws").Law(1.0)))
+    assert prints[0] != prints[1]
+
+
+def test_the_same_class_has_the_same_fingerprint_in_another_process(cache, tmp_path):
+    (tmp_path / "mine.py").write_text("""
+import dataclasses
+import vibrokit as vk
+
+@dataclasses.dataclass(frozen=True)
+class Shape:
+    power: float = 2.0
+    names: frozenset = frozenset(("a", "b", "c"))
+
+    def __call__(self, depth):
+        return depth**self.power
+
+SHAPE = Shape()
+
+class Law(vk.ContactLaw):
+    stiffness: float = vk.parameter("k", "")
+
+    def force(self, depth, rate):
+        return self.stiffness * SHAPE(depth)
+""")
+    code = """
+import hashlib, mine, vibrokit as vk
+from vibrokit.kernels.fingerprint import scene_fingerprint
+stops = [vk.Barrier(mine.Law(1.0), 0.5, "right")]
+osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.01, barriers=stops)
+print(hashlib.sha256(scene_fingerprint(osc).encode()).hexdigest())
+"""
+    runs = [python(code, cache, PYTHONPATH=str(tmp_path), PYTHONHASHSEED=seed) for seed in ("1", "2")]
+    assert runs[0] == runs[1]
 
 
 def test_the_code_follows_a_changed_global():

@@ -272,6 +272,12 @@ class TestOwnParts:
         with pytest.raises(ParameterError, match=r"Plain: offset must be a finite number, got nan\."):
             Plain(1.0, math.nan)
 
+    @pytest.mark.parametrize("name", ["force", "parameters", "declared", "twin", "replace", "variables", "formulas"])
+    def test_a_field_cannot_hide_what_every_part_has(self, name):
+        body = {"__annotations__": {name: float}, "formula": lambda self: 0}
+        with pytest.raises(TypeError, match=f"the field '{name}' would hide"):
+            type("Hiding", (vk.ContactLaw,), body)
+
     def test_a_structural_field_stays_a_number_in_the_twin(self):
         class Power(vk.ContactLaw):
             stiffness: float = vk.parameter("k", "", minimum=0)

@@ -16,7 +16,7 @@ from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.source import SceneText
-from vibrokit.symbolic.symbols import parameter_symbols
+from vibrokit.symbolic.symbols import code_name, parameter_symbols
 from vibrokit.testing.compiled import Pieces
 
 DIGITS = 160  # so that second differences are good to 50
@@ -219,7 +219,7 @@ def compiled(name, flow):
     """The compiled right-hand side of lanes, and the values of the parameters that it takes."""
     scene = CASES[name].scene
     module = kernel_for(scene, flow, Pieces()).module
-    values = dict(zip(map(str, parameter_symbols(scene).values()), theta_of(scene), strict=True))
+    values = dict(zip(map(code_name, parameter_symbols(scene).values()), theta_of(scene), strict=True))
     names = list(inspect.signature(module.derivative.py_func).parameters)
     return module, [values[name] for name in names[names.index("f") + 1 :]]
 

@@ -37,7 +37,7 @@ def everything():
 def test_the_whole_scene_has_it_all(flow):
     """So that the absences below mean something."""
     found = words(source(everything(), flow))
-    assert {"k_r", "k_l", "b_r", "b_l", "forcing", "tabulate", "cos", "phi"} <= found
+    assert {"u_k_r", "u_k_l", "u_b_r", "u_b_l", "forcing", "tabulate", "cos", "u_phi"} <= found
     assert ("amplitude" in found) == (flow is Flow.NOISY)
     assert ("p_1" in found) == (flow in (Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL))
 
@@ -48,10 +48,10 @@ def test_one_side_has_no_trace_of_the_other(flow, stop, other):
     text = source(scene(stop, excitations=(vk.Harmonic(0.1, 0.5),), noise=vk.WhiteNoise(1e-3)), flow)
     assert "barriers.1" not in text
     assert other not in text.replace("LEFT_REGION", "").lower()
-    assert not [word for word in words(text) if re.fullmatch(r"C1.*|d1_\d+|touching1|[kb]_[rl]", word)]
+    assert not [word for word in words(text) if re.fullmatch(r"C1.*|d1_\d+|touching1|u_[kb]_[rl]", word)]
     assert text.count("sqrt(") <= source(everything(), flow).count("sqrt(")
-    assert ("x - b" in text) == (stop is RIGHT)
-    assert ("b - x" in text) == (stop is LEFT)
+    assert ("x - u_b" in text) == (stop is RIGHT)
+    assert ("u_b - x" in text) == (stop is LEFT)
 
 
 @pytest.mark.parametrize("flow", list(Flow), ids=lambda flow: flow.value)
@@ -66,7 +66,7 @@ def test_no_stops_no_contact_code(flow):
 @pytest.mark.parametrize("excitations", [(), (vk.Constant(0.2),)], ids=["nothing", "constant"])
 def test_unforced_has_no_time(flow, excitations):
     text = source(scene(RIGHT, excitations=excitations, noise=vk.WhiteNoise(1e-3)), flow)
-    assert not words(text) & {"forcing", "tabulate", "table", "cos", "sin", "omega", "phi", "f", "t", "elapsed"}
+    assert not words(text) & {"forcing", "tabulate", "table", "cos", "sin", "u_omega", "u_phi", "f", "t", "elapsed"}
     parts = functions(text)
     assert "f" not in arguments(parts["derivative"])
     assert arguments(parts["step_lanes"]) == ["z", "forces", "normals", "theta", "room", "h", "steps"]
@@ -120,7 +120,7 @@ def test_generated_modules_read_well(flow):
     used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     assert len(imported) == len(set(imported))
     assert set(imported) <= used
-    assert "theta[3] = barriers.0.law.stiffness (k_r)" in ast.get_docstring(tree)
+    assert "theta[3] = barriers.0.law.stiffness (u_k_r)" in ast.get_docstring(tree)
     assert not re.search(
         r"\*\*|\bpow\(|select\(|Heaviside|DiracDelta|\n{4}",
         text.split('"""')[2].replace("@njit(**", ""),
@@ -141,7 +141,7 @@ class TestAperiodic:
     osc = scene(RIGHT, excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5)))
 
     def test_the_equations_hold_both(self):
-        assert {"omega_0", "omega_1"} <= words(source(self.osc))
+        assert {"u_omega_0", "u_omega_1"} <= words(source(self.osc))
         assert str(self.osc.model).count("cos(") == 2
 
     def test_the_trajectory_runs_by_duration(self):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import SceneError, StepperError, shown
 from vibrokit.kernels import store
-from vibrokit.kernels.fingerprint import environment, scene_fingerprint
+from vibrokit.kernels.fingerprint import emitter_fingerprint, environment, scene_fingerprint
 from vibrokit.kernels.links import addresses, linked
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.kernels.template import read_template, with_needed_imports
@@ -149,7 +149,8 @@ def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
     if not isinstance(stepper, Emitter):
         raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
     stepper.check(scene, flow)
-    return _kernel(scene_fingerprint(scene), flow, stepper.name, _Sources(scene, flow, stepper))
+    fingerprint = f"{scene_fingerprint(scene)}\n{emitter_fingerprint(stepper)}"
+    return _kernel(fingerprint, flow, _Sources(scene, flow, stepper))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -168,9 +169,9 @@ class _Sources:
 
 
 @functools.lru_cache(maxsize=256)
-def _kernel(fingerprint: str, flow: Flow, stepper: str, sources: _Sources) -> Kernel:
-    digest = hashlib.sha256(f"{fingerprint}\n{flow.value}\n{stepper}".encode()).hexdigest()[:24]
-    name = f"vibrokit_{flow.value}_{stepper}_{digest}"
+def _kernel(fingerprint: str, flow: Flow, sources: _Sources) -> Kernel:
+    digest = hashlib.sha256(f"{fingerprint}\n{flow.value}".encode()).hexdigest()[:24]
+    name = f"vibrokit_{flow.value}_{sources.stepper.name}_{digest}"
     kernel = _stored(name)
     if kernel is None:
         with compiling():

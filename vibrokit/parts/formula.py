@@ -45,6 +45,8 @@ _ALLOWED = "a formula has numbers, names, functions, + - * / ** ( ) and commas"
 _STRANGE = re.compile(r"[^\w +\-*/(),.]", re.ASCII)
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")  # among Python's constants: not 0x10, 1_000, 1j or True
 
+_LOGARITHM = "log()"  # among names: that of something that varies
+
 T = TypeVar("T")
 
 
@@ -114,6 +116,52 @@ def _parsed(text: str) -> ast.expr:
             raise refusal(text, (error.offset or len(text)) - 1, f"{reason}; {_ALLOWED}") from None
         except (ValueError, RecursionError, MemoryError):
             raise refusal(text, 0, "it is nested too deeply; make it simpler") from None
+
+
+@functools.lru_cache(maxsize=256)
+def in_exponents(text: str, variables: tuple[str, ...]) -> frozenset[str]:
+    """Return the names in exponents of what varies with `variables`, in a formula that was read before.
+
+    They decide how smooth the formula is, as numbers in their places would. ``exp(n*log(x))`` is a power too.
+    """
+    found: set[str] = set()
+
+    def names(node: ast.expr, parts: list[frozenset[str]]) -> frozenset[str]:
+        below = frozenset[str]().union(*parts)
+        match node:
+            case ast.BinOp(op=ast.Pow()) if not parts[0].isdisjoint(variables):
+                found.update(parts[1])
+            case ast.Call(func=ast.Name(id="log")) if not below.isdisjoint(variables):
+                return below | {_LOGARITHM}
+            case ast.Call(func=ast.Name(id="exp")) if _LOGARITHM in below:
+                found.update(below)
+            case ast.Name(id=name):
+                return frozenset((name,))
+        return below
+
+    fold(_parsed(text.strip(" ")), names)
+    return frozenset(found - {*variables, "pi", _LOGARITHM})
+
+
+def evaluate(text: str, values: Mapping[str, float]) -> float:
+    """Return the number that a formula that was read before has for some values of its names; NaN if it has none."""
+
+    def number(node: ast.expr, parts: list[float]) -> float:
+        match node:
+            case ast.Constant(value=int() | float() as value):
+                return float(value)
+            case ast.Name(id=name):
+                return math.pi if name == "pi" else float(values[name])
+            case ast.Call(func=ast.Name(id=name)):
+                return float(FUNCTIONS[name](*parts))
+            case ast.BinOp(op=operation) | ast.UnaryOp(op=operation):
+                return float(OPERATIONS[type(operation)](*parts))
+        raise TypeError(f"{type(node).__name__} is not arithmetic")
+
+    try:
+        return fold(_parsed(text.strip(" ")), number)
+    except (ArithmeticError, ValueError, TypeError):  # a power may be complex
+        return math.nan
 
 
 def fold(tree: ast.expr, visit: Callable[[ast.expr, list[T]], T]) -> T:

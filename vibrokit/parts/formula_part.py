@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from vibrokit.parts.formula import check_parameter_names, read
+from vibrokit.parts.formula import check_parameter_names, in_exponents, read
 from vibrokit.parts.parameter import Parameter
 
 
@@ -13,7 +13,8 @@ class FormulaPart:
     """Base of the custom parts: a formula as text, and named constants that it may use.
 
     The constants are parameters: they must be finite, have symbols, are saved in scene files, and can be changed
-    without recompilation. The formula is structural.
+    without recompilation. The formula is structural, and so are constants in exponents of what varies: ``k*depth**n``
+    with n = 1.5 is treated like ``k*depth**1.5``.
     """
 
     variables: ClassVar[tuple[str, ...]]
@@ -41,7 +42,9 @@ class FormulaPart:
     def declared(self) -> tuple[Parameter, ...]:
         """Parameters of this part: its own, the formula (structural), then each constant."""
         formula = Parameter(self.formula_name, "formula", self.formula_name, "", structural=True)
-        return (*self._own(), formula, *(Parameter(name, name, name, "") for name, _ in self.constants))
+        shaping = in_exponents(self.formula, self.variables)
+        constants = (Parameter(name, name, name, "", structural=name in shaping) for name, _ in self.constants)
+        return (*self._own(), formula, *constants)
 
     def _value(self, declared: Parameter) -> Any:
         constants = dict(self.constants)

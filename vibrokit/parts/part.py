@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import inspect
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed
 from vibrokit.errors import ParameterError, nearest
+from vibrokit.parts.exponents import exponents
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
 
 
@@ -26,6 +27,8 @@ class Part(ABC, metaclass=Constructed):
     derivatives, compiled kernels and the conformance kit follow from these.
     """
 
+    variables: ClassVar[tuple[str, ...]]
+    """Names of the arguments of a formula."""
     _declared: ClassVar[tuple[Parameter, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -38,15 +41,34 @@ class Part(ABC, metaclass=Constructed):
                     f"{kind} and write the whole formula."
                 )
         dataclasses.dataclass(frozen=True, repr=False)(cls)
+        cls._check_fields()
         del cls.__setattr__, cls.__delattr__  # Part has its own; an explicit decorator may add them again
         cls._declared = declared_parameters(cls)
+
+    @classmethod
+    def _check_fields(cls) -> None:
+        """Refuse a field with the name of something else that every part of its kind has."""
+        for base in cls.__mro__[1:]:
+            own = {field.name for field in dataclasses.fields(base)} if dataclasses.is_dataclass(base) else set()
+            for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+                if issubclass(base, Part) and field.name in vars(base) and field.name not in own:
+                    raise TypeError(
+                        f"{cls.__name__}: the field {field.name!r} would hide what every {base.__name__} has by that "
+                        "name; give the field another name, and its parameter the name that you want by "
+                        f"parameter(..., name={field.name!r})."
+                    )
+
+    @classmethod
+    def is_ours(cls) -> bool:
+        """Whether the class comes with the toolkit."""
+        return cls.__module__.startswith("vibrokit.")
 
     @classmethod
     def _is_final(cls) -> bool:
         return not inspect.isabstract(cls) and ABC not in cls.__bases__
 
     def __post_init__(self) -> None:
-        for declared in self.declared():
+        for declared in self._declared:
             value = getattr(self, declared.attribute)
             number = declared.checked(type(self).__name__, value)
             if isinstance(value, float) or not declared.structural:  # a structural Fraction stays exact
@@ -59,8 +81,16 @@ class Part(ABC, metaclass=Constructed):
         raise dataclasses.FrozenInstanceError(f"{type(self).__name__}: {name} cannot be deleted.")
 
     def declared(self) -> tuple[Parameter, ...]:
-        """Parameters of this part, in order."""
-        return self._declared
+        """Parameters of this part, in order; one that stands in an exponent is structural, declared so or not."""
+        if self.is_ours():  # declared where they are written; no SymPy is needed to find them
+            return self._declared
+        fixed = tuple((d.name, self._value(d)) for d in self._declared if d.structural)
+        shaping = exponents(type(self), fixed)
+        return tuple(dataclasses.replace(d, structural=d.structural or d.name in shaping) for d in self._declared)
+
+    def formulas(self, argument: Callable[[str], Any]) -> tuple[Any, ...]:
+        """Return all formulas of this part, for arguments that `argument` makes from their names."""
+        return (self.force(*map(argument, self.variables)),)  # type: ignore[attr-defined]
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -88,6 +118,6 @@ class Part(ABC, metaclass=Constructed):
         The formula method of the twin returns the formula as a SymPy expression.
         """
         twin = object.__new__(type(self))
-        for declared in self.declared():
+        for declared in self._declared:
             object.__setattr__(twin, declared.attribute, values[declared.name])
         return twin

@@ -71,6 +71,7 @@ class Scene(metaclass=Constructed):
         object.__setattr__(self, "excitations", _checked_parts("excitations", self.excitations, Excitation))
         if self.noise is not None:
             _checked_parts("noise", (self.noise,), NoiseModel)
+            _check_names(self.noise)
         if self.spring is not None:
             _checked_parts("spring", (self.spring,), Spring)
         self._check_stops()
@@ -255,6 +256,16 @@ def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:
         if not isinstance(part, kind):
             raise SceneError(f"scene: {name} must be of type {kind.__name__}, got {shown(part)}.")
     return found
+
+
+def _check_names(noise: NoiseModel) -> None:
+    names: Any = noise.extra_states
+    fits = isinstance(names, tuple) and all(isinstance(name, str) and name for name in names)
+    if not fits or len(set(names)) < len(names):
+        raise SceneError(
+            f"scene: {type(noise).__name__}.extra_states must be a tuple of distinct names, such as ('y',), got "
+            f"{shown(names)}."
+        )
 
 
 def _replaced(owner: Any, path: list[str], value: Any) -> Any:

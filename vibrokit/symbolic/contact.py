@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
-from vibrokit.symbolic.formulas import derived_formula
+from vibrokit.symbolic.formulas import derived_formula, exact
 from vibrokit.symbolic.friction import refuse_friction
 
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
 
+_BRANCHES = (sympy.Max, sympy.Min, sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Piecewise)
 _ANALYTIC = (sympy.exp, sympy.sin, sympy.cos, sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan)  # on the real axis
 
 
@@ -35,6 +37,8 @@ class DerivedContact:
         True if the force is smooth in √depth but not in depth.
     smooth : bool
         True if the force is smooth in depth or √depth, so that located contacts keep the full order of a stepper.
+    values : mapping
+        Values of the parameters of the law.
     """
 
     law: sympy.Expr
@@ -43,6 +47,7 @@ class DerivedContact:
     exponent: sympy.Expr | None
     rooted: bool
     smooth: bool
+    values: Mapping[sympy.Symbol, sympy.Expr]
 
     @property
     def conservative(self) -> bool:
@@ -52,26 +57,30 @@ class DerivedContact:
     @property
     def bends(self) -> bool:
         """True if first derivatives of the force jump, at first touch or where the force is set to zero."""
-        return self.clamped or self.jumps or _bends(self.law)
+        return self.clamped or self.jumps or _bends(self.law, self.values)
 
 
 def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_frequency: float) -> DerivedContact:
     """Derive the formula and the properties of the law of a barrier in a scene of this natural frequency (s⁻¹).
 
+    Signs of its parameters are known; a minimum or a maximum that they do not decide at touch is decided by values.
     Raises DerivationError if the force is unbounded at first touch, or jumps in the rate.
     """
+    values = {symbol: exact(barrier.law.parameters[name]) for name, symbol in symbols.items()}
     law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
     refuse_friction(barrier.law, law, RATE, symbols, natural_frequency)
+    law = law.xreplace({symbol: sympy.Integer(0) for symbol in values if symbol.is_zero})
     analytic = _analytic(law, DEPTH)
     root = sympy.Symbol("root", positive=True)
     smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)
     return DerivedContact(
         law=law,
-        jumps=_jumps(law),
+        jumps=_jumps(law, values),
         clamped=not barrier.adhesive and not law.is_nonnegative,
         exponent=_leading_power(law),
         rooted=smooth and not analytic,
         smooth=smooth,
+        values=values,
     )
 
 
@@ -97,8 +106,8 @@ def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:
     return True
 
 
-def _jumps(law: sympy.Expr) -> bool:
-    at_touch = _at_touch(law)
+def _jumps(law: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> bool:
+    at_touch = _at_touch(law, values)
     if at_touch is None:
         return True
     if at_touch.has(sympy.oo, -sympy.oo, sympy.zoo):
@@ -109,18 +118,23 @@ def _jumps(law: sympy.Expr) -> bool:
     return sympy.simplify(at_touch) != 0
 
 
-def _bends(law: sympy.Expr) -> bool:
-    at_touch = _at_touch(sympy.diff(law, DEPTH))
+def _bends(law: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> bool:
+    at_touch = _at_touch(sympy.diff(law, DEPTH), values)
     return at_touch is None or (at_touch.is_infinite is not True and sympy.simplify(at_touch) != 0)
 
 
-def _at_touch(expression: sympy.Expr) -> sympy.Expr | None:
+def _at_touch(expression: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> sympy.Expr | None:
     """Limit at first touch from inside; None if SymPy cannot find it."""
     try:
         value = expression.subs(DEPTH, 0)
-        return sympy.limit(expression, DEPTH, 0, "+") if value.has(sympy.nan, sympy.zoo, sympy.oo) else value
+        if value.has(sympy.nan, sympy.zoo, sympy.oo):
+            value = sympy.limit(expression, DEPTH, 0, "+")
     except (NotImplementedError, ValueError):
         return None
+    if value.has(sympy.Limit):
+        return None
+    undecided = {node for node in value.atoms(*_BRANCHES) if node.free_symbols <= values.keys()}
+    return value.xreplace({node: node.subs(values) for node in undecided})
 
 
 def _leading_power(law: sympy.Expr) -> sympy.Expr | None:

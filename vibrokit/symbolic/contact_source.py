@@ -8,6 +8,7 @@ from vibrokit.symbolic.contact import DEPTH, RATE
 from vibrokit.symbolic.flow import FlowEquations
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import SourcePrinter, assignments, printable
+from vibrokit.symbolic.symbols import code_name
 
 _TINY = "1e-300"
 _SIDE = sympy.Symbol("side")
@@ -75,7 +76,7 @@ class ContactWriter:
         return terms
 
     def _depth_and_rate(self, stop: int) -> tuple[str, str]:
-        position = self.model.symbols[f"barriers.{stop}.position"]
+        position = code_name(self.model.symbols[f"barriers.{stop}.position"])
         if self.model.scene.barriers[stop].sign > 0:
             return f"x - {position}", "v"
         return f"{position} - x", "-v"
@@ -104,7 +105,8 @@ class ContactWriter:
         head = [f"    depth = {near}", f"    other = {far}"]
         head += [f"    nearer = on{first}" if switched else "    nearer = depth > other"]
         head += ["    depth = depth if nearer else other", f"    side = {sign} if nearer else {-sign}"]
-        head += [f"    {one} = {one} if nearer else {other}" for one, other in self._partners()]
+        partners = [(code_name(one), code_name(other)) for one, other in self._partners()]
+        head += [f"    {one} = {one} if nearer else {other}" for one, other in partners]
         touching = f"on{first} or on{second}" if switched else ""
         return [*head, *self._guarded_terms(first, _SIDE, "side*v", "d", touching)]
 

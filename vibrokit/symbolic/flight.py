@@ -7,7 +7,7 @@ import contextlib
 import sympy
 
 from vibrokit.errors import StepperError
-from vibrokit.symbolic.flow import FORCING, FlowEquations
+from vibrokit.symbolic.flow import ACTION, FORCING, FlowEquations
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import SourcePrinter, unpack
 
@@ -24,14 +24,14 @@ class FlightWriter:
 
     def __init__(self, model: Model, equations: FlowEquations) -> None:
         self.model = model
-        self.variables = equations.variables
+        self.variables, self.covariances = equations.variables, equations.covariances
         no_contact = dict.fromkeys(equations.contacts, sympy.Integer(0))
         self.rates = [sympy.expand(rate.xreplace(no_contact)) for rate in equations.rates]
         self.waves = sinusoids(model)
         self.polynomials = [self._polynomial(*pair) for pair in zip(self.variables, self.rates, strict=True)]
 
     def _polynomial(self, variable: sympy.Symbol, rate: sympy.Expr) -> sympy.Poly:
-        allowed = 2 if str(variable) == "S" else 1
+        allowed = 2 if variable == ACTION else 1
         with contextlib.suppress(sympy.PolynomialError):
             polynomial = sympy.Poly(rate, *self.variables, FORCING)
             used = set().union(*(coefficient.free_symbols for coefficient in polynomial.coeffs()))
@@ -53,7 +53,7 @@ class FlightWriter:
         for rate in self.rates[2 : 2 + len(extra)]:
             bounds.append(sum(sympy.Abs(sympy.diff(rate, variable)) for variable in self.model.state))
         # A covariance decays at the sum of two rates of the motion.
-        pairs = [(v, rate) for v, rate in zip(self.variables, self.rates, strict=True) if str(v).startswith("W")]
+        pairs = [pair for pair in zip(self.variables, self.rates, strict=True) if pair[0] in self.covariances]
         bounds += [sympy.Abs(own) for own in dict.fromkeys(sympy.diff(rate, v) for v, rate in pairs) if own != 0]
         text, *others = map(SourcePrinter().doprint, bounds)
         for other in others:

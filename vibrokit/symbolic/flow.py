@@ -13,6 +13,7 @@ from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.model import Model
 
 FORCING = sympy.Symbol("f", real=True)
+ACTION = sympy.Symbol("S", real=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,6 +23,7 @@ class FlowEquations:
     variables: tuple[sympy.Symbol, ...]
     rates: tuple[sympy.Expr, ...]  # in the variables, the parameters, FORCING and the symbols of `contacts`
     contacts: dict[sympy.Symbol, tuple[int, int, int]]  # stop, orders in x and in v of each needed contact term
+    covariances: tuple[sympy.Symbol, ...]  # among the variables
 
 
 class ReversedModel(Model):
@@ -81,28 +83,31 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
         rates += [-sympy.diff(hamiltonian, q) for q in model.state]
         if flow is Flow.HAMILTONIAN_VARIATIONAL:
             linear = sympy.Matrix(rates).jacobian(list(phase))
-        variables = (*phase, sympy.Symbol("S", real=True))
+        variables = (*phase, ACTION)
         rates.append(model.action_rate)
     if linear is not None:
         size = linear.shape[0]
         matrix = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"m_{i}{j}", real=True))
         variables = (*variables, *matrix)
         rates += list(linear * matrix)
+    covariances: tuple[sympy.Symbol, ...] = ()
     if flow.has_covariance:
         size = len(model.state)
         places = [(row, column) for row in range(size) for column in range(row, size)]
         covariance = sympy.Matrix(size, size, lambda i, j: sympy.Symbol(f"W{min(i, j)}{max(i, j)}", real=True))
         carried = drift.jacobian(list(model.state)) * covariance
         gathered = carried + carried.T + model.diffusion
-        variables = (*variables, *(covariance[place] for place in places))
+        covariances = tuple(covariance[place] for place in places)
+        variables = (*variables, *covariances)
         rates += [gathered[place] for place in places]
-    return _with_plain_contacts(model, opaque, variables, rates)
+    rates, contacts = _with_plain_contacts(model, opaque, rates)
+    return FlowEquations(variables, tuple(rates), contacts, covariances)
 
 
 def _with_plain_contacts(
-    model: Model, opaque: tuple[sympy.Expr, ...], variables: tuple[sympy.Symbol, ...], rates: list[sympy.Expr]
-) -> FlowEquations:
-    """Replace the force of each stop and its derivatives by one symbol each; what is always 0 is left out."""
+    model: Model, opaque: tuple[sympy.Expr, ...], rates: list[sympy.Expr]
+) -> tuple[list[sympy.Expr], dict[sympy.Symbol, tuple[int, int, int]]]:
+    """Replace the force of each stop and its derivatives by one symbol each, and say which; what is 0 is left out."""
     x, v = model.state[:2]
     contacts: dict[sympy.Symbol, tuple[int, int, int]] = {}
     replacements = {}
@@ -120,4 +125,4 @@ def _with_plain_contacts(
                 contacts[symbol] = (index, a, b)
     rates = [rate.doit().xreplace(replacements) for rate in rates]
     needed = set().union(*(rate.free_symbols for rate in rates))
-    return FlowEquations(variables, tuple(rates), {s: c for s, c in contacts.items() if s in needed})
+    return rates, {s: c for s, c in contacts.items() if s in needed}

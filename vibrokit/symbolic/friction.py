@@ -57,11 +57,11 @@ def refuse_friction(
     names = {symbol: name for name, symbol in values.items() if symbol in force.free_symbols}
     numbers = {symbol: float(part.parameters[name]) for symbol, name in names.items()}
     others = sorted(force.free_symbols - {speed}, key=str)
-    value = sympy.lambdify([speed, *others], force, "mpmath")
+    value = sympy.lambdify([speed, *others], force, "mpmath", dummify=True)
     fixed = set().union(*(power.exp.free_symbols for power in force.atoms(sympy.Pow))) & set(numbers)
     with mpmath.workdps(_DIGITS):
         for switch in switches:
-            argument = sympy.lambdify([speed, *others], switch, "mpmath")
+            argument = sympy.lambdify([speed, *others], switch, "mpmath", dummify=True)
             for point in _points(others, numbers, fixed):
                 if _jump(value, argument, point) > 0:
                     steps = [_jump(value, argument, each) for each in _points(others, numbers, set(numbers), 3)]
@@ -95,7 +95,8 @@ def _points(
         point = []
         for symbol in others:
             size = 10.0 ** rng.uniform(-_DECADES, _DECADES)
-            drawn = size if symbol.is_nonnegative else size * rng.choice([-1.0, 1.0])
+            sign = 1.0 if symbol.is_nonnegative else -1.0 if symbol.is_negative else rng.choice([-1.0, 1.0])
+            drawn = size * sign
             kept = symbol in fixed or (draw == 0 and symbol in numbers)
             point.append(mpmath.mpf(numbers[symbol] if kept else float(drawn)))
         yield point

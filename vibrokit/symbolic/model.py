@@ -12,10 +12,10 @@ from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
 from vibrokit.symbolic.domain import Domain, border_ahead
-from vibrokit.symbolic.formulas import derived_formula
+from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.friction import refuse_friction
 from vibrokit.symbolic.printer import as_latex, as_text
-from vibrokit.symbolic.symbols import parameter_symbols
+from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
 
 
 class Model:
@@ -36,8 +36,7 @@ class Model:
         self.scene = scene
         self.symbols = parameter_symbols(scene)
         self.time = sympy.Symbol("t", real=True)
-        extra = scene.noise.extra_states if scene.noise else ()
-        self.state = tuple(sympy.Symbol(name, real=True) for name in ("x", "v", *extra))
+        self.state = state_symbols(scene)
 
     def _symbols_of(self, prefix: str) -> dict[str, sympy.Symbol]:
         paths = (path for path in self.symbols if path.startswith(f"{prefix}."))
@@ -107,8 +106,7 @@ class Model:
         noise, extra = self.scene.noise, self.state[2:]
         if noise is None or not extra:
             return ()
-        values = {d.name: self._symbols_of("noise").get(d.name, noise.parameters[d.name]) for d in noise.declared()}
-        return tuple(sympy.sympify(rate) for rate in noise.twin(values).drift(*self.state))
+        return derived_rates(noise, "drift", self._symbols_of("noise"), self.state, len(extra))
 
     @cached_property
     def drift(self) -> sympy.Matrix:

@@ -10,7 +10,18 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.pycode import PythonCodePrinter
 from sympy.printing.str import StrPrinter
 
+from vibrokit.symbolic.symbols import Named, code_name
+
 _LARGEST_PRODUCT = 16
+
+FUNCTIONS = frozenset(
+    (
+        sympy.acos, sympy.acosh, sympy.asin, sympy.asinh, sympy.atan, sympy.atan2, sympy.atanh, sympy.cos, sympy.cosh,
+        sympy.cot, sympy.csc, sympy.erf, sympy.erfc, sympy.exp, sympy.log, sympy.sec, sympy.sin, sympy.sinh, sympy.tan,
+        sympy.tanh, sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Mod, sympy.Piecewise,
+    )
+)  # fmt: skip
+"""What compiled code can call, besides roots, the least and the largest of several numbers."""
 
 
 class SourcePrinter(PythonCodePrinter):
@@ -40,6 +51,9 @@ class SourcePrinter(PythonCodePrinter):
             return f"-{product}" if others == -1 else product
         text = self._print(others)
         return f"({text})*{product}" if others.is_Add else f"{text}*{product}"
+
+    def _print_Named(self, expression: Named) -> str:
+        return code_name(expression)
 
     def _print_Integer(self, expression: sympy.Integer) -> str:
         return f"{int(expression)}.0"
@@ -109,7 +123,7 @@ def printable(expression: sympy.Expr) -> sympy.Expr:
 def unpack(expressions: Iterable[sympy.Expr], places: Mapping[sympy.Symbol, int], indent: str = "    ") -> list[str]:
     """Assignments of the parameters in some expressions from ``theta``; `places` has the index of each parameter."""
     used = set().union(*(expression.free_symbols for expression in expressions))
-    return [f"{indent}{symbol} = theta[{place}]" for symbol, place in places.items() if symbol in used]
+    return [f"{indent}{code_name(symbol)} = theta[{place}]" for symbol, place in places.items() if symbol in used]
 
 
 def assignments(
@@ -124,7 +138,7 @@ def assignments(
     the text of each target in terms of these names.
     """
     printer = SourcePrinter(arrival)
-    names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))  # no parameter begins with "_"
+    names = (sympy.Symbol(f"_{temporary}{index}") for index in range(10**6))
     shared, reduced = sympy.cse([printable(e) for e in targets.values()], symbols=names, optimizations=None)
     lines = [f"{indent}{name} = {printer.doprint(value)}" for name, value in shared]
     texts = {name: printer.doprint(value) for name, value in zip(targets, reduced, strict=True)}

@@ -10,6 +10,7 @@ import sympy
 from vibrokit.symbolic.flow import FlowEquations
 from vibrokit.symbolic.printer import assignments, unpack
 from vibrokit.symbolic.second_order import SecondOrderForm
+from vibrokit.symbolic.symbols import code_name
 
 
 class PlacedPair(NamedTuple):
@@ -44,7 +45,7 @@ class SecondOrderWriter:
         values = {f"a{n}": pair.acceleration(variables[pair.position]) for n, pair in enumerate(self._form.pairs)}
         values |= {f"r{n}": rates[place] for n, place in enumerate(self.integrals)}
         lines, texts = assignments(values, "c")
-        arguments = [str(variables[pair.position]) for pair in self._form.pairs]
+        arguments = [code_name(variables[pair.position]) for pair in self._form.pairs]
         arguments += [*["f"] * forced, *parameters]
         head = ["@njit(**INLINED)", f"def accelerations({', '.join(arguments)}):"]
         result = f"    return ({', '.join(texts.values())},)"

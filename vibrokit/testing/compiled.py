@@ -14,6 +14,7 @@ from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.symbols import code_name
 from vibrokit.testing.report import ConformanceError
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Compiled:
         self._module = _guarded(lambda: kernel_for(scene, flow, Pieces()).module)
         self.theta = theta_of(scene)
         self.size = self._module.EQUATIONS
-        self._named = dict(zip(map(str, scene.model.symbols.values()), self.theta, strict=True))
+        self._named = dict(zip(map(code_name, scene.model.symbols.values()), self.theta, strict=True))
 
     def has(self, name: str) -> bool:
         """Whether the code of the scene has a piece."""
@@ -53,7 +54,7 @@ class Compiled:
         """Rates as computed by steppers that pack lanes."""
         function = self._module.derivative
         names = list(inspect.signature(function.py_func).parameters)[self.size :]
-        rest = [forcing if name == "f" and name not in self._named else self._named[name] for name in names]
+        rest = [forcing if name == "f" else self._named[name] for name in names]
         return _guarded(lambda: np.array(function(*map(float, z), *map(float, rest))))
 
     def rhs(self, z: Any, pushing: tuple[bool, ...] = (), time: float = 0.0) -> Any:

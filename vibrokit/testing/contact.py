@@ -107,8 +107,8 @@ class ContactLawChecks(PartChecks[ContactLaw]):
                         if not push >= 0:
                             raise ConformanceError(
                                 f"{part!r} on the {side} side pulls with {-push:g} at depth {depth:g} and rate "
-                                f"{faster:g}, although its barrier is not adhesive: by the declared ranges it cannot "
-                                "pull. Correct the ranges of its parameters."
+                                f"{faster:g}, although its barrier is not adhesive: by the derivation it cannot pull. "
+                                "Write its formula in a form that SymPy can judge."
                             )
                         if (remote := code.derivative((-sign * depth, sign * faster))[1]) != 0:
                             raise ConformanceError(
@@ -129,7 +129,7 @@ class ContactLawChecks(PartChecks[ContactLaw]):
                 if abs(at_touch) > 1e-12 * abs(force(1, rate)):
                     raise ConformanceError(
                         f"The force of {part!r} jumps to {mpmath.nstr(at_touch, 6)} at first touch at rate {rate:g}, "
-                        "but the model derives a continuous force. Correct the ranges of its parameters."
+                        "but the model derives a continuous force. Write its formula in a form that SymPy can judge."
                     )
         return ", ".join(dict.fromkeys(results))
 
@@ -153,7 +153,7 @@ class ContactLawChecks(PartChecks[ContactLaw]):
             if abs(found - float(exponent)) > 1e-6:
                 raise ConformanceError(
                     f"The force of {part!r} varies like depth^{found:g} at first touch, but the model derives "
-                    f"depth^{float(exponent):g}. Correct the ranges of its parameters."
+                    f"depth^{float(exponent):g}. Write its formula in a form that SymPy can judge."
                 )
         return ", ".join(dict.fromkeys(results)) or "unknown"
 
@@ -170,7 +170,8 @@ class ContactLawChecks(PartChecks[ContactLaw]):
                 if abs(slopes[0]) > 30 * abs(slopes[1]) + 1e-9 * abs(force(1, 1)):
                     raise ConformanceError(
                         f"The model derives a force smooth in {results[-1]} at first touch for {part!r}, but its "
-                        f"derivative of order {order} is unbounded there. Correct the ranges of its parameters."
+                        f"derivative of order {order} is unbounded there. Write its formula in a form that SymPy can "
+                        "judge."
                     )
         return ", ".join(dict.fromkeys(results))
 

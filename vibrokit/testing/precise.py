@@ -28,7 +28,7 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
 
     It returns an mpmath number, and raises ConformanceError where the formula has no finite real value.
     """
-    raw = sympy.lambdify([*arguments, *values], formula, modules=[_FUNCTIONS, "mpmath"])
+    raw = sympy.lambdify([*arguments, *values], formula, modules=[_FUNCTIONS, "mpmath"], dummify=True)
 
     def evaluated(*point: Any, digits: int = DIGITS) -> Any:
         with mpmath.workdps(digits):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 from vibrokit.parts.part import Part
 
@@ -15,6 +15,18 @@ class ContactLaw(Part):
     positive depth only. Whether the law is conservative, how smooth it is at first touch, and whether its force jumps
     there, is derived from the formula. A force that jumps in the rate is refused when the equations are derived.
     """
+
+    variables: ClassVar[tuple[str, ...]] = ("depth", "rate")
+
+    def touch(self) -> tuple[bool, ...]:
+        """Whether the force at depth 0 vanishes, at rates −1, 0 and 1; nothing for laws that no value makes jump.
+
+        The order of constants in a minimum or a maximum may decide it, so it is a part of what decides compiled code.
+        """
+        try:
+            return () if self.is_ours() else tuple(bool(self.force(0.0, rate) == 0) for rate in (-1.0, 0.0, 1.0))
+        except Exception:  # the formula is for symbols; the derivation checks it
+            return ()
 
     @abstractmethod
     def force(self, depth: Any, rate: Any) -> Any:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.formula import evaluate
 from vibrokit.parts.formula_part import FormulaPart
 
 
@@ -24,13 +25,17 @@ class CustomLaw(FormulaPart, ContactLaw):
     CustomLaw(formula='k*depth**1.5 + c*depth*rate', k=50.0, c=0.1)
     """
 
-    variables: ClassVar[tuple[str, ...]] = ("depth", "rate")
-
     formula: str
     constants: tuple[tuple[str, Any], ...]
 
     def __init__(self, /, formula: str, **constants: float) -> None:
         self._read(formula, constants)
+
+    def touch(self) -> tuple[bool, ...]:
+        """Whether the force at depth 0 vanishes, at rates −1, 0 and 1."""
+        values = dict(self.constants)
+        forces = (evaluate(self.formula, values | {"depth": 0.0, "rate": rate}) for rate in (-1.0, 0.0, 1.0))
+        return tuple(force == 0 for force in forces)
 
     def force(self, depth: Any, rate: Any) -> Any:
         """Force on the mass: the formula."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 from vibrokit.parts.part import Part
 
 
 class Excitation(Part):
     """Force per unit mass that depends on time only. Abstract."""
+
+    variables: ClassVar[tuple[str, ...]] = ("t",)
 
     @abstractmethod
     def force(self, t: Any) -> Any:

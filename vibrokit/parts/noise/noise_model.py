@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from vibrokit.parts.parameter import parameter
@@ -13,14 +14,15 @@ class NoiseModel(Part):
     """Random force of intensity D, in the Itô sense. Abstract.
 
     White noise drives the velocity: dv = … dt + amplitude(x, v) √D dW. A model with extra states (coloured noise)
-    names them in `extra_states`; then the white noise drives the last of these, `drift` gives their rates without
-    noise, and `force` gives their force on the mass.
+    names them in `extra_states`, as it likes; then the white noise drives the last of these, `drift` gives their rates
+    without noise, and `force` gives their force on the mass.
 
     For developers
     --------------
     `amplitude` alone is a complete model. With `extra_states`, write `force` and `drift` as well.
     """
 
+    variables: ClassVar[tuple[str, ...]] = ("x", "v")
     extra_states: ClassVar[tuple[str, ...]] = ()
 
     intensity: float = parameter("D", "m^2 s^-3", minimum=0)
@@ -28,6 +30,12 @@ class NoiseModel(Part):
     @abstractmethod
     def amplitude(self, x: Any, v: Any) -> Any:
         """Factor of √D dW, as a SymPy expression in displacement and velocity."""
+
+    def formulas(self, argument: Callable[[str], Any]) -> tuple[Any, ...]:
+        """Return the amplitude, and the force and the rates of the extra states."""
+        plane, extra = map(argument, self.variables), tuple(map(argument, self.extra_states))
+        x, v = plane
+        return (self.amplitude(x, v), self.force(*extra), *self.drift(x, v, *extra))
 
     def force(self, *extra: Any) -> Any:
         """Force of the extra states on the mass (m s⁻²)."""

@@ -26,7 +26,6 @@ class StateDependentNoise(FormulaPart, NoiseModel):
     StateDependentNoise(intensity=0.0001, amplitude='1 + c*x**2', c=0.5)
     """
 
-    variables: ClassVar[tuple[str, ...]] = ("x", "v")
     formula_name: ClassVar[str] = "amplitude"
 
     formula: str

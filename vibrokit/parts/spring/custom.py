@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.spring.spring import Spring
@@ -27,8 +27,6 @@ class CustomSpring(FormulaPart, Spring):
     >>> CustomSpring("x + e*x**5", e=0.2)
     CustomSpring(formula='x + e*x**5', e=0.2)
     """
-
-    variables: ClassVar[tuple[str, ...]] = ("x", "v")
 
     formula: str
     constants: tuple[tuple[str, Any], ...]

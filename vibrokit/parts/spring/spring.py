@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 from vibrokit.parts.part import Part
 
 
 class Spring(Part):
     """Restoring force per unit mass, x″ = … − force(x, v). Abstract."""
+
+    variables: ClassVar[tuple[str, ...]] = ("x", "v")
 
     @abstractmethod
     def force(self, x: Any, v: Any) -> Any:
