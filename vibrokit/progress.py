@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from typing import Any
 
+import numpy as np
+
 from vibrokit.blas import one_blas_thread
 from vibrokit.errors import OutOfTime, StructureError, shown
 from vibrokit.registry import load_attribute
@@ -205,7 +207,8 @@ def working(progress: Progress = None, time_limit: float | None = None) -> Itera
             yield work
         return
     try:
-        with one_blas_thread(), opened(work):
+        # What overflows or is no number is tested where it arises; NumPy's warnings would tell a user nothing more.
+        with one_blas_thread(), np.errstate(all="ignore"), opened(work):
             yield work
     except Deadline:
         raise OutOfTime("the time limit was reached before there was a result; raise time_limit.") from None

@@ -76,7 +76,7 @@ def test_barrier_of_the_double_well_by_default(damping):
     assert (energy.source, energy.target, energy.saddle, energy.bound) == (0, 1, 0, Bound.ESTIMATE)
     assert energy.value == pytest.approx(exact, rel=0.02)
     assert energy.lower == max(0.0, energy.value - energy.numerical_error) <= exact
-    assert energy.upper == energy.value + energy.numerical_error >= exact
+    assert exact <= energy.upper <= energy.value + energy.numerical_error  # the action of a path
     assert found.energies == found.estimates
 
 

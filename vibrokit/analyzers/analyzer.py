@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -336,5 +337,5 @@ def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:
     return [
         Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=_WEAK)
         for e in energies
-        if 0 < e.value < _WEAK * intensity
+        if 0 < e.value < _WEAK * intensity and math.isfinite(e.upper)  # otherwise the value is not known
     ]

@@ -142,6 +142,12 @@ class LeaveBasin(Exit):
         """Refuse a structure of one attractor that no motion escapes from."""
         escapes = any(ESCAPED in saddle.leads_to for saddle in structure.saddles)
         if len(structure.attractors) < 2 and not escapes:
+            if not structure.complete:
+                raise StructureError(
+                    "the structure is incomplete, because its search was stopped: only one attractor and no way out "
+                    "are known; find the structure with more time, or ask for the first contact with a stop "
+                    "(exit=FirstContact())."
+                )
             raise StructureError(
                 "the structure has only one attractor, so there is no other basin to leave for; widen the region, "
                 "change the scene, or ask for the first contact with a stop (exit=FirstContact())."

@@ -278,4 +278,6 @@ def _shown(value: float, lower: float, upper: float) -> str:
     """Return a number, with its bounds where these differ in the digits shown."""
     if math.isinf(value):
         return "no exit" if math.isinf(lower) else "not found"
+    if math.isinf(upper):
+        return f"{value:.4g} ({lower:.3g} or more)" if lower > 0 else f"{value:.4g} (not bounded)"
     return f"{value:.5g}" if upper - lower <= 1e-4 * abs(value) else f"{value:.4g} ({lower:.3g} to {upper:.3g})"

@@ -94,7 +94,7 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> str:
     rows = [("exit", "ΔU", "ΔU/D", "lower", "upper", "bound", "error", "residual", "saddle", "method")]
     for e in energies:
         ratio = number_text(e.value / intensity if intensity else math.nan, ".4g")
-        bounds = f"{e.lower:.6g}", f"{e.upper:.6g}", str(e.bound)
+        bounds = f"{e.lower:.6g}", "unknown" if math.isinf(e.upper) else f"{e.upper:.6g}", str(e.bound)
         errors = number_text(e.numerical_error, ".1e"), number_text(e.residual, ".1e")
         saddle = str(e.saddle) if e.saddle >= 0 else "–"
         value = f"{e.value:.{_digits(e)}g}"

@@ -351,7 +351,7 @@ class Code(StrEnum):
     )  # fmt: skip
     NO_CERTIFICATE = (
         "no-certificate", WARNING,
-        "A path from {state} converged but could not be certified: {reason} Its action {action:.6g} is an upper bound.",
+        "A path from {state} with action {action:.6g} converged but could not be certified: {reason}",
         _FINER_STEPPER,
     )  # fmt: skip
     STARTS_ON_ORBIT = (
@@ -430,7 +430,7 @@ class Code(StrEnum):
     NOT_SEARCHED = (
         "not-searched", WARNING,
         "From {state} to {goal} the polished path costs {path:.6g}; no graph search tests whether a cheaper path "
-        "exists.", "Run LeastAction with a graph search.",
+        "exists.", "Expect that one may exist; where the noise has no states of its own, a graph search excludes it.",
     )  # fmt: skip
     BRACKET = (
         "bracket", INFO,

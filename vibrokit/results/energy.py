@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
@@ -42,7 +43,7 @@ class Bound(StrEnum):
     UPPER = "upper"
     """Upper: a path. Lower: what no search has excluded or what is proven, 0 if there is neither."""
     ESTIMATE = "estimate"
-    """Both are error estimates of a grid."""
+    """Lower: an error estimate of a grid. Upper: another one, or the action of a path; infinite if none is known."""
     BRACKET = "bracket"
     """Upper: a path that begins or ends inside a set. Lower: an error estimate of a grid."""
     CONFIDENCE = "confidence"
@@ -145,7 +146,8 @@ class ActivationEnergy:
     value : float
         ΔU, in units of action (m² s⁻³).
     lower, upper : float
-        Bounds of ΔU itself: a cheaper path that was not excluded lies within them.
+        Bounds of ΔU itself: a cheaper path that was not excluded lies within them. Where nothing is known they are 0
+        and infinite.
     method : str
     bound : Bound
         What the bounds rest on.
@@ -185,6 +187,21 @@ class ActivationEnergy:
     def exit_between(self, names: Sequence[str]) -> str:
         """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""
         return exit_between(names, self.source, self.target)
+
+
+def upper_bound(value: float, error: float) -> float:
+    """Return the upper bound that a path of some action gives; infinite if its error exceeds the action.
+
+    What changes by more than itself when its computation is tightened is no evidence of a path.
+    """
+    return value + error if error <= value else math.inf
+
+
+def bounds_text(energy: ActivationEnergy) -> str:
+    """Return the bounds of an energy as text: what is not known is not shown as a number."""
+    if math.isinf(energy.upper):
+        return f"{energy.lower:.6g} or more" if energy.lower > 0 else "not bounded"
+    return f"{energy.lower:.6g} to {energy.upper:.6g}"
 
 
 _ACTION = "m2 s-3"

@@ -13,7 +13,7 @@ from vibrokit.errors import ResultFileError, StructureError, counted
 from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
-from vibrokit.results.energy import ActivationEnergy, ExitPath, energy_variables, read_energies
+from vibrokit.results.energy import ActivationEnergy, ExitPath, bounds_text, energy_variables, read_energies
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.labels import exit_between, goal_of, label_of, source_among
 from vibrokit.results.record import Record
@@ -131,7 +131,12 @@ class Result(Record):
         return Summary(
             f"{type(self).__name__}: {counted(len(self.energies), 'energy', 'energies')}",
             tuple(
-                (self.exit_of(e), f"ΔU = {e.value:.6g} m² s⁻³", f"{e.lower:.6g} to {e.upper:.6g} ({e.bound})", e.method)
+                (
+                    self.exit_of(e),
+                    f"ΔU = {e.value:.6g} m² s⁻³",
+                    f"{bounds_text(e)} ({e.bound})",
+                    e.method,
+                )
                 for e in self.energies
             ),
         )

@@ -26,6 +26,11 @@ Array = NDArray[np.float64]
 def exit_targets(problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     """Return the exit targets of a problem; raises StructureError if the graph can reach none of its path ends."""
     targets = [target for end in problem.path_ends for target in targets_at(end, problem, model)]
+    if not targets and not problem.structure.complete:
+        raise StructureError(
+            f"the structure is incomplete, because its search was stopped, and has no place where a path from "
+            f"{problem.attractor.name} may end; find the structure with more time."
+        )
     if not targets:
         raise StructureError(
             f"{problem.exit} has no place where a path from {problem.attractor.name} may end; choose another exit, or "

@@ -24,6 +24,7 @@ from vibrokit.progress import stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
+from vibrokit.results.summary import counted
 from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow

@@ -88,9 +88,7 @@ class GraphSolution:
         found: dict[int, list[ActivationEnergy]] = {}
         for energy in self.energies:
             found.setdefault(energy.target, []).append(energy)
-        best = [min(some, key=lambda energy: (energy.upper, energy.value)) for some in found.values()]
-        lowest = [min(energy.lower for energy in some) for some in found.values()]
-        return tuple(dataclasses.replace(one, lower=lower) for one, lower in zip(best, lowest, strict=True))
+        return tuple(_best(some) for some in found.values())
 
     def dataset(self) -> xarray.Dataset:
         """Return the potential on the section, and the cheapest path.
@@ -113,6 +111,12 @@ class GraphSolution:
                 "quasi_potential_v": _array("node_v", nodes[0, :, 1], "m s-1", "velocity of the nodes"),
             },
         )
+
+
+def _best(energies: Sequence[ActivationEnergy]) -> ActivationEnergy:
+    best = min(energies, key=lambda energy: (energy.upper, energy.value))
+    lower = min(energy.lower for energy in energies)
+    return best if best.lower == lower else dataclasses.replace(best, lower=lower)
 
 
 def _bounded(energy: ActivationEnergy, estimate: TargetEstimate, action: float) -> ActivationEnergy:

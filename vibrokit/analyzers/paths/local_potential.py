@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import scipy.linalg
@@ -95,4 +96,11 @@ def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotenti
             f"the orbit at {tuple(orbit.point.tolist())} has a multiplier of size {largest:.6g}; only a stable one "
             "(all below 1) has a quasi-potential around it."
         )
-    return LocalPotential(monodromy, gathered, scipy.linalg.solve_discrete_lyapunov(monodromy, gathered))
+    return LocalPotential(monodromy, gathered, stationary_covariance(monodromy, gathered))
+
+
+def stationary_covariance(slope: Array, added: Array) -> Array:
+    """Return Σ = M Σ Mᵀ + C. Where a multiplier is close to 1, Σ is as uncertain as it is large: that is no warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
+        return np.asarray(scipy.linalg.solve_discrete_lyapunov(slope, added), dtype=np.float64)

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.paths.local_potential import stationary_covariance
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap
@@ -85,10 +86,10 @@ def invariant_spaces(monodromy: Array, covariance: Array, neutral: Array) -> tup
     v_s, v_u, l_s, l_u = vectors[:, :decaying], vectors[:, strict], duals[:, :decaying], duals[:, strict]
     y_s, y_u = np.zeros((decaying, decaying)), np.zeros((growing, growing))
     if decaying:
-        y_s = scipy.linalg.solve_discrete_lyapunov(l_s.T @ monodromy @ v_s, l_s.T @ covariance @ l_s)
+        y_s = stationary_covariance(l_s.T @ monodromy @ v_s, l_s.T @ covariance @ l_s)
     if growing:
         back = np.linalg.inv(l_u.T @ monodromy @ v_u)
-        y_u = scipy.linalg.solve_discrete_lyapunov(back, -back @ l_u.T @ covariance @ l_u @ back.T)
+        y_u = stationary_covariance(back, -back @ l_u.T @ covariance @ l_u @ back.T)
     still = np.hstack([neutral, v_u])
     leaving = np.hstack([np.vstack([still, np.zeros_like(still)]), np.vstack([v_s @ y_s, l_s])])
     still = np.hstack([neutral, v_s])

@@ -18,7 +18,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.progress import advance, stage
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy, Bound, Certificate
+from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, upper_bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
 from vibrokit.structure.orbits import Orbit
@@ -185,6 +185,10 @@ def _certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding]
         findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=action, reason=str(failure)))
         return _energies(problem, solved)
     certificate = Certificate.combined(certificates)
+    if not certificate.error <= action:
+        reason = f"its action changes by {certificate.error:.2g} when its beginning, length and integration do."
+        findings.append(Finding.of(Code.NO_CERTIFICATE, source, action=action, reason=reason))
+        return _energies(problem, solved, error=certificate.error)
     if any(leg.found.source.start_on_orbit for leg in solved.legs):
         findings.append(Finding.of(Code.STARTS_ON_ORBIT, source, action=action, periods=certificate.periods))
     derivatives = [sensitivities(problem, leg.end, leg.propagator, leg.found) for leg in solved.legs]
@@ -229,7 +233,7 @@ def _energies(
             target=target,
             value=action,
             lower=0.0,
-            upper=action + error,
+            upper=upper_bound(action, error),
             method=METHOD,
             bound=Bound.BRACKET if solved.end.one_of_many else Bound.UPPER,
             numerical_error=error,

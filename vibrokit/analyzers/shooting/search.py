@@ -17,7 +17,7 @@ from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.kernels.single import record
 from vibrokit.progress import TRAJECTORIES, stage
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
+from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath, upper_bound
 from vibrokit.results.finding import Finding
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -189,7 +189,7 @@ def _energy(shots: Shots, branch: Branch, *, with_error: bool) -> ActivationEner
         target=branch.candidate.target,
         value=value,
         lower=0.0,
-        upper=value + error if with_error else value,
+        upper=upper_bound(value, error) if with_error else value,
         method=shots.starts.method,
         bound=Bound.UPPER,
         numerical_error=error,

@@ -90,7 +90,8 @@ class Shooting(metaclass=Constructed):
         """
         if not problem.attractor.is_fixed:
             raise StructureError(
-                f"it is {problem.attractor.kind}; the action plot needs a periodic orbit or an equilibrium."
+                f"it is {problem.attractor.kind}; the action plot needs a periodic orbit or an equilibrium. A graph "
+                "search does not."
             )
         with stage("starts of exit paths", subject=problem.attractor.name):
             stepper = problem.ensemble_stepper(Flow.HAMILTONIAN)
