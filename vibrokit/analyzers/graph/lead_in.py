@@ -11,8 +11,8 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.results.attractor import Attractor
 
 # Relaxation times on the attractor. A path that has t relaxation times to reach a state near it costs 1/(1 − e^(−2t))
-# of what one without a beginning costs up to there, by the linearized equations: 0.25 % more.
-_RELAXATIONS = 3.0
+# of what one without a beginning costs up to there, by the linearized equations: 0.03 % more.
+_RELAXATIONS = 4.0
 _LONGEST = 250  # section intervals
 
 Array = NDArray[np.float64]

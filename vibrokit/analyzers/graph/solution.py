@@ -121,7 +121,7 @@ def _best(energies: Sequence[ActivationEnergy]) -> ActivationEnergy:
 
 def _bounded(energy: ActivationEnergy, estimate: TargetEstimate, action: float) -> ActivationEnergy:
     """An energy with bounds by the action of a whole path to the exit."""
-    error = estimate.by_nodes + PATH_FACTOR * abs(action - energy.value)
+    error = max(estimate.error, estimate.by_nodes + PATH_FACTOR * abs(action - energy.value))
     low, vague = min(energy.value, action), error > VAGUE * action
     return dataclasses.replace(
         energy,
