@@ -24,7 +24,6 @@ from vibrokit.progress import stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
-from vibrokit.results.summary import counted
 from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes, pair, whole
 from vibrokit.symbolic.flow_kind import Flow
@@ -94,7 +93,7 @@ class GraphSearch(metaclass=Constructed):
         if osc.noise is not None and osc.noise.extra_states:
             raise SceneError(
                 f"the noise has {counted(len(osc.noise.extra_states), 'state')} of its own, and the graph covers x and "
-                "v only; use ActionPlot."
+                "v only; paths of such a scene are found by shooting alone."
             )
 
     def search(self, problem: ExitProblem) -> GraphSolution:
