@@ -93,7 +93,7 @@ class GraphSearch(metaclass=Constructed):
         if osc.noise is not None and osc.noise.extra_states:
             raise SceneError(
                 f"the noise has {counted(len(osc.noise.extra_states), 'state')} of its own, and the graph covers x and "
-                "v only; use ActionPlot."
+                "v only; paths of such a scene are found by shooting alone."
             )
 
     def search(self, problem: ExitProblem) -> GraphSolution:
