@@ -9,14 +9,11 @@ from __future__ import annotations
 import math
 import warnings
 
-import hypothesis
 import numpy as np
-import pytest
-from hypothesis import strategies as st
 
 import vibrokit as vk
 from tests.random_scenes import draw_scene
-from vibrokit.errors import IntegrationError, NoSectionError, VibrokitError
+from vibrokit.errors import IntegrationError
 from vibrokit.kernels import kernel, store
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
@@ -63,7 +60,7 @@ def check_agreement(drawn, starts):
     unsettled = np.isnan(sum(changes)) | np.isinf(sum(changes))
     diverging = np.isinf(located[1]) == np.isinf(fixed[3])
     assert (bounded | diverging | unsettled).all(), (fixed, located)
-    allowed = max((change[np.isfinite(change)].max(initial=0.0) for change in changes))
+    allowed = max(change[np.isfinite(change)].max(initial=0.0) for change in changes)
     assert distance[bounded & ~unsettled].max(initial=0.0) <= 2 * allowed + 1e-9, (distance, changes)
 
 
