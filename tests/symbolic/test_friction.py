@@ -72,7 +72,7 @@ class Terraced(vk.Spring):
     level: float = vk.parameter("F", "m s^-2")
 
     def force(self, x, v):
-        return x + self.level * v * sympy.floor(v)
+        return x + self.level * sympy.Mod(v, 1)
 
 
 class Uneven(vk.ContactLaw):
