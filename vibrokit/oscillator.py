@@ -116,8 +116,8 @@ class Oscillator(Scene):
                     last,
                 )
             raise IntegrationError(
-                f"the trajectory diverged between t = {since:g} and {times[len(path)]:g}, after the "
-                f"state {last}; {_advice(chosen)}",
+                f"the trajectory diverged, or needed too many steps, between t = {since:g} and "
+                f"{times[len(path)]:g}, after the state {last}; {_advice(chosen)}",
                 since,
                 last,
             )
