@@ -1,6 +1,7 @@
 import concurrent.futures
 import dataclasses
 import itertools
+import math
 import multiprocessing
 
 import numpy as np
@@ -64,7 +65,11 @@ def test_branches_keep_their_identity(paper):
 def test_basin_fractions_are_shares_of_one_region(paper):
     shares, errors = paper.fractions()
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=0.02)  # but for cells on a boundary that did not settle
-    np.testing.assert_allclose(errors, np.sqrt(shares * (1 - shares) / 900), atol=1e-12)
+    for share, error in zip(shares[errors > 0], errors[errors > 0], strict=True):
+        halvings = (
+            math.log2(share * (1 - share) / error**2 / 900) / 2
+        )  # of 30 × 30 cells, until each attractor has its own
+        assert halvings == pytest.approx(max(0, round(halvings)), abs=1e-9)
     assert paper.region is not None
     for at in paper.states:
         for attractor in at.attractors:

@@ -79,7 +79,8 @@ def _typical_motion(scene: Scene, module: types.ModuleType, theta: NDArray[np.fl
         response = np.abs(sizes / (stiffness - rates**2 + 2j * scene.damping_ratio * own * rates))
     response[sizes == 0.0] = 0.0
     constant = sum(part.magnitude for part in scene.excitations if isinstance(part, Constant))
-    reach, speed = float(response.sum()) + abs(constant) / own**2, float((rates * response).sum())
+    moving = rates > 0.0  # a constant part may displace a mass without a spring by any length
+    reach, speed = float(response.sum()) + abs(constant) / own**2, float((rates[moving] * response[moving]).sum())
     gap = max(abs(barrier.position) for barrier in scene.barriers)
     if gap > 0.0:
         limit = _LONGEST_REACH * gap

@@ -90,7 +90,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
             self.expression(part)
             model = self.scene(part).model
             values = self.values(part)
-            entries = sympy.lambdify([*self.arguments, *values], model.diffusion, modules="mpmath")
+            entries = sympy.lambdify([*self.arguments, *values], model.diffusion, modules="mpmath", dummify=True)
             for point in self.points():
                 matrix = np.array(entries(*map(mpmath.mpf, (*point, *values.values()))).tolist(), dtype=complex)
                 lowest = np.linalg.eigvalsh(matrix).min()
