@@ -1,6 +1,7 @@
 """Kernels return to Python before long, and go on: time limits and interrupts are seen, and no bit depends on it."""
 
 import _thread
+import signal
 import threading
 import time
 
@@ -109,6 +110,15 @@ def test_an_interrupt_that_is_asked_for_is_seen_during_a_call(bouncing):
     assert work.seconds < 0.3 + LEAST
 
 
+@pytest.fixture
+def python_handles_sigint():
+    """The processes of pytest-xdist ignore Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("python_handles_sigint")
 def test_ctrl_c_is_seen_during_a_call(bouncing):
     work = Work()
     threading.Timer(0.3, _thread.interrupt_main).start()
