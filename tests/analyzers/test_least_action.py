@@ -183,7 +183,7 @@ def test_all_work_belongs_to_a_named_stage(structure):
     rest = seconds.pop("LeastAction")
     assert set(seconds) - {"compiling"} == {
         "reversed relaxation", "exit targets", "graph", "starts of exit paths", "cells of the basins", "action plot",
-        "closest approach", "ends of exit paths", "polishing", "certifying",
+        "closest approach", "ends of exit paths", "polishing", "certifying", "whole paths",
     }  # fmt: skip
     assert rest < 0.05 * sum(seconds.values())
 

@@ -45,7 +45,7 @@ def test_energies_are_told_by_name_with_their_bounds_and_their_ratio_to_the_nois
     assert [cell.strip() for cell in cells(lines[1])] == [
         "clear → hammering", "9e-05", "4.5", "8e-05", "9.1e-05", "certified", "1.0e-11", "1.0e-12", "3", "least action",
     ]  # fmt: skip
-    assert [cell.strip() for cell in cells(lines[2])][4:9] == ["inf", "estimate", "1.0e-06", "–", "–"]
+    assert [cell.strip() for cell in cells(lines[2])][4:9] == ["unknown", "estimate", "1.0e-06", "–", "–"]
     assert lines[3].startswith("clear → exit ")
 
 
