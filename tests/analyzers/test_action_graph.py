@@ -424,7 +424,8 @@ def test_a_saddle_at_the_tip_of_a_basin_is_reached():
     found = vk.ActionGraph(nodes=(90, 90)).run(osc, structure)
     for attractor, value in ((large, 0.1273162369), (small, 0.1306644174)):
         (escape,) = (each for each in found.energies if (each.source, each.target) == (attractor.label, ESCAPED))
-        assert abs(escape.value - value) <= escape.numerical_error < 0.5 * value
+        assert escape.value == pytest.approx(value, rel=0.01)
+        assert 0 < escape.lower <= value * (1 + 1e-9) <= escape.upper * (1 + 2e-9)
 
 
 @pytest.mark.long

@@ -135,8 +135,8 @@ def test_noise_with_its_own_states():
     """The graph covers x and v only, and names an alternative; LeastAction goes on without it, with a finding."""
     structure = vk.find_structure(SLOW, **QUICK)
     alone = vk.LeastAction(shooting=None, graph=SMALL_GRAPH)
-    refused(SceneError, lambda: SMALL_GRAPH.search(problem_of(SLOW, structure)), "of its own.*ActionPlot")
-    refused(SceneError, lambda: alone.run(SLOW, structure), "ActionPlot")
+    refused(SceneError, lambda: SMALL_GRAPH.search(problem_of(SLOW, structure)), "of its own.*shooting alone")
+    refused(SceneError, lambda: alone.run(SLOW, structure), "shooting alone")
     result = vk.LeastAction(source=0, **SMALL).run(SLOW, structure)
     (failed,) = result.found(Code.METHOD_FAILED)
     assert failed.values["method"] == "graph search"

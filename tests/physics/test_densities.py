@@ -75,7 +75,7 @@ def test_first_contact_of_a_forced_linear_scene_is_that_of_an_exact_simulation()
         noise=vk.WhiteNoise(intensity=given["intensity"]),
     )
     structure = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(20, 20), manifolds=False, rng=0)
-    result = vk.SGCM(intensities=(1e-2,), nodes=(120, 120), exit=vk.FirstContact()).run(osc, structure)
+    result = vk.SGCM(intensities=(1e-2,), nodes=(160, 160), exit=vk.FirstContact()).run(osc, structure)
     (rate,) = result.rates
     simulated, standard_error = simulated_first_passage(**given)
     found = -rate.log_value - math.log(osc.section_interval)

@@ -65,7 +65,7 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
         excitations=(vk.Constant(current / capacity),), noise=vk.WhiteNoise(intensities[0]),
     )  # fmt: skip
     exit_ = Beyond(place=math.pi - well + 1.2)
-    region = ((-1.5, exit_.place + 0.3), (-2.5, 2.5))
+    region = ((-1.5, exit_.place + 1.5), (-3.0, 3.0))
     structure = vk.find_structure(osc, region=region, cells=(40, 40), manifolds=False, rng=0)
     source = min(structure.attractors, key=lambda each: abs(each.points[0, 0] - well)).label
     found = vk.SGCM(source=source, intensities=intensities, exit=exit_, nodes=(150, 150)).run(osc, structure)

@@ -212,7 +212,7 @@ def test_watching_an_orbit_and_what_runs_away():
     osc = vk.load_scene("duffing").replace({"spring.cubic": -0.3, "excitations.0.amplitude": 0.1})
     orbit = osc.section_map([[0.0, 0.0]], 400)
     states = np.array([[0.0, 0.0], [9.0, 9.0], [0.1, 0.0]])
-    _, labels = follow(osc, states, arrival([orbit]), 300, vk.RK4(256))
+    _, _, labels = follow(osc, states, arrival([orbit]), 300, vk.RK4(256))
     np.testing.assert_array_equal(labels, [0, ESCAPED, 0])
     survival, left = watch(osc, states, arrival([orbit]), vk.RK4(256), longest=300)
     assert (survival.survivors, len(left)) == (0, 0)

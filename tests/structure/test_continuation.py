@@ -103,7 +103,9 @@ def test_an_attractor_that_the_search_missed_is_found_from_its_neighbour(monkeyp
     region = ((-3, 3), (-3, 3))
     result = continuation(osc, FREQUENCY, [1.35, 1.4, 1.45], region=region, **QUICK)
     assert len(at_middle) == 2
-    kept, added = result.states[1].attractors
+    by_place = {round(each.points[0, 0], 6): each for each in result.states[1].attractors}
+    added = by_place.pop(round(at_middle[0].points[0, 0], 6))
+    (kept,) = by_place.values()
     np.testing.assert_allclose(added.points, at_middle[0].points, atol=1e-9)
     (finding,) = result.found(Code.FOUND_BY_NEIGHBOUR)
     assert finding.values["count"] == 1

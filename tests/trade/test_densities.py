@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def trade():
-    well = double_well(noise=vk.WhiteNoise(intensity=5e-2))
+    well = double_well(noise=vk.WhiteNoise(intensity=1e-2))  # a fifth of ΔU: the cores hardly matter
     structure = vk.find_structure(well, cells=(40, 40), manifolds=False, rng=0)
     return measure_densities(well, structure, source=0, nodes=(0.6, 1.0), steps=(), samples=(20,))
 

@@ -119,17 +119,20 @@ def _attains(path: ActivationEnergy, least: ActivationEnergy) -> bool:
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
     """An energy whose lower bound is at least what no path can cost less than.
 
-    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it.
+    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it, and
+    of one that a path within numerical errors of it has.
     """
     raised = least.value - energy.value
     if energy.value >= least.lower:
         return dataclasses.replace(energy, lower=min(max(energy.lower, least.lower), energy.value))
+    error = float(np.fmax(raised, energy.numerical_error))
+    known = energy.upper >= least.value and (energy.certificate is None or not _attains(energy, least))
     return dataclasses.replace(
         energy,
         value=least.value,
         lower=max(energy.lower, least.lower),
-        upper=energy.upper if energy.upper >= least.value else least.value + raised,
-        numerical_error=float(np.fmax(raised, energy.numerical_error)),
+        upper=energy.upper if known else least.value + error,
+        numerical_error=error,
     )
 
 
