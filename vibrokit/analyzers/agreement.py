@@ -119,8 +119,8 @@ def _attains(path: ActivationEnergy, least: ActivationEnergy) -> bool:
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
     """An energy whose lower bound is at least what no path can cost less than.
 
-    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it, and
-    of one that a path within numerical errors of it has.
+    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it,
+    and of a certified path that attains it.
     """
     raised = least.value - energy.value
     if energy.value >= least.lower:
