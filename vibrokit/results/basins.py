@@ -56,13 +56,13 @@ class Basins:
         return np.where(inside, self.labels[i, v], UNSETTLED).astype(np.int16)
 
     def lost(self, attractor: Attractor, label: int) -> bool:
-        """Return whether an attractor lies in cells of another basin: one point of an orbit, or most points of a set.
+        """Return whether an attractor lies in cells of another basin: one point of an orbit, or all points of a set.
 
         Points outside the region and cells that were not followed do not count.
         """
         points = attractor.points[self.region.contains(attractor.points)]
         foreign = ~np.isin(self.at(points), (label, UNSETTLED, NOT_FOLLOWED))
-        return bool(foreign.any() if attractor.repeats else 2 * foreign.sum() > len(points))
+        return bool(foreign.any() if attractor.repeats else len(points) and foreign.all())
 
     def __repr__(self) -> str:
         return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"

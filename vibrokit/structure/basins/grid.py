@@ -109,12 +109,13 @@ class BasinGrid:
         self._find_lost()
 
     def _find_lost(self) -> None:
-        """Refine the grid, at most to 2048 cells along a side, until no attractor lies in a cell of another basin.
+        """Refine the grid until no attractor lies in a cell of another basin.
 
+        It ends at 2048 cells along a side, or where a grid took more sections than the first one may by default.
         Cells that put an attractor into another basin are too wide to tell what lies around them either. So few cells
         are all followed anew, and of many cells none near a lost attractor classifies others.
         """
-        while (lost := self._lost()) and 2 * max(self._labels.shape) <= _FINEST:
+        while (lost := self._lost()) and 2 * max(self._labels.shape) <= _FINEST and self._sections <= _MOST_FIRST:
             self._refined = True
             with stage("basins of lost attractors", unit=CELLS, total=4 * self._labels.size):
                 if self._labels.size <= _COARSEST:
