@@ -44,6 +44,17 @@ def codes(found):
     return {finding.code for finding in found.findings}
 
 
+# --- noise given as a formula
+
+
+def test_a_constant_amplitude_given_as_a_formula_is_white_noise(structure, result):
+    """√D g dW with g = 2 is white noise of intensity 4 D; the two runs have different random numbers."""
+    osc = dataclasses.replace(WELL, noise=vk.StateDependentNoise(0.01, "g", g=2.0))
+    rate = vk.MFET(intensities=(0.01,), **QUICK).run(osc, structure).rates[0]
+    (white,) = (one for one in result.rates if one.intensity == 0.04)
+    assert rate.log_value == pytest.approx(white.log_value, abs=4 * math.hypot(rate.log_error, white.log_error))
+
+
 # --- estimates against closed forms
 
 

@@ -85,7 +85,7 @@ class Walk:
         """The oscillator with this intensity; where position decides, without what is felt only after the exit."""
         osc = self.problem.scene
         assert osc.noise is not None  # every analyzer checks that
-        return dataclasses.replace(osc, noise=dataclasses.replace(osc.noise, intensity=self.intensity))
+        return dataclasses.replace(osc, noise=osc.noise.replace(intensity=self.intensity))
 
     @property
     def checks(self) -> int:
