@@ -476,6 +476,19 @@ def test_the_scene_may_come_after_the_analyzers(place):
 
 
 @pytest.mark.parametrize(
+    ("words", "analyzers"),
+    [
+        ([], ["least-action"]),
+        (["--analyzer"], []),
+        (["--analyzer", "sgcm", "mfet"], ["sgcm", "mfet"]),
+        (["--analyzer", "sgcm", "--analyzer", "mfet"], ["sgcm", "mfet"]),
+    ],
+)
+def test_analyzers_that_are_named(words, analyzers):
+    assert parsed(["run", "double-well", *words]).analyzer == analyzers
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["run", "herz-0.570"], "hertz-0.570"),

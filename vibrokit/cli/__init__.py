@@ -42,6 +42,8 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the arguments of the command line."""
     parser = _parser()
     options = parser.parse_args(arguments)
+    if "analyzer" in options and options.analyzer is None:
+        options.analyzer = ["least-action"]
     if "analyzer" in options and options.scene is None:  # the last of the analyzers' names is the scene's
         if len(options.analyzer) < 2:
             parser.error("the following arguments are required: scene")
@@ -68,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("scene", nargs="?", help=which)
     run.add_argument(
-        "--analyzer", nargs="*", default=["least-action"], metavar="NAME",
+        "--analyzer", nargs="*", action="extend", metavar="NAME",
         help="analyzers to run (default: least-action); without a name, the structure only",
     )  # fmt: skip
     run.add_argument(
