@@ -81,6 +81,12 @@ def endless(osc, work):
         run_ensemble(osc, Flow.STATE, vk.Order8(1e-12), np.array([[0.3, 0.1]] * 300), 10**7)
 
 
+def check_that_it_stops(osc, work):
+    with pytest.raises(KeyboardInterrupt):
+        endless(osc, work)
+    assert work.seconds < 0.3 + LEAST
+
+
 @pytest.fixture(scope="module")
 def bouncing():
     """A ball on a stiff table that vibrates, whose kernel is compiled."""
@@ -96,18 +102,13 @@ def bouncing():
 
 
 def test_a_time_limit_is_seen_during_a_call(bouncing):
-    work = Work(time_limit=0.3)
-    with pytest.raises(KeyboardInterrupt):
-        endless(bouncing, work)
-    assert work.seconds < 0.3 + LEAST
+    check_that_it_stops(bouncing, Work(time_limit=0.3))
 
 
 def test_an_interrupt_that_is_asked_for_is_seen_during_a_call(bouncing):
     work = Work()
     threading.Timer(0.3, work.interrupt).start()
-    with pytest.raises(KeyboardInterrupt):
-        endless(bouncing, work)
-    assert work.seconds < 0.3 + LEAST
+    check_that_it_stops(bouncing, work)
 
 
 @pytest.fixture
@@ -122,9 +123,7 @@ def python_handles_sigint():
 def test_ctrl_c_is_seen_during_a_call(bouncing):
     work = Work()
     threading.Timer(0.3, _thread.interrupt_main).start()
-    with pytest.raises(KeyboardInterrupt):
-        endless(bouncing, work)
-    assert work.seconds < 0.3 + LEAST
+    check_that_it_stops(bouncing, work)
     began = time.perf_counter()
     run_ensemble(bouncing, Flow.STATE, vk.Order8(1e-12), np.array([[0.3, 0.1]]), 0)  # nothing runs on
     assert time.perf_counter() - began < LEAST

@@ -128,25 +128,26 @@ def test_few_structures_with_many_numbers(seed, data):
     checked(seed, data, limit=False)
 
 
+def check_block(seeds, examples, *, limit):
+    """Check so many scenes with the structures of some seeds."""
+
+    @settings(common, max_examples=examples)
+    @given(seed=st.sampled_from(seeds), data=st.data())
+    def test(seed, data):
+        checked(seed, data, limit=limit)
+
+    test()
+
+
 @pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("block", range(20))
 def test_a_thousand_structures(block):
-    @settings(common, max_examples=50)
-    @given(seed=st.integers(50 * block, 50 * block + 49), data=st.data())
-    def test(seed, data):
-        checked(seed, data, limit=False)
-
-    test()
+    check_block(range(50 * block, 50 * block + 50), 50, limit=False)
 
 
 @pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("block", range(10))
 def test_a_time_limit_holds(block):
-    @settings(common, max_examples=5)
-    @given(seed=st.integers(100 * block, 100 * block + 99), data=st.data())
-    def test(seed, data):
-        checked(seed, data, limit=True)
-
-    test()
+    check_block(range(100 * block, 100 * block + 100), 5, limit=True)

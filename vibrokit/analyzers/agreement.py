@@ -31,9 +31,9 @@ def combined(
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
     excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
-    Where it is proven what no path can cost less than, the lower bound is at least that; where that is what the exit
-    costs, no path is needed. A path attains the proven minimum only if both agree within their numerical errors. An
-    action plot's path that was not polished is an upper bound within its own error.
+    Where a minimum is proven, the lower bound is at least that minimum; where the exit attains it, no path is needed. A
+    path attains the proven minimum only if both agree within their numerical errors. An action plot's path that was not
+    polished is an upper bound within its own error.
 
     Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
     attractor are mirror images of, the least possible actions, and the action plot's energies. Returns an energy and a
@@ -112,15 +112,15 @@ def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> t
 
 
 def _attains(path: ActivationEnergy, least: ActivationEnergy) -> bool:
-    """Whether a path costs what no path can cost less than, within the numerical errors of both."""
+    """Whether a path attains the proven minimum, within the numerical errors of both."""
     return abs(path.value - least.value) <= path.numerical_error + least.numerical_error
 
 
 def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEnergy:
-    """An energy whose lower bound is at least what no path can cost less than.
+    """Raise an energy to the proven minimum.
 
-    A value below that is raised to it, and its error is at least by how much. So is that of an upper bound below it,
-    and of a certified path that attains it.
+    The error of a raised value is at least the difference. An upper bound below the minimum, and that of a certified
+    path that attains it, becomes the minimum plus this error.
     """
     raised = least.value - energy.value
     if energy.value >= least.lower:

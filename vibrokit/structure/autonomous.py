@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
@@ -22,13 +22,13 @@ from vibrokit.structure.borders import intervals_within
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import CONVERGED, Orbit
+from vibrokit.structure.roots import bracketed_roots
 from vibrokit.structure.scales import size_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
 """Parts of 2π/ω_n: over one of them the motion at an equilibrium is linearized."""
 _PLACES = 1024  # at which the force at rest is compared with 0
-_LEAST_FORCE = 1e-8  # of the distance between them: where a force is smallest, to rounding
 _ONE_PLACE = 1e-14  # of the range: distance of two results that are one
 _AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
 _SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
@@ -88,9 +88,8 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 
     A force changes its sign at a pole, too, so each interval between borders of the forces is searched by itself.
-    Between the places where it is evaluated, the force is searched for changes of sign where it comes near 0 and turns
-    back, so that a node and a saddle next to it are both found. A StructureError is raised for a scene with periodic
-    excitation.
+    Where the force comes near 0 between the places where it is evaluated and turns back, a node and a saddle next to it
+    are both found. A StructureError is raised for a scene with periodic excitation.
     """
     refuse_forcing(osc)
     field, rest = VectorField(osc), np.zeros(1 if osc.noise is None else 1 + len(osc.noise.extra_states))
@@ -105,29 +104,12 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
     guesses, found = list[float](), list[Equilibrium]()
     for one, other in intervals_within(osc, low, high):
         places = np.linspace(one, other, _PLACES)
-        places = np.sort([*places, *_turns_back(force_at, places, force(places))])
-        forces = force(places)
-        crossed = np.flatnonzero(forces[:-1] * forces[1:] < 0)
-        guesses += [*places[forces == 0], *(float(brentq(force_at, places[at], places[at + 1])) for at in crossed)]
+        guesses += bracketed_roots(force_at, places, force(places))
     for guess in sorted(guesses):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
             found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
     apart = _ONE_PLACE * (high - low)
     return [one for at, one in enumerate(found) if not at or abs(one.point[0] - found[at - 1].point[0]) > apart]
-
-
-def _turns_back(force: Callable[[float], float], places: Array, forces: Array) -> list[float]:
-    """Where, next to the places at which a force is smaller than at their neighbours, it is smallest or beyond 0."""
-    sizes = np.abs(forces)
-    least = (sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] <= sizes[2:]) & (forces[:-2] * forces[2:] > 0)
-    found = []
-    for at in np.flatnonzero(least) + 1:
-        side, low, high = math.copysign(1.0, forces[at]), float(places[at - 1]), float(places[at + 1])
-        nearest = minimize_scalar(
-            lambda x, side=side: side * force(x), bounds=(low, high), options={"xatol": _LEAST_FORCE * (high - low)}
-        )
-        found.append(float(nearest.x))
-    return found
 
 
 def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex128]:

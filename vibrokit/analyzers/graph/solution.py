@@ -64,21 +64,18 @@ class GraphSolution:
         whole path has no bounds, and one that is far below it is replaced by it. Exits that polished paths lead to keep
         their energies. If the work is stopped, a finding says so, and the others have no bounds.
         """
-        wanted = [
-            (energy, estimate) for energy, estimate in zip(self.energies, self.behind, strict=True)
-            if energy.target not in polished
-        ]  # fmt: skip
-        actions, findings = {id(estimate): math.inf for _, estimate in wanted}, self.findings
+        pairs, findings = list(zip(self.energies, self.behind, strict=True)), self.findings
+        actions = {estimate: math.inf for energy, estimate in pairs if energy.target not in polished}
         try:
             with stage(WHOLE_PATHS, subject=problem.attractor.name):
-                for estimate in {id(estimate): estimate for _, estimate in wanted}.values():
+                for estimate in actions:
                     found = (whole_action(problem, path) for path in estimate.paths)
-                    actions[id(estimate)] = next((action for action in found if math.isfinite(action)), math.inf)
+                    actions[estimate] = next((action for action in found if math.isfinite(action)), math.inf)
         except KeyboardInterrupt as interrupt:
             findings = (*findings, Finding.stopped(WHOLE_PATHS, interrupt, problem.source))
         energies = [
-            energy if energy.target in polished else _bounded(energy, estimate, actions[id(estimate)])
-            for energy, estimate in zip(self.energies, self.behind, strict=True)
+            energy if energy.target in polished else _bounded(energy, estimate, actions[estimate])
+            for energy, estimate in pairs
         ]
         return dataclasses.replace(self, energies=tuple(energies), findings=findings)
 

@@ -59,6 +59,11 @@ class ExitTarget(ABC):
         return False
 
     @property
+    def is_sharp(self) -> bool:
+        """Whether a path that ends on it has reached the exit; if not, motion without noise from its end shows that."""
+        return True
+
+    @property
     def places(self) -> Array:
         """States on the section that a grid has to cover, shape (count, 2)."""
         return np.empty((0, 2))
@@ -80,6 +85,11 @@ class StateTarget(ExitTarget):
     def farther(self) -> bool:
         """Whether it is a basin: a saddle on the boundary of the own basin is reached before any other basin."""
         return self.depth is not None
+
+    @property
+    def is_sharp(self) -> bool:
+        """Whether paths end on its states, and not just beyond a saddle or behind a basin boundary."""
+        return self.direction is None and self.depth is None
 
     @property
     def places(self) -> Array:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from vibrokit.analyzers.graph.lead_in import lead_in
-from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.graph.tracing import TracedPath
 from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
@@ -44,7 +43,7 @@ def whole_action(problem: ExitProblem, path: TracedPath) -> float:
 def _leads_out(problem: ExitProblem, path: TracedPath) -> bool:
     """Whether the end of a path is on a saddle or a face, or motion without noise leads on from it to the target."""
     target, end = path.target, path.start
-    if not isinstance(target, StateTarget) or (target.direction is None and target.depth is None):
+    if target.is_sharp:
         return True
     classifier = BasinClassifier.of(
         problem.scene, problem.structure, problem.stepper or ensemble_stepper(problem.scene, Flow.STATE)

@@ -68,9 +68,9 @@ class Cores:
         if self.problem.exit.by_position:
             return CoreSets(own, {}, entry)
         others = self.problem.targets
-        settled = targets_at(self.problem, intensity) or others  # exploration may take more noise than is asked for
         if self.problem.exit.at_boundary:
             return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
+        settled = targets_at(self.problem, intensity) or others  # exploration may take more noise than is asked for
         return CoreSets(own, {a.label: self._core(a, grid, intensity, size) for a in settled}, entry)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
