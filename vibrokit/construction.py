@@ -1,14 +1,18 @@
-"""Construction: what the constructors of parts, scenes, steppers and methods say about arguments they do not take."""
+"""Calls of public classes and functions: arguments that they do not take are refused with a sentence."""
 
 from __future__ import annotations
 
+import functools
 import inspect
 from abc import ABCMeta
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn, TypeVar, cast
 
 from vibrokit.errors import ArgumentError, counted, listed, nearest
 
 _OPEN = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+
+F = TypeVar("F", bound=Callable[..., Any])  # its signature stays what it is
 
 
 class Constructed(ABCMeta):
@@ -23,7 +27,7 @@ class Constructed(ABCMeta):
         except TypeError:
             if inspect.isabstract(cls):
                 _refuse_abstract(cls)
-            _check(cls, values, named)
+            _check(cls.__name__, inspect.signature(cls).parameters.values(), values, named)
             raise
 
     @property
@@ -31,6 +35,24 @@ class Constructed(ABCMeta):
         """That of the constructor, for `inspect` and the documentation."""
         own = inspect.signature(cls.__init__)  # type: ignore[misc] # of this very class
         return own.replace(parameters=list(own.parameters.values())[1:], return_annotation=own.empty)
+
+
+def called(function: F) -> F:
+    """Decorate a public function or method: wrong arguments are refused with a sentence, by an ArgumentError."""
+
+    @functools.wraps(function)
+    def checked(*values: Any, **named: Any) -> Any:
+        try:
+            return function(*values, **named)
+        except ArgumentError:
+            raise
+        except TypeError:  # only then is the signature looked at, for a call costs nothing that way
+            parameters = list(inspect.signature(function).parameters.values())
+            bound = parameters[0].name in ("self", "cls") if parameters else False
+            _check(function.__name__, parameters[bound:], values[bound:], named)
+            raise
+
+    return cast(F, checked)
 
 
 def _refuse_abstract(cls: type) -> NoReturn:
@@ -41,24 +63,26 @@ def _refuse_abstract(cls: type) -> NoReturn:
     ) from None
 
 
-def _check(cls: type, values: tuple[Any, ...], named: dict[str, Any]) -> None:
-    """Raise ArgumentError if a constructor does not take these arguments."""
-    parameters = inspect.signature(cls).parameters.values()
+def _check(
+    caller: str, takes: Iterable[inspect.Parameter], values: tuple[Any, ...], named: dict[str, Any]
+) -> None:  # fmt: skip
+    """Raise ArgumentError if these arguments do not fit the parameters."""
+    parameters = list(takes)
     names = [one.name for one in parameters if one.kind not in _OPEN]
     places = [one.name for one in parameters if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)]
     open_ended = {one.kind for one in parameters} & set(_OPEN)
     given = dict(zip(places, values, strict=False))
     for name in named:
         if name not in names and inspect.Parameter.VAR_KEYWORD not in open_ended:
-            raise ArgumentError(f"{cls.__name__} has no parameter {name!r}{nearest(name, names)}") from None
+            raise ArgumentError(f"{caller} has no parameter {name!r}{nearest(name, names)}") from None
         if name in given:
-            raise ArgumentError(f"{cls.__name__}: {name} has two values; give one.") from None
+            raise ArgumentError(f"{caller}: {name} has two values; give one.") from None
     if len(values) > len(places) and inspect.Parameter.VAR_POSITIONAL not in open_ended:
         raise ArgumentError(
-            f"{cls.__name__} takes {counted(len(places), 'value')} without a name, got {len(values)}; its parameters "
+            f"{caller} takes {counted(len(places), 'value')} without a name, got {len(values)}; its parameters "
             f"are {listed(names)}."
         ) from None
     needed = [one.name for one in parameters if one.default is one.empty and one.kind not in _OPEN]
     missing = [name for name in needed if name not in given and name not in named]
     if missing:
-        raise ArgumentError(f"{cls.__name__} needs a value of {listed(missing)}.") from None
+        raise ArgumentError(f"{caller} needs a value of {listed(missing)}.") from None

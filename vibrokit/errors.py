@@ -52,7 +52,7 @@ class CheckpointError(VibrokitError, ValueError):
 
 
 class ArgumentError(VibrokitError, TypeError):
-    """A class is called without a value that it needs, or with one that it does not take, or is abstract."""
+    """A class or function is called without a value that it needs, or with one that it does not take; or is abstract."""
 
 
 class OutOfTime(VibrokitError, TimeoutError):

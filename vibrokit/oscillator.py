@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import IntegrationError, ParameterError, SceneError, shown
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.scene import Scene
@@ -55,6 +56,7 @@ class Oscillator(Scene):
 
         return Model(self)
 
+    @called
     def trajectory(
         self,
         state: ArrayLike,
@@ -123,6 +125,7 @@ class Oscillator(Scene):
             )
         return Trajectory(times, path, tuple(barrier.position for barrier in self.barriers))
 
+    @called
     def section_map(
         self,
         states: ArrayLike,
@@ -184,6 +187,7 @@ class Oscillator(Scene):
             )
         return ended.states
 
+    @called
     def error_estimate(self, states: ArrayLike, periods: int = 1, *, stepper: Stepper | None = None) -> Array:
         """Estimate the error of `section_map` for each state by comparison with the next finer stepper.
 

@@ -11,6 +11,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+from vibrokit.construction import called
 from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, nearest_form, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
@@ -31,11 +32,13 @@ _KEYS = ("natural_frequency", "damping_ratio", "spring", "barriers", "excitation
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
 
+@called
 def bundled_scenes() -> tuple[str, ...]:
     """Return the names of the bundled scenes."""
     return tuple(sorted(path.stem for path in _BUNDLED.glob("*.toml")))
 
 
+@called
 def load_scene(source: str | os.PathLike[str]) -> Oscillator:
     """Read a scene from a file, or a bundled scene by name.
 
@@ -108,6 +111,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path} is not valid TOML: {' '.join(str(error).split())}.") from error
 
 
+@called
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to a TOML file. Writing is atomic.
 

@@ -1,4 +1,4 @@
-"""Constructors called with arguments that they do not take, and abstract classes."""
+"""Classes, functions and methods called with arguments that they do not take, and abstract classes."""
 
 import inspect
 import pickle
@@ -7,6 +7,8 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.errors import ArgumentError, VibrokitError
+
+SCENE = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
 
 WRONG = [
     (lambda: vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, mass=2.0), "mass"),
@@ -23,6 +25,22 @@ WRONG = [
     (lambda: vk.Shooting(point=100), "'points'"),
     (lambda: vk.FirstContact(sides="left"), "'side'"),
     (vk.Constant, "force"),
+    (lambda: vk.find_structure(SCENE, region_=((-1, 1), (-1, 1))), "'region'"),
+    (lambda: vk.find_structure(SCENE, ((-1, 1), (-1, 1))), "1 value without a name, got 2"),
+    (vk.find_structure, "osc"),
+    (lambda: vk.continuation(SCENE, "damping_ratio"), "values"),
+    (lambda: vk.unstable_orbits(SCENE, 3, start=(8, 8)), "'starts'"),
+    (lambda: vk.evolve_density(SCENE, ((-1, 1), (-1, 1)), node=(40, 40)), "'nodes'"),
+    (lambda: SCENE.trajectory((0.0, 0.0), period=3), "'periods'"),
+    (lambda: SCENE.trajectory((0.0, 0.0), 3, 4), "2 values without a name, got 3"),
+    (SCENE.section_map, "states"),
+    (vk.occupancies, "result"),
+    (lambda: vk.Transitions(1), "energies, lower, upper"),
+    (lambda: vk.Transitions.of(result=1), "result"),
+    (lambda: vk.ExitProblem(osc=SCENE), "structure"),
+    (vk.load_result, "path"),
+    (lambda: vk.LeastAction().run(SCENE), "structure"),
+    (lambda: vk.Finding(cod=1), "'code'"),
     (lambda: vk.CubicSpring(1.0, 2.0, 3.0), "cubic"),
 ]
 
@@ -67,3 +85,30 @@ def test_signatures_are_those_of_the_constructors():
     assert list(inspect.signature(vk.Harmonic).parameters) == ["amplitude", "frequency", "phase"]
     assert list(inspect.signature(vk.CustomLaw).parameters) == ["formula", "constants"]
     assert pickle.loads(pickle.dumps(vk.Harmonic(1.0, 2.0))) == vk.Harmonic(1.0, 2.0)
+
+
+def users_functions():
+    """Public functions, and the methods that users call with arguments."""
+    classes = [vk.Oscillator, vk.Analyzer, vk.Transitions, vk.StationaryDensity, vk.Record]
+    classes += [kind for one in map(vars(vk).get, vk.__all__) if inspect.isclass(one) for kind in one.__subclasses__()]
+    for name in vk.__all__:
+        if inspect.isfunction(getattr(vk, name)):
+            yield name, getattr(vk, name)
+    for kind in dict.fromkeys(one for one in classes if not issubclass(one, vk.Analyzer) or one is vk.Analyzer):
+        for name, value in vars(kind).items():
+            if name in USED and not getattr(value, "__isabstractmethod__", False):
+                yield f"{kind.__name__}.{name}", value
+
+
+USED = {
+    "trajectory", "section_map", "error_estimate", "run", "route", "stationary_weights", "found", "save", "energy",
+    "exit_of", "plot", "attractor", "plot_orbits", "plot_paths", "plot_history", "plot_quasi_potential", "changes",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "function"), list(users_functions()))
+def test_every_function_of_users_refuses_a_word_that_it_does_not_know(name, function):
+    with pytest.raises(ArgumentError, match="no_such_word"):
+        function(no_such_word=1)
+    assert "no_such_word" not in inspect.signature(function).parameters
+    assert pickle.loads(pickle.dumps(vk.find_structure)) is vk.find_structure

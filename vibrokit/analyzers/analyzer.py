@@ -19,7 +19,7 @@ from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.metastability import metastability
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
-from vibrokit.construction import Constructed
+from vibrokit.construction import Constructed, called
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -39,7 +39,7 @@ _WEAK = 3.0  # ΔU/D: below, exp(ΔU/D) varies no faster than the prefactor, and
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Analysis:
+class Analysis(metaclass=Constructed):
     """What a method found about one attractor.
 
     Attributes
@@ -123,6 +123,7 @@ class Analyzer(ABC, metaclass=Constructed):
             The method cannot be used for this attractor; the others are analyzed all the same.
         """
 
+    @called
     def run(
         self,
         osc: Oscillator,

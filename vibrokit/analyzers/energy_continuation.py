@@ -13,6 +13,7 @@ from vibrokit.analyzers.least_action import LeastAction
 from vibrokit.analyzers.polishing.followed_path import FollowedPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
+from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, stage, working
@@ -35,6 +36,7 @@ _ROUNDING = 1e-6  # of an action: the same, where the change is small
 Array = NDArray[np.float64]
 
 
+@called
 def energy_continuation(
     osc: Oscillator,
     parameter: str,

@@ -17,6 +17,7 @@ from vibrokit.analyzers.neighbourhoods import nearest
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
+from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -40,6 +41,7 @@ _SAME = 1e-9  # section intervals: times that differ by less are equal
 Array = NDArray[np.float64]
 
 
+@called
 def evolve_density(
     osc: Oscillator,
     region: Any,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.exits import Exit
 from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError
 from vibrokit.kernels import choice
 from vibrokit.kernels.ensemble import Stop
@@ -30,7 +31,7 @@ _REFINEMENTS = 5  # of an ensemble stepper, until it reproduces the attractor's 
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ExitProblem:
+class ExitProblem(metaclass=Constructed):
     """The question that an analyzer answers: how is this attractor left?
 
     Attributes

@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.special import expit, logsumexp
 
 from vibrokit.analyzers.metastability import HELD, METASTABLE
+from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.rated import RatedResult
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
+@called
 def occupancies(result: RatedResult) -> xarray.DataArray:
     """Return the stationary probability of each metastable state, over (intensity, attractor), from rates alone.
 

@@ -14,6 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.special import logsumexp
 
 from vibrokit.comparison.occupancies import balances, occupancies, shares_text
+from vibrokit.construction import Constructed, called
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
@@ -29,7 +30,7 @@ _LOWEST = -1e6  # in place of −inf where ln p is interpolated
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class StationaryDensity:
+class StationaryDensity(metaclass=Constructed):
     """Stationary probabilities of all attractors and the density on the section, at finite noise.
 
     The exit rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from
@@ -61,6 +62,7 @@ class StationaryDensity:
     occupancies: xarray.DataArray
 
     @classmethod
+    @called
     def of(cls, result: SGCMResult, nodes: tuple[int, int] = (240, 240)) -> StationaryDensity:
         """Combine what `SGCM` found for every attractor of a scene.
 
@@ -105,6 +107,7 @@ class StationaryDensity:
         coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
         return xarray.DataArray(values, coordinates, ("intensity", "x", "v"), name)
 
+    @called
     def plot(
         self, ax: Any = None, intensity: float | None = None, paths: Sequence[ArrayLike] = ()
     ) -> QuasiPotentialArtists:

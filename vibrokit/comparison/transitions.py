@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
+from vibrokit.construction import Constructed, called
 from vibrokit.errors import StructureError
 from vibrokit.results.labels import exit_between, label_of
 from vibrokit.results.result import Result
@@ -57,7 +58,7 @@ class StationaryWeights:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Transitions:
+class Transitions(metaclass=Constructed):
     """Activation energies between all attractors, and the long-term behaviour under weak noise that follows from them.
 
     For D → 0 the motion jumps from attractor i to attractor j at rates like exp(−V_ij/D), and the stationary weight of
@@ -101,6 +102,7 @@ class Transitions:
             raise StructureError("transitions need 0 ≤ lower ≤ energies ≤ upper, and no NaN.")
 
     @classmethod
+    @called
     def of(cls, *results: Result) -> Transitions:
         """Collect the energies of results on one scene, the least of each pair of attractors.
 
@@ -180,6 +182,7 @@ class Transitions:
         """Least cost of getting from row to column, also through other attractors (m² s⁻³); shape of `energies`."""
         return self._shortest[0]
 
+    @called
     def route(self, source: int | str, target: int | str) -> tuple[int, ...]:
         """Return the labels along the cheapest route, both ends included; empty if there is no route.
 
@@ -197,6 +200,7 @@ class Transitions:
             route.append(int(before[start, route[-1]]))
         return tuple(reversed(route))
 
+    @called
     def stationary_weights(self, intensity: float) -> StationaryWeights:
         """Return the exponents of the stationary weights at a noise intensity D (m² s⁻³).
 

@@ -7,6 +7,7 @@ import math
 from numbers import Real
 from typing import Any
 
+from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
 
 _KEY = "vibrokit.parameter"
@@ -73,6 +74,7 @@ class Parameter:
         return number
 
 
+@called
 def parameter(
     symbol: str,
     unit: str,

@@ -10,7 +10,7 @@ from fractions import Fraction
 from numbers import Real
 from typing import Any, NamedTuple, Self
 
-from vibrokit.construction import Constructed
+from vibrokit.construction import Constructed, called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.excitation.excitation import Excitation
@@ -122,6 +122,7 @@ class Scene(metaclass=Constructed):
         """Every parameter by its path, such as ``"excitations.0.frequency"``."""
         return {entry.path: entry.value for entry in self.entries}
 
+    @called
     def entry(self, path: str) -> Entry:
         """Return the parameter at a path.
 
@@ -147,6 +148,7 @@ class Scene(metaclass=Constructed):
             )
         return entries[found[0]]
 
+    @called
     def replace(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> Self:
         """Return a copy with some parameters or parts changed, checked like a new scene.
 

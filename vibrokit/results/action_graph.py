@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from vibrokit.construction import called
 from vibrokit.results.result import Result
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class ActionGraphResult(Result):
 
     kind: ClassVar[str] = "action_graph"
 
+    @called
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
         """Draw a quasi-potential; see `Result.plot_quasi_potential`."""
         return self.plot_quasi_potential(source, ax)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.labels import source_among
@@ -34,6 +35,7 @@ class ActionPlotResult(Result):
 
     kind: ClassVar[str] = "action_plot"
 
+    @called
     def plot(self, ax: Any = None) -> ActionPlotArtists:
         """Draw action against angle; see `vibrokit.plots.actions.action_plot`."""
         from vibrokit.plots.actions import action_plot
@@ -50,6 +52,7 @@ class ActionPlotResult(Result):
             ax=ax,
         )
 
+    @called
     def plot_domain(self, source: int | str | None = None, ax: Any = None) -> ActionMapArtists:
         """Draw the action over the fundamental domain; see `vibrokit.plots.actions.action_map`.
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
@@ -160,6 +161,7 @@ class Continuation(AlongParameter):
             ),
         )
 
+    @called
     def plot(self, ax: Any = None) -> BifurcationArtists:
         """Draw the bifurcation diagram; see `vibrokit.plots.bifurcation.bifurcation_diagram`."""
         from vibrokit.plots.bifurcation import bifurcation_diagram
@@ -174,6 +176,7 @@ class Continuation(AlongParameter):
         marks = [(found.kind, found.value, float(found.point[0])) for found in self.bifurcations]
         return bifurcation_diagram(values, x, branches, marks, names=self.branch_names, label=self.axis_label, ax=ax)
 
+    @called
     def plot_fractions(self, ax: Any = None) -> FractionArtists:
         """Draw the basin fractions along the parameter; see `vibrokit.plots.bifurcation.basin_fractions`."""
         from vibrokit.plots.bifurcation import basin_fractions

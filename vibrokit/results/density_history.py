@@ -8,6 +8,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.record import Record
@@ -81,6 +82,7 @@ class DensityHistory(Record):
         times = counted(len(self.times), "time")
         return Summary(f"Density on {len(self.x)} × {len(self.v)} nodes at {times}", tuple(rows))
 
+    @called
     def plot(self, ax: Any = None, axis: str = "x") -> MarginalArtists:
         """Draw the marginal densities of x, or of v, at all times."""
         from vibrokit.plots.densities import marginal_lines

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import Constructed
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.basins import ESCAPED
@@ -136,7 +137,7 @@ class Certificate:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ActivationEnergy:
+class ActivationEnergy(metaclass=Constructed):
     """Activation energy ΔU of one exit; the mean exit time grows like exp(ΔU/D) as D → 0.
 
     Attributes

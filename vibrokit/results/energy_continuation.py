@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
@@ -99,6 +100,7 @@ class EnergyContinuation(AlongParameter):
             for number, name in enumerate(exits)
         )
 
+    @called
     def energy(self, source: str, target: str | None = None) -> Array:
         """Return the least action at each value (m² s⁻³), NaN where no path is known.
 
@@ -118,6 +120,7 @@ class EnergyContinuation(AlongParameter):
         least = np.where(np.isnan(actions), np.inf, actions).min(axis=0)
         return np.where(np.isinf(least), np.nan, least)
 
+    @called
     def changes(self, source: str, target: str | None = None) -> tuple[LeastPathChange, ...]:
         """Return where another path becomes the cheapest one of an exit; arguments and errors as of `energy`.
 
@@ -167,6 +170,7 @@ class EnergyContinuation(AlongParameter):
         count = counted(len(self.branches), "path")
         return Summary(f"Energy continuation: {count} at {values}", tuple(rows))
 
+    @called
     def plot(self, ax: Any = None) -> EnergyCurveArtists:
         """Draw the actions along the parameter; see `vibrokit.plots.energy_curves.energy_curves`."""
         from vibrokit.plots.energy_curves import energy_curves

@@ -6,11 +6,12 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
+from vibrokit.construction import Constructed
 from vibrokit.results.labels import exit_between
 
 
 @dataclasses.dataclass(frozen=True)
-class ExitRate:
+class ExitRate(metaclass=Constructed):
     """Rate of exits from an attractor at a finite noise intensity.
 
     Attributes

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, UnknownNameError, shown
 from vibrokit.registry import Group, load
 from vibrokit.results.arrays import LARGEST_WHOLE, taken
@@ -39,6 +40,7 @@ def save_record(record: Record, path: str | os.PathLike[str]) -> None:
     write_atomically(Path(path), content)
 
 
+@called
 def load_result(path: str | os.PathLike[str]) -> Any:
     """Open a saved `Record`, such as a `Result` or a `Structure`.
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from vibrokit.construction import Constructed
 from vibrokit.errors import OutOfTime, counted, shown
 from vibrokit.progress import Deadline
 from vibrokit.results.basins import ESCAPED
@@ -16,7 +17,7 @@ Value = float | int | str | bool | None | Sequence[float] | Sequence[int] | Sequ
 
 
 @dataclasses.dataclass(frozen=True)
-class Finding:
+class Finding(metaclass=Constructed):
     """One thing that an analysis found; ``str(finding)`` is its sentence.
 
     Attributes

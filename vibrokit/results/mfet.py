@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.results.labels import source_among
 from vibrokit.results.rated import RatedResult
@@ -96,10 +97,12 @@ class MFETResult(RatedResult):
         wanted = intensities.min() if intensity is None else intensity
         return own.isel(intensity_index=known[np.argmin(np.abs(np.log(intensities / wanted)))])
 
+    @called
     def plot(self, ax: Any = None) -> ExitTimeArtists:
         """Draw ln τ against 1/D; see `RatedResult.plot_rates`."""
         return self.plot_rates(ax)
 
+    @called
     def plot_exit_times(self, ax: Any = None, source: int | str = 0, intensity: float | None = None) -> SurvivalArtists:
         """Draw the share of walkers that have not left, with the exponential law; see `vibrokit.plots.survival`."""
         from vibrokit.plots.survival import survival
@@ -110,6 +113,7 @@ class MFETResult(RatedResult):
         rate = float(np.nansum(np.exp(one["log_rate"].values)))
         return survival(times, int(one["walkers_left_over"]), 1.0 / rate, label=int(one["source"]), ax=ax)
 
+    @called
     def plot_escapes(
         self,
         ax: Any = None,

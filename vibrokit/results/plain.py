@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, UnknownNameError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.codes import Code
@@ -49,6 +50,7 @@ class PlainRecord(Record):
         except ResultFileError:
             return ()
 
+    @called
     def plot(self, ax: Any = None) -> Any:
         """Raise UnknownNameError: only the package that registers the kind can draw it."""
         raise UnknownNameError(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.arrhenius import ArrheniusFit
@@ -129,6 +130,7 @@ class RatedResult(Result):
             )
         return ArrheniusFit.of([rate for rate in own if rate.target == wanted])
 
+    @called
     def plot_rates(self, ax: Any = None, source: int | str | None = None) -> ExitTimeArtists:
         """Draw ln τ against 1/D, τ = 1/rate; see `vibrokit.plots.exit_times.exit_times`.
 
@@ -142,6 +144,7 @@ class RatedResult(Result):
 
         return exit_times(self._exit_times(source), ax=ax)
 
+    @called
     def plot_slopes(
         self, ax: Any = None, source: int | str | None = None, limits: Iterable[ActivationEnergy] = ()
     ) -> SlopeArtists:

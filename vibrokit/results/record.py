@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
+from vibrokit.construction import Constructed, called
 from vibrokit.progress import Stats
 from vibrokit.registry import load_attribute
 from vibrokit.results.codes import Code, Severity
@@ -32,7 +33,7 @@ def versions() -> dict[str, str]:
 
 @dataclass_transform(frozen_default=True, eq_default=False, kw_only_default=True, field_specifiers=(dataclasses.field,))
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Record(ABC):
+class Record(ABC, metaclass=Constructed):
     """The outcome of one piece of work. Abstract.
 
     A subclass becomes a frozen dataclass by itself; no decorator is needed.
@@ -107,6 +108,7 @@ class Record(ABC):
         """The findings as sentences, a line each."""
         return "\n".join(finding.sentence(self.names) for finding in self.findings)
 
+    @called
     def found(self, code: Code) -> tuple[Finding, ...]:
         """Return the findings of a code."""
         return tuple(finding for finding in self.findings if finding.code is code)
@@ -134,6 +136,7 @@ class Record(ABC):
         oscillator: Oscillator = load_attribute("vibrokit.scene_file:scene_from_data")(self.scene)
         return oscillator
 
+    @called
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
         from vibrokit.results.files import save_record

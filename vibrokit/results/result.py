@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted
 from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
@@ -92,6 +93,7 @@ class Result(Record):
         """Names of the attractors, in the order of their labels."""
         return self.section.names
 
+    @called
     def energy(self, source: int | str, target: int | str | None = None) -> ActivationEnergy:
         """Return the activation energy of one exit, by labels or names.
 
@@ -116,6 +118,7 @@ class Result(Record):
             raise StructureError(f"there is no energy of {wanted}; the result has {known}.")
         return min(found, key=lambda energy: energy.value)
 
+    @called
     def exit_of(self, energy: ActivationEnergy | ExitRate) -> str:
         """Return the names of the attractors between which an exit leads: ``"hammering → clear"``."""
         return energy.exit_between(self.names)
@@ -148,10 +151,12 @@ class Result(Record):
         analyzer: Analyzer = load_attribute("vibrokit.analyzers.settings:analyzer_from")(self.settings)
         return analyzer
 
+    @called
     def plot(self, ax: Any = None) -> Any:
         """Draw the exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`."""
         return self.plot_paths(ax)
 
+    @called
     def plot_paths(self, ax: Any = None) -> ExitPathArtists:
         """Draw the exit paths over basins and manifolds; see `vibrokit.plots.exit_paths.exit_paths`."""
         from vibrokit.plots.exit_paths import exit_paths
@@ -173,6 +178,7 @@ class Result(Record):
             ax=ax,
         )
 
+    @called
     def plot_history(self, ax: Any = None) -> HistoryArtists:
         """Draw p₂ and S along each exit path; see `vibrokit.plots.exit_paths.path_history`.
 
@@ -201,6 +207,7 @@ class Result(Record):
         value = f"{mantissa} × 10$^{{{int(exponent)}}}$" if exponent else mantissa
         return f"{self.exit_of(energy)}, $\\Delta U$ = {value} m$^2$ s$^{{-3}}$"
 
+    @called
     def plot_quasi_potential(self, source: int | str | None = None, ax: Any = None) -> QuasiPotentialArtists:
         """Draw a quasi-potential on the section; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
 

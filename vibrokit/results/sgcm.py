@@ -8,6 +8,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.results.labels import source_among
 from vibrokit.results.rated import RatedResult
@@ -104,6 +105,7 @@ class SGCMResult(RatedResult):
         labels = self.data["source"].values.tolist() if "log_density" in self.data else []
         return self.data.isel(source=labels.index(source_among(labels, source, self.names, "density", "of")))
 
+    @called
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
         """Draw −D ln p at the least intensity; see `Result.plot_quasi_potential`."""
         return self.plot_quasi_potential(source, ax)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray
 
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
@@ -108,6 +109,7 @@ class Structure(Record):
         """Names of the attractors, in the order of their labels."""
         return tuple(attractor.name for attractor in self.attractors)
 
+    @called
     def attractor(self, which: int | str) -> Attractor:
         """Return the attractor of a label or a name; the beginning of a name is enough if it is unique.
 
@@ -128,6 +130,7 @@ class Structure(Record):
             tuple((attractor.name, *attractor.description) for attractor in self.attractors),
         )
 
+    @called
     def plot(self, ax: Any = None) -> SectionArtists:
         """Draw attractors, saddles and manifolds over the basins; see `vibrokit.plots.basins.section_portrait`.
 
@@ -150,6 +153,7 @@ class Structure(Record):
             ax=ax,
         )
 
+    @called
     def plot_orbits(self, ax: Any = None) -> MotionArtists:
         """Draw the steady motions in the phase plane; see `vibrokit.plots.portraits.steady_motions`."""
         from vibrokit.plots.portraits import steady_motions

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
+
 if TYPE_CHECKING:
     import xarray
 
@@ -63,6 +65,7 @@ class Trajectory:
     def _repr_html_(self) -> str:
         return f"<pre>{self!r}</pre>"
 
+    @called
     def plot(self, ax: Any = None) -> PortraitArtists:
         """Draw the phase portrait; see `vibrokit.plots.portraits.phase_portrait`."""
         from vibrokit.plots.portraits import phase_portrait

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -47,6 +48,7 @@ _FEW = (2, 2)  # cells where only the attractors are wanted
 Array = NDArray[np.float64]
 
 
+@called
 def continuation(
     osc: Oscillator,
     parameter: str,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vibrokit.construction import called
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, put_off, working
@@ -15,6 +16,7 @@ from vibrokit.structure.finder import Finder
 from vibrokit.structure.validation import Request, check_means, seed_of, stepper_of
 
 
+@called
 def find_structure(
     osc: Oscillator,
     *,

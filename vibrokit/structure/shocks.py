@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.named import named_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -33,6 +34,7 @@ _MOST = 10**5
 Array = NDArray[np.float64]
 
 
+@called
 def shape_stability(
     osc: Oscillator,
     structure: Structure,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import run_ensemble
@@ -40,6 +41,7 @@ _MOST_STARTS = 10**6
 Array = NDArray[np.float64]
 
 
+@called
 def unstable_orbits(
     osc: Oscillator,
     period: int,
