@@ -6,7 +6,7 @@ import stat
 import pytest
 
 import vibrokit as vk
-from vibrokit.errors import SceneError
+from vibrokit.errors import FileError, SceneError
 from vibrokit.results import atomic
 from vibrokit.scene_file import bundled_scenes, scene_data, scene_from_data
 
@@ -79,7 +79,7 @@ class TestSaving:
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr(atomic.os, fails, full)
-        with pytest.raises(SceneError, match=r"scene\.toml cannot be written \(No space left on device\); give .*\.$"):
+        with pytest.raises(FileError, match=r"scene\.toml cannot be written \(No space left on device\); give .*\.$"):
             vk.save_scene(everything(), path)
         assert path.read_text() == "old"
         assert os.listdir(tmp_path) == ["scene.toml"]
@@ -87,7 +87,9 @@ class TestSaving:
     @pytest.mark.parametrize("place", ["missing/scene.toml", "file/scene.toml", ""])
     def test_places_that_cannot_be_written(self, tmp_path, place):
         (tmp_path / "file").write_text("")
-        with pytest.raises(SceneError, match=r"cannot be written \(.*\); give .*\.$"):
+        with pytest.raises(
+            FileError, match=r"is no folder; make it first\.$|is a folder; add the name of a file\.$"
+        ):
             vk.save_scene(everything(), tmp_path / place)
         assert os.listdir(tmp_path) == ["file"]
 

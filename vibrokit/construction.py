@@ -63,9 +63,7 @@ def _refuse_abstract(cls: type) -> NoReturn:
     ) from None
 
 
-def _check(
-    caller: str, takes: Iterable[inspect.Parameter], values: tuple[Any, ...], named: dict[str, Any]
-) -> None:  # fmt: skip
+def _check(caller: str, takes: Iterable[inspect.Parameter], values: tuple[Any, ...], named: dict[str, Any]) -> None:
     """Raise ArgumentError if these arguments do not fit the parameters."""
     parameters = list(takes)
     names = [one.name for one in parameters if one.kind not in _OPEN]

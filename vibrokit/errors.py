@@ -47,12 +47,20 @@ class ResultFileError(VibrokitError, ValueError):
     """A file is not a saved result, its parts contradict one another, or a result cannot be saved."""
 
 
+class FileError(VibrokitError, OSError):
+    """A file cannot be written."""
+
+
+class NoSuchFileError(FileError, FileNotFoundError):
+    """There is no file or folder of this name."""
+
+
 class CheckpointError(VibrokitError, ValueError):
     """A checkpoint is damaged, or belongs to other work."""
 
 
 class ArgumentError(VibrokitError, TypeError):
-    """A class or function is called without a value that it needs, or with one that it does not take; or is abstract."""
+    """A class or function lacks a value that it needs, or is given one that it does not take; a class is abstract."""
 
 
 class OutOfTime(VibrokitError, TimeoutError):
@@ -88,6 +96,11 @@ def shown(value: object) -> str:
 _LONGEST_SHOWN = 120
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _LONGEST_SHOWN
+
+
+def reason(error: Exception) -> str:
+    """Return why the system refused a file, without its number and the path."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

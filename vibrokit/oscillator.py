@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _SAMPLES = 256
 _MOST_SAMPLES = 10**8
+_MOST_PERIODS = 10**15
 _PERIODS = Parameter("periods", "", "", "", above=0)
 _DURATION = Parameter("duration", "", "", "s", above=0)
 _START_TIME = Parameter("start_time", "", "", "s")
@@ -98,12 +99,14 @@ class Oscillator(Scene):
         """
         from vibrokit.kernels.choice import single_stepper
         from vibrokit.kernels.ending import ending
+        from vibrokit.kernels.named import check_stepper
         from vibrokit.kernels.single import record
 
         start = self._checked_states(state, 1)[0]
         start_time = _START_TIME.checked("trajectory", start_time)
         length, count = self._sampling(periods, duration, samples)
         flow = Flow.STATE if rng is None else self._noisy()
+        check_stepper(stepper)
         chosen = stepper or single_stepper(self, flow)
         seed = None if rng is None else seed_from(rng)
         path = record(self, flow, chosen, start, start_time, length / count, count, seed=seed)
@@ -163,13 +166,19 @@ class Oscillator(Scene):
         from vibrokit.kernels.choice import ensemble_stepper
         from vibrokit.kernels.ending import ending
         from vibrokit.kernels.ensemble import run_ensemble
+        from vibrokit.kernels.named import check_stepper
         from vibrokit.kernels.streams import streams_of
+        from vibrokit.kernels.tasks import check_executor
 
         starts = self._checked_states(states, 2)
-        if isinstance(periods, bool) or not isinstance(periods, Integral) or periods < 0:
-            raise ParameterError(f"section_map: periods must be a whole number, at least 0, got {shown(periods)}.")
+        if isinstance(periods, bool) or not isinstance(periods, Integral) or not 0 <= periods <= _MOST_PERIODS:
+            raise ParameterError(
+                f"section_map: periods must be a whole number from 0 to {_MOST_PERIODS}, got {shown(periods)}."
+            )
         flow = Flow.STATE if rng is None else self._noisy()
+        check_stepper(stepper)
         chosen = stepper or ensemble_stepper(self, flow)
+        check_executor(executor)
         streams = None if rng is None else streams_of(seed_from(rng), np.arange(len(starts)))
         ended = run_ensemble(self, flow, chosen, starts, int(periods), streams=streams, executor=executor)
         failed = np.flatnonzero(ended.intervals < periods)
@@ -197,7 +206,9 @@ class Oscillator(Scene):
             Distance between the two results.
         """
         from vibrokit.kernels.choice import ensemble_stepper
+        from vibrokit.kernels.named import check_stepper
 
+        check_stepper(stepper)
         chosen = stepper or ensemble_stepper(self, Flow.STATE)
         coarse = self.section_map(states, periods, stepper=chosen)
         fine = self.section_map(states, periods, stepper=chosen.refined())
@@ -228,8 +239,10 @@ class Oscillator(Scene):
         """Length of a trajectory (s), and number of samples after the initial one."""
         if (periods is None) == (duration is None):
             raise ParameterError("trajectory: give either periods or duration.")
-        if isinstance(samples, bool) or not isinstance(samples, Integral) or samples < 1:
-            raise ParameterError(f"trajectory: samples must be a whole number, at least 1, got {shown(samples)}.")
+        if isinstance(samples, bool) or not isinstance(samples, Integral) or not 1 <= samples <= _MOST_SAMPLES:
+            raise ParameterError(
+                f"trajectory: samples must be a whole number from 1 to {_MOST_SAMPLES}, got {shown(samples)}."
+            )
         if duration is not None:
             length = _DURATION.checked("trajectory", duration)
         else:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from vibrokit.arguments import real
 from vibrokit.blas import one_blas_thread
 from vibrokit.errors import OutOfTime, StructureError, shown
 from vibrokit.registry import load_attribute
@@ -302,9 +303,9 @@ def checked_time_limit(seconds: Any) -> float | None:
     """Return a time limit (s) or None; raises StructureError for anything else."""
     if seconds is None:
         return None
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
+    if not 0 < real(seconds) < math.inf:
         raise StructureError(f"time_limit must be a positive number of seconds or None, got {shown(seconds)}.")
-    return float(seconds)
+    return real(seconds)
 
 
 def _listener(progress: Progress) -> Listener | None:

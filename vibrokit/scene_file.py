@@ -118,7 +118,9 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     SceneError
-        The class of a part is not registered, so the file cannot name it; or the file cannot be written.
+        The class of a part is not registered, so the file cannot name it.
+    FileError
+        The file cannot be written.
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"save_scene: scene must be an Oscillator, got {shown(scene)}.")
@@ -129,10 +131,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
                 f"{values['name']} is not registered, so a scene file cannot name it; register the class under the "
                 f"entry-point group {kind.value!r}."
             )
-    try:
-        write_atomically(Path(path), _toml(data).encode("utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path} cannot be written ({error.strerror}); give a path in a writable folder.") from error
+    write_atomically(path, _toml(data).encode("utf-8"))
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:

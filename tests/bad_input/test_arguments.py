@@ -3,6 +3,7 @@
 import inspect
 import pickle
 
+import numpy as np
 import pytest
 
 import vibrokit as vk
@@ -85,6 +86,46 @@ def test_signatures_are_those_of_the_constructors():
     assert list(inspect.signature(vk.Harmonic).parameters) == ["amplitude", "frequency", "phase"]
     assert list(inspect.signature(vk.CustomLaw).parameters) == ["formula", "constants"]
     assert pickle.loads(pickle.dumps(vk.Harmonic(1.0, 2.0))) == vk.Harmonic(1.0, 2.0)
+
+
+HUGE = 10**400  # no float
+WRONG_TYPES = [
+    lambda: vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, barriers=np.array(3.0)),
+    lambda: vk.Barrier(vk.Hertz(1.0), position=1.0, side=np.array([1, 2])),
+    lambda: vk.FirstContact(side=np.array([1, 2])),
+    lambda: vk.SGCM(intensities=HUGE),
+    lambda: vk.MFET(intensities=np.array(3.0)),
+    lambda: vk.MFET(target_error=HUGE),
+    lambda: vk.MFET(splitting=np.array([])),
+    lambda: vk.ActionPlot(radius=HUGE),
+    lambda: vk.find_structure("hertz"),
+    lambda: vk.find_structure(SCENE, settling=HUGE),
+    lambda: vk.find_structure(SCENE, time_limit=HUGE),
+    lambda: vk.continuation(SCENE, "damping_ratio", np.array(3.0)),
+    lambda: vk.continuation(SCENE, "damping_ratio", [HUGE]),
+    lambda: vk.evolve_density(SCENE.replace(noise=vk.WhiteNoise(1.0)), ((-1, 1), (-1, 1)), np.array(3.0) * np.nan),
+    lambda: vk.evolve_density(SCENE.replace(noise=vk.WhiteNoise(1.0)), ((-1, 1), (-1, 1)), phase=HUGE),
+    lambda: vk.unstable_orbits(SCENE, 1, classifier="basins"),
+    lambda: vk.occupancies(3),
+    lambda: vk.Transitions.of("result"),
+    lambda: vk.Transitions(3, 1, 1, 1),
+    lambda: vk.Transitions(("a",), [[0.0]], [[0.0]], [[0.0]]),
+    lambda: SCENE.trajectory((0.0, 0.0), 1, samples=HUGE),
+    lambda: SCENE.trajectory((0.0, 0.0), 1, stepper=np.array([])),
+    lambda: SCENE.section_map([[0.0, 0.0]], HUGE),
+    lambda: SCENE.section_map([[0.0, 0.0]], executor="threads"),
+    lambda: SCENE.trajectory((0.0, 0.0), 1, samples=1).plot(ax="here"),
+    lambda: vk.save_scene(SCENE, 3),
+    lambda: vk.save_scene(SCENE, "a\0b"),
+    lambda: vk.load_result(3),
+    lambda: vk.load_result("a\0b"),
+]
+
+
+@pytest.mark.parametrize("call", WRONG_TYPES)
+def test_values_of_wrong_types_are_refused_in_a_sentence(call):
+    with pytest.raises(VibrokitError, match=r"(?s)\.$"):
+        call()
 
 
 def users_functions():

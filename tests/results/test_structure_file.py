@@ -24,8 +24,8 @@ from tests.builders import (
     rewritten,
     say,
 )  # fmt: skip
+from vibrokit.errors import ArgumentError, NoSuchFileError, ResultFileError
 from vibrokit.results.basins import Basins
-from vibrokit.results.files import ResultFileError
 from vibrokit.results.structure import Structure
 
 
@@ -271,9 +271,13 @@ def test_huge_claims_cost_nothing_and_are_refused(variables, lengths, room, word
 def test_what_is_no_file_is_refused_in_a_sentence(tmp_path):
     with pytest.raises(ResultFileError, match="cannot be read"):
         vk.load_result(tmp_path)
-    with pytest.raises(ResultFileError, match="cannot be read"):
+    with pytest.raises(ArgumentError, match="got 3"):
         vk.load_result(3)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(NoSuchFileError, match="give a file written by save") as raised:
+        vk.load_result(tmp_path / "none.nc")
+    assert isinstance(raised.value, FileNotFoundError)
+    (tmp_path / "nine.nc").write_bytes(b"")
+    with pytest.raises(NoSuchFileError, match=r"nine\.nc"):
         vk.load_result(tmp_path / "none.nc")
 
 

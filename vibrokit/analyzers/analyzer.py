@@ -9,7 +9,6 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from pathlib import Path
 from typing import Any, ClassVar, dataclass_transform
 
 import xarray
@@ -19,6 +18,7 @@ from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.metastability import metastability
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
+from vibrokit.arguments import path_of
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
@@ -237,7 +237,7 @@ class Analyzer(ABC, metaclass=Constructed):
             return Checkpoint(None, {})
         if not self.keeps_checkpoints:
             raise StructureError(f"{type(self).__name__} does not write checkpoints; leave out checkpoint=.")
-        where = Path(path)
+        where = path_of(path)
         if not where.parent.is_dir():
             raise StructureError(f"the folder {where.parent} of the checkpoint does not exist; make it first.")
         points = [attractor.points.tolist() for attractor in structure.attractors]

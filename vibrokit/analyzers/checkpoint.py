@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.errors import CheckpointError
+from vibrokit.errors import CheckpointError, reason
 from vibrokit.results.atomic import write_atomically
 
 _PAUSE = 2.0  # seconds between two writes, so that these take a small share of the time
@@ -81,7 +81,12 @@ class Checkpoint:
         self._written = time.monotonic()
 
     def _read(self, path: Path) -> dict[str, NDArray[Any]]:
-        content = path.read_bytes()
+        try:
+            content = path.read_bytes()
+        except (OSError, ValueError) as error:
+            raise CheckpointError(
+                f"the checkpoint {path} cannot be read ({reason(error)}); choose another name."
+            ) from error
         digest, body = content[:32], content[32:]
         if hashlib.sha256(body).digest() != digest:
             raise CheckpointError(f"{path} is no checkpoint, or it is damaged; choose another name, or delete it.")

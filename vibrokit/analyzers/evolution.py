@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from vibrokit.analyzers.neighbourhoods import nearest
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
+from vibrokit.arguments import members, real
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper
@@ -184,21 +184,22 @@ def _findings(times: Array, masses: list[float], changes: list[float]) -> list[F
 
 
 def _checked_phase(phase: object) -> float:
-    if isinstance(phase, bool) or not isinstance(phase, Real) or not 0 <= float(phase) < 1:
+    if not 0 <= real(phase) < 1:
         raise StructureError(f"evolve_density: phase must be a number from 0 to below 1, got {shown(phase)}.")
-    return float(phase)
+    return real(phase)
 
 
 def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
-    given = tuple(intervals) if isinstance(intervals, Sequence | np.ndarray) else (intervals,)
+    found = members(intervals)
+    given = (intervals,) if found is None else found
     for time in given:
-        if isinstance(time, bool) or not isinstance(time, Real) or not 0 < time <= _MOST_INTERVALS:
+        if not 0 < real(time) <= _MOST_INTERVALS:
             raise StructureError(
                 f"evolve_density: intervals must be numbers above 0 and up to {_MOST_INTERVALS}, got {shown(time)}."
             )
     if not given or list(given) != sorted(set(given)):
         raise StructureError(f"evolve_density: intervals must be one or more in ascending order, got {shown(given)}.")
-    return tuple(float(time) for time in given)
+    return tuple(real(time) for time in given)
 
 
 def _start(grid: DensityGrid, start: Any) -> Array:
@@ -231,7 +232,7 @@ def _numbers(start: Any) -> Array:
     """The start as an array of numbers; an empty array if it does not consist of numbers."""
     try:
         return np.asarray(start, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
 

@@ -252,8 +252,10 @@ class FirstContact(LeaveRegion):
     side: str | None = None
 
     def __post_init__(self) -> None:
-        if self.side not in ("left", "right", None):
-            raise StructureError(f"FirstContact: side must be 'left', 'right' or None for either, got {self.side!r}.")
+        if not isinstance(self.side, str | None) or self.side not in ("left", "right", None):
+            raise StructureError(
+                f"FirstContact: side must be 'left', 'right' or None for either, got {shown(self.side)}."
+            )
 
     def check_scene(self, osc: Oscillator) -> None:
         """Refuse a scene without the stop."""

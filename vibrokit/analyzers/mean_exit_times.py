@@ -98,7 +98,7 @@ class MFET(Analyzer):
         whole("MFET: replicas", self.replicas, 16, 1_000_000)
         if not isinstance(self.from_orbit, bool):
             raise StructureError(f"MFET: from_orbit must be True or False, got {shown(self.from_orbit)}.")
-        if self.splitting not in (None, True, False):
+        if not isinstance(self.splitting, bool | None):
             raise StructureError(f"MFET: splitting must be True, False or None, got {shown(self.splitting)}.")
         if self.intensities is not None:
             object.__setattr__(self, "intensities", intensities("MFET", self.intensities))

@@ -15,7 +15,7 @@ from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
 from vibrokit.construction import Constructed, called
-from vibrokit.errors import StructureError
+from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import exit_between, label_of
 from vibrokit.results.result import Result
 from vibrokit.text_table import text_table
@@ -89,14 +89,18 @@ class Transitions(metaclass=Constructed):
     upper: Array
 
     def __post_init__(self) -> None:
+        if not isinstance(self.names, tuple) or not all(isinstance(name, str) for name in self.names):
+            raise StructureError(f"names of attractors must be a tuple of texts, got {shown(self.names)}.")
         count = len(self.names)
         if len(set(self.names)) != count:
             raise StructureError(f"names of attractors must differ, got {', '.join(self.names)}.")
         for name in ("energies", "lower", "upper"):
-            shape = np.shape(getattr(self, name))
+            values = getattr(self, name)
+            shape = values.shape if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" else None
             if shape != (count, count):
                 raise StructureError(
-                    f"transitions of {count} attractors need {name} of shape {(count,) * 2}, got {shape}."
+                    f"transitions of {count} attractors need {name}, an array of numbers of shape {(count,) * 2}, "
+                    f"got {shown(values)}."
                 )
         if not np.all((self.lower >= 0) & (self.lower <= self.energies) & (self.energies <= self.upper)):
             raise StructureError("transitions need 0 ≤ lower ≤ energies ≤ upper, and no NaN.")
@@ -113,6 +117,9 @@ class Transitions(metaclass=Constructed):
         StructureError
             The results are of different scenes, or no energy leads to another attractor.
         """
+        for result in results:
+            if not isinstance(result, Result):
+                raise StructureError(f"transitions need results, as of LeastAction, got {shown(result)}.")
         if not results or any((one.names, one.scene) != (results[0].names, results[0].scene) for one in results):
             raise StructureError("transitions need at least one result, and all results must be of one scene.")
         found = [energy for result in results for energy in result.energies if energy.target >= 0]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import Any
 
-from vibrokit.errors import StepperError, nearest
+from vibrokit.errors import StepperError, nearest, shown
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
@@ -23,6 +24,12 @@ def name_of(stepper: Stepper) -> str:
     """Return the text from which `named_stepper` makes the same stepper."""
     (setting,) = (getattr(stepper, field.name) for field in dataclasses.fields(stepper))
     return f"{stepper.name.replace('_', '-')}:{setting!r}"
+
+
+def check_stepper(stepper: Any) -> None:
+    """Raise StepperError unless something is a stepper, or None for a default."""
+    if stepper is not None and not isinstance(stepper, Stepper):
+        raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
 
 
 def named_stepper(text: str) -> Stepper:

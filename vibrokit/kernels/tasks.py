@@ -13,11 +13,20 @@ import threading
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
+from vibrokit.errors import StructureError, shown
 from vibrokit.progress import Work, count, current, opened
 
 _GLANCE = 0.2  # s between looks at the time limit while others work
 
 Task = tuple[Any, ...]
+
+
+def check_executor(executor: Any) -> None:
+    """Raise StructureError unless something can do tasks, or is None."""
+    if executor is not None and not isinstance(executor, futures.Executor):
+        raise StructureError(
+            f"executor must be a concurrent.futures.Executor, or None for threads, got {shown(executor)}."
+        )
 
 
 def carry(

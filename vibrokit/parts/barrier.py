@@ -39,7 +39,7 @@ class Barrier(metaclass=Constructed):
             raise SceneError(
                 f"Barrier: law must be a ContactLaw, such as Hertz(stiffness=50.0), got {shown(self.law)}."
             )
-        if self.side not in ("right", "left"):
+        if not isinstance(self.side, str) or self.side not in ("right", "left"):
             raise ParameterError(f"Barrier: side must be 'right' or 'left', got {shown(self.side)}.")
         if not isinstance(self.adhesive, bool):
             raise ParameterError(f"Barrier: adhesive must be True or False, got {shown(self.adhesive)}.")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from numbers import Real
 from typing import Any
 
+from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
 
@@ -57,12 +57,7 @@ class Parameter:
 
     def checked(self, owner: str, value: Any) -> float:
         """Return `value` as a float; raise ParameterError if it is not a number in the allowed range."""
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {shown(value)}.")
-        try:
-            number = float(value)
-        except OverflowError:
-            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got one above 1.8e308.") from None
+        number = real(value)
         outside = (
             not math.isfinite(number)
             or (self.minimum is not None and number < self.minimum)
@@ -70,7 +65,9 @@ class Parameter:
             or (self.maximum is not None and number > self.maximum)
         )
         if outside:
-            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {number:g}.")
+            large = number == math.inf and not isinstance(value, float)
+            given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
+            raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
 
 

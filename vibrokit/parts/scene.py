@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
-from numbers import Real
 from typing import Any, NamedTuple, Self
 
+from vibrokit.arguments import members, real
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
@@ -95,7 +95,7 @@ class Scene(metaclass=Constructed):
     def _check_periods(self) -> None:
         for index, part in enumerate(self.excitations):
             period = part.period
-            if period is not None and (isinstance(period, bool) or not isinstance(period, Real) or not period > 0):
+            if period is not None and not real(period) > 0:
                 raise SceneError(
                     f"scene: the period of excitations.{index} ({type(part).__name__}) must be a positive number, None "
                     f"for a constant force, or math.inf for one that never repeats, got {shown(period)}."
@@ -251,9 +251,9 @@ class Scene(metaclass=Constructed):
 def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:
     if isinstance(parts, kind):
         raise SceneError(f"scene: {name} must be a sequence, got a single {type(parts).__name__}; give a list of it.")
-    if not isinstance(parts, Iterable):
+    found = members(parts)
+    if found is None:
         raise SceneError(f"scene: {name} must be a sequence of {kind.__name__} objects, got {shown(parts)}.")
-    found = tuple(parts)
     for part in found:
         if not isinstance(part, kind):
             raise SceneError(f"scene: {name} must be of type {kind.__name__}, got {shown(part)}.")

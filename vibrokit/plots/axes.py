@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
+from vibrokit.errors import ArgumentError, shown
+
 COLOURS = (
     "#3b6ea8", "#c8553d", "#588b5b", "#8e6bb0", "#c9a227", "#7a4b2a", "#d679a8", "#4aa3a2", "#1f3a5f", "#e08e45",
     "#9bbf3b", "#5b2a6e", "#6fb1e0", "#8c1c2f", "#0f6b4f", "#b58bd6", "#d9c56b", "#a66a52", "#e8a0a0", "#2b8fb3",
@@ -22,6 +24,8 @@ _ROUNDING = 1e-9
 def axes_or_new(ax: Axes | None, width: float = 6.0, height: float = 4.2) -> Axes:
     """Return `ax`, or the axes of a new figure that belongs to no window."""
     if ax is not None:
+        if not isinstance(ax, Axes):
+            raise ArgumentError(f"ax must be the axes of a Matplotlib figure, or None for new ones, got {shown(ax)}.")
         return ax
     return Figure(figsize=(width, height), layout="constrained").add_subplot()
 

@@ -6,11 +6,27 @@ import os
 import tempfile
 from pathlib import Path
 
+from vibrokit.arguments import path_of
+from vibrokit.errors import FileError, NoSuchFileError, reason
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that at any moment it is the old one or the whole new one."""
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path} would be in {path.parent}, which is no folder; make it first.")
+
+def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file so that at any moment it is the old one or the whole new one; raises FileError."""
+    target = path_of(path)
+    if not target.parent.is_dir():
+        raise NoSuchFileError(f"{target} would be in {target.parent}, which is no folder; make it first.")
+    if target.is_dir():
+        raise FileError(f"{target} is a folder; add the name of a file.")
+    try:
+        _write(target, content)
+    except (OSError, ValueError) as error:
+        raise FileError(
+            f"{target} cannot be written ({reason(error)}); give a path in a folder that "
+            "you may write to, on a disk that has room."
+        ) from error
+
+
+def _write(path: Path, content: bytes) -> None:
     with tempfile.NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.name}-", delete=False) as file:
         try:
             file.write(content)

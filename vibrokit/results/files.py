@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import xarray
 
+from vibrokit.arguments import path_of
 from vibrokit.construction import called
-from vibrokit.errors import ResultFileError, UnknownNameError, shown
+from vibrokit.errors import NoSuchFileError, ResultFileError, UnknownNameError, nearest_form, reason, shown
 from vibrokit.registry import Group, load
 from vibrokit.results.arrays import LARGEST_WHOLE, taken
 from vibrokit.results.atomic import write_atomically
@@ -37,7 +38,7 @@ def save_record(record: Record, path: str | os.PathLike[str]) -> None:
         content = _content(record)
     except ResultFileError as error:
         raise ResultFileError(f"{type(record).__name__} cannot be saved: {str(error).rstrip('.')}.") from error
-    write_atomically(Path(path), content)
+    write_atomically(path, content)
 
 
 @called
@@ -57,12 +58,13 @@ def load_result(path: str | os.PathLike[str]) -> Any:
     Raises
     ------
     ResultFileError
-        The file is not a saved record.
-    FileNotFoundError
+        The file is not a saved record, or cannot be read.
+    NoSuchFileError
         There is no such file.
     """
+    where = path_of(path)
     try:
-        content = _read(path)
+        content = _read(where)
         dataset, header = _opened(content)
         kind = taken(header, "kind", str)
         provenance = provenance_from(header)
@@ -73,7 +75,7 @@ def load_result(path: str | os.PathLike[str]) -> Any:
         return record.from_dataset(dataset, **provenance)
     except ResultFileError as error:
         raise ResultFileError(
-            f"{path} is not a result that vibrokit saved: {str(error).rstrip('.')}. Give a file written by save."
+            f"{where} is not a result that vibrokit saved: {str(error).rstrip('.')}. Give a file written by save."
         ) from error
 
 
@@ -148,13 +150,19 @@ class _ReadOnce(io.BytesIO):
         return content
 
 
-def _read(path: str | os.PathLike[str]) -> bytes:
+def _read(path: Path) -> bytes:
     try:
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise
-    except (OSError, TypeError, ValueError) as error:
-        raise ResultFileError(f"it cannot be read ({error})") from error
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise NoSuchFileError(f"there is no file {path}{_beside(path)}") from error
+    except (OSError, ValueError) as error:
+        raise ResultFileError(f"it cannot be read ({reason(error)})") from error
+
+
+def _beside(path: Path) -> str:
+    """The end of a sentence that names the closest of the results in the same folder."""
+    known = {file.name: str(file) for file in path.parent.glob("*.nc")} if path.parent.is_dir() else {}
+    return nearest_form(path.name, known) if known else "; give a file written by save."
 
 
 def _opened(content: bytes) -> tuple[xarray.Dataset, Any]:

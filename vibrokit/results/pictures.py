@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vibrokit.arguments import path_of
 from vibrokit.errors import VibrokitError
 from vibrokit.results.atomic import write_atomically
 
@@ -19,7 +20,7 @@ _FORMATS = (".png", ".pdf", ".svg")
 
 def checked_picture(path: str | os.PathLike[str]) -> Path:
     """Return the path of a picture; raises VibrokitError if its ending is not that of a picture."""
-    target = Path(path)
+    target = path_of(path)
     if target.suffix not in _FORMATS:
         raise VibrokitError(f"{target} ends in {target.suffix!r}; a picture ends in {', '.join(_FORMATS)}.")
     return target

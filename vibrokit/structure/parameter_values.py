@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.arguments import members, real
 from vibrokit.errors import ParameterError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
@@ -28,13 +27,13 @@ def followed_parameter(caller: str, osc: Oscillator, parameter: str) -> Entry:
 
 def ordered_values(caller: str, values: Any) -> NDArray[np.float64]:
     """Return values in ascending order; raises ParameterError unless they are finite and distinct."""
-    listed = list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else []
+    listed = members(values)
     if not listed:
         raise ParameterError(f"{caller}: values must be a sequence of numbers, one or more, got {shown(values)}.")
     for value in listed:
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        if not math.isfinite(real(value)):
             raise ParameterError(f"{caller}: values must be finite numbers, got {shown(value)}.")
-    numbers = np.sort(np.array(listed, dtype=float))
+    numbers = np.sort([real(value) for value in listed])
     twice = numbers[:-1][np.diff(numbers) == 0]
     if twice.size:
         raise ParameterError(f"{caller}: values must be distinct, got {twice[0]:g} more than once.")

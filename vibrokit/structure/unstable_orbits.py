@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
-from vibrokit.errors import StructureError
+from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
@@ -99,6 +99,8 @@ def unstable_orbits(
         The excitations have no common period.
     """
     check_means(osc, stepper, executor)
+    if classifier is not None and not isinstance(classifier, BasinClassifier):
+        raise StructureError(f"classifier must be a BasinClassifier or None, got {shown(classifier)}.")
     period = whole("period", period, 1, _LONGEST_PERIOD)
     if osc.autonomous and period != 1:
         raise StructureError(

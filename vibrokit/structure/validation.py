@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import dataclasses
 import json
 import math
-from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
+from collections.abc import Mapping
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from vibrokit.errors import SceneError, StepperError, StructureError, shown
-from vibrokit.kernels.named import name_of, named_stepper
+from vibrokit.arguments import members, real
+from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.kernels.named import check_stepper, name_of, named_stepper
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.tasks import check_executor
 from vibrokit.oscillator import Oscillator, generator_from
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
@@ -44,10 +45,11 @@ class Request:
     rng: int
 
     def __post_init__(self) -> None:
-        settling = self.settling
-        if isinstance(settling, bool) or not isinstance(settling, Real) or not 0 < float(settling) <= 0.5:
+        settling = real(self.settling)
+        if not 0 < settling <= 0.5:
             raise StructureError(
-                f"settling must be a fraction of the region's widths, above 0 and at most 0.5, got {shown(settling)}."
+                "settling must be a fraction of the region's widths, above 0 and at most 0.5, got "
+                f"{shown(self.settling)}."
             )
         for name in ("saddles", "manifolds"):
             if not isinstance(getattr(self, name), bool):
@@ -56,7 +58,7 @@ class Request:
             "region": None if self.region is None else Region.of(self.region),
             "cells": None if self.cells is None else pair("cells", self.cells),
             "starts": pair("starts", self.starts),
-            "settling": float(settling),
+            "settling": settling,
             "refine": whole("refine", self.refine, 0, 10),
             "margin": None if self.margin is None else whole("margin", self.margin, 1, 100),
             "budget": None if self.budget is None else whole("budget", self.budget, 1, _MOST_CELLS),
@@ -109,8 +111,7 @@ def whole(name: str, number: Any, least: int, most: int) -> int:
 
 def share(name: str, number: Any, least: float = 0.0) -> None:
     """Refuse a number that is not a share: above 0, at most 1 and not below `least`."""
-    real = isinstance(number, Real) and not isinstance(number, bool)
-    if not (real and 0 < float(number) <= 1 and float(number) >= least):
+    if not max(least, math.ulp(0.0)) <= real(number) <= 1:
         allowed = f"from {least:g} to 1" if least else "above 0 and at most 1"
         raise StructureError(f"{name} must be {allowed}, got {shown(number)}.")
 
@@ -130,20 +131,21 @@ def pair(name: str, counts: Any, most: int = _MOST_CELLS, least: int = 1) -> tup
 
 def gibibytes(name: str, amount: Any) -> float:
     """Return an amount of memory (GiB); a StructureError is raised unless it is a positive number."""
-    if isinstance(amount, bool) or not isinstance(amount, Real) or not float(amount) > 0:
+    if not real(amount) > 0:
         raise StructureError(f"{name} must be a positive number of GiB, got {shown(amount)}.")
-    return float(amount)
+    return real(amount)
 
 
 def intensities(caller: str, given: Any) -> tuple[float, ...]:
     """Return noise intensities in descending order, each once; raises StructureError unless all are positive."""
-    listed = tuple(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else (given,)
+    found = members(given)
+    listed = (given,) if found is None else found
     for intensity in listed:
-        if isinstance(intensity, bool) or not isinstance(intensity, Real) or not 0 < float(intensity) < math.inf:
+        if not 0 < real(intensity) < math.inf:
             raise StructureError(f"{caller}: intensities must be positive numbers, got {shown(intensity)}.")
     if not listed:
         raise StructureError(f"{caller}: intensities must contain at least one number, got ().")
-    return tuple(sorted({float(intensity) for intensity in listed}, reverse=True))
+    return tuple(sorted({real(intensity) for intensity in listed}, reverse=True))
 
 
 def check_means(osc: Any, stepper: Any, executor: Any) -> None:
@@ -152,12 +154,8 @@ def check_means(osc: Any, stepper: Any, executor: Any) -> None:
         raise SceneError(
             f"the scene must be an Oscillator, got {shown(osc)}; compose one, or load a bundled one with load_scene."
         )
-    if stepper is not None and not isinstance(stepper, Stepper):
-        raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
-    if executor is not None and not isinstance(executor, concurrent.futures.Executor):
-        raise StructureError(
-            f"executor must be a concurrent.futures.Executor, or None for threads, got {shown(executor)}."
-        )
+    check_stepper(stepper)
+    check_executor(executor)
 
 
 def check_belongs(osc: Oscillator, structure: Any) -> None:

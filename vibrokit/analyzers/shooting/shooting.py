@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget, growin
 from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.analyzers.shooting.starts import Ring, Starts
+from vibrokit.arguments import real
 from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.stepper import Stepper
@@ -123,5 +123,5 @@ def _affordable(intervals: float) -> int:
 
 
 def _check_positive(name: str, value: Any, alternative: str = "") -> None:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < float(value) < math.inf:
+    if not 0 < real(value) < math.inf:
         raise StructureError(f"{name} must be a positive number{alternative}, got {shown(value)}.")
