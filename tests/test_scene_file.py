@@ -87,9 +87,7 @@ class TestSaving:
     @pytest.mark.parametrize("place", ["missing/scene.toml", "file/scene.toml", ""])
     def test_places_that_cannot_be_written(self, tmp_path, place):
         (tmp_path / "file").write_text("")
-        with pytest.raises(
-            FileError, match=r"is no folder; make it first\.$|is a folder; add the name of a file\.$"
-        ):
+        with pytest.raises(FileError, match=r"is no folder; make it first\.$|is a folder; add the name of a file\.$"):
             vk.save_scene(everything(), tmp_path / place)
         assert os.listdir(tmp_path) == ["file"]
 

@@ -67,5 +67,5 @@ LIES = {
 @pytest.mark.parametrize(("lie", "words"), LIES.values(), ids=LIES)
 def test_lies_are_refused_in_a_sentence(lie, words, sound, tmp_path):
     (tmp_path / "lie.nc").write_bytes(rewritten(sound, lie))
-    with pytest.raises(ResultFileError, match=rf"lie\.nc is not a result that vibrokit saved: .*{words}"):
+    with pytest.raises(ResultFileError, match=rf"lie\.nc is no result that this vibrokit can open: .*{words}"):
         vk.load_result(tmp_path / "lie.nc")

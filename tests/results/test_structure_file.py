@@ -182,7 +182,7 @@ LIES = {
     "a stop on top": (stop(side="top"), "side 'top'"),
     "a kind in a list": (say("kind", ["structure"]), "kind = "),
     "another kind of result": (say("kind", "action_plot"), "no dimension 'chaotic_saddle'"),
-    "a newer format": (say("format", 4), "format 4, and this version reads format 3"),
+    "a newer format": (say("format", 4), "format 4, written by version"),
     "no list of empty arrays": (say("empty", ...), "no entry 'empty'"),
     "an empty array that is not": (say("empty", {"x": {"dims": ["x"], "shape": [0], "dtype": "f"}}), "contradict"),
     "an empty array of no type": (say("empty", {"q": {"dims": ["q"], "shape": [0], "dtype": "V"}}), "contradict"),
@@ -193,7 +193,7 @@ LIES = {
 @pytest.mark.parametrize(("lie", "words"), LIES.values(), ids=LIES)
 def test_lies_are_refused_in_a_sentence(lie, words, sound, tmp_path):
     (tmp_path / "lie.nc").write_bytes(rewritten(sound, lie))
-    with pytest.raises(ResultFileError, match=rf"lie\.nc is not a result that vibrokit saved: .*{words}"):
+    with pytest.raises(ResultFileError, match=rf"lie\.nc is no result that this vibrokit can open: .*{words}"):
         vk.load_result(tmp_path / "lie.nc")
 
 
@@ -203,7 +203,7 @@ def test_lies_are_refused_in_a_sentence(lie, words, sound, tmp_path):
 )
 def test_headers_that_are_none_are_refused(header, tmp_path):
     xarray.Dataset({"a": ("n", [1.0])}, attrs={"vibrokit": header}).to_netcdf(tmp_path / "h.nc", engine="scipy")
-    with pytest.raises(ResultFileError, match="not a result that vibrokit saved"):
+    with pytest.raises(ResultFileError, match="no result that this vibrokit can open"):
         vk.load_result(tmp_path / "h.nc")
 
 
@@ -261,7 +261,7 @@ def test_huge_claims_cost_nothing_and_are_refused(variables, lengths, room, word
     (tmp_path / "huge.nc").write_bytes(netcdf(variables, lengths, room))
     tracemalloc.start()
     try:
-        with pytest.raises(ResultFileError, match=rf"not a result that vibrokit saved: .*{words}"):
+        with pytest.raises(ResultFileError, match=rf"no result that this vibrokit can open: .*{words}"):
             vk.load_result(tmp_path / "huge.nc")
         assert tracemalloc.get_traced_memory()[1] < 20e6
     finally:

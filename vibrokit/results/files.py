@@ -29,6 +29,7 @@ ATTRIBUTES = ("title", "Conventions", "source", "history", "status", HEADER)
 """Attributes that every file has, besides those of its record's own dataset."""
 
 _READINGS = 2  # a sound file is read once, to the byte
+_MAGIC = b"CDF"  # how netCDF 3 files begin
 _INT32 = np.iinfo(np.int32)
 
 
@@ -75,7 +76,7 @@ def load_result(path: str | os.PathLike[str]) -> Any:
         return record.from_dataset(dataset, **provenance)
     except ResultFileError as error:
         raise ResultFileError(
-            f"{where} is not a result that vibrokit saved: {str(error).rstrip('.')}. Give a file written by save."
+            f"{where} is no result that this vibrokit can open: {str(error).rstrip('.')}. Give a file written by save."
         ) from error
 
 
@@ -167,6 +168,8 @@ def _beside(path: Path) -> str:
 
 def _opened(content: bytes) -> tuple[xarray.Dataset, Any]:
     """The arrays of a file and its provenance. Nothing is masked, scaled or taken for a time."""
+    if not content.startswith(_MAGIC):
+        raise ResultFileError("it is not a netCDF 3 file" if content else "it is empty")
     file = _ReadOnce(content)
     file.left = _READINGS * len(content) + 1024
     try:
@@ -176,12 +179,16 @@ def _opened(content: bytes) -> tuple[xarray.Dataset, Any]:
     except ResultFileError:
         raise
     except Exception as error:  # what SciPy and xarray raise at strange bytes is of every kind
-        raise ResultFileError(f"it is not a netCDF 3 file, or a damaged one ({type(error).__name__})") from error
+        raise ResultFileError("it is damaged, perhaps cut short") from error
     if HEADER not in dataset.attrs:
         raise ResultFileError(f"it has no attribute {HEADER!r}")
     header = json_data(dataset.attrs[HEADER])
     if taken(header, "format", int) != FORMAT:
-        raise ResultFileError(f"it is of format {shown(header['format'])}, and this version reads format {FORMAT}")
+        writer = taken(taken(header, "versions", dict), "vibrokit", str)
+        raise ResultFileError(
+            f"it is of format {shown(header['format'])}, written by version {writer}, and this version reads format "
+            f"{FORMAT}"
+        )
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in ATTRIBUTES}
     return _with_empty(dataset, taken(header, "empty", dict)).drop_encoding(), header
 
