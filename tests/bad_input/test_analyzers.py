@@ -291,3 +291,12 @@ def test_more_memory_may_be_allowed_and_less(structure):
     little = vk.GraphSearch(max_memory_gib=1e-3)
     refused(StructureError, lambda: little.search(problem_of(WELL, structure)), "max_memory_gib is 0.001")
     assert vk.GraphSearch(nodes=(40, 40), max_memory_gib=0.01).search(problem_of(WELL, structure)).estimates
+
+
+@pytest.mark.parametrize("amplitude", ["v", "x**2 - 1", "sqrt(0.9 - x**2)"])
+@pytest.mark.parametrize("analyzer", [vk.ActionGraph(nodes=(40, 40)), vk.ActionPlot(points=200, rounds=2)], ids=str)
+def test_noise_without_a_value_or_without_effect_at_the_attractor(structure, analyzer, amplitude):
+    osc = WELL.replace(noise=vk.StateDependentNoise(1e-2, amplitude))
+    found = analyzer.run(osc, structure)
+    assert found.energies == ()
+    assert len(found.found(Code.SOURCE_FAILED)) == 2

@@ -11,6 +11,7 @@ from tests.scenes import scene
 from vibrokit.errors import IntegrationError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
+from vibrokit.structure.linear_map import gaussian_map, hamiltonian_map
 from vibrokit.symbolic.flow_kind import Flow
 
 STEPPERS = [vk.RK4(256), vk.RK4(8), vk.RK8(24), vk.RKN12(12), vk.Order8(1e-6), vk.Order8(1e-10)]
@@ -143,3 +144,17 @@ def test_section_maps_name_the_pole():
     with pytest.raises(IntegrationError, match=r"1 of 2 trajectories ended.*pole") as caught:
         scene(damping_ratio=0.1, spring=vk.CustomSpring("x - 0.05/(1 - x)**2")).section_map([[0.0, 0.0], [0.9, 0.0]], 3)
     assert caught.value.state == (0.9, 0.0)
+
+
+@pytest.mark.parametrize("stepper", [vk.RK4(64), vk.Order8(1e-10)], ids=named)
+@pytest.mark.parametrize("amplitude", ["sqrt(c - x**2)", "sqrt(c - x**2)*exp(x/9)"])
+def test_noise_has_no_covariance_and_no_action_where_it_is_not_real(stepper, amplitude):
+    osc = scene(noise=vk.StateDependentNoise(1e-3, amplitude, c=0.5))
+    inside, beyond, out = [0.1, 0.1], [1.2, 0.0], [0.5, 3.0]  # out: it crosses the edge within the time
+    found = gaussian_map(osc, np.array([inside, beyond, out]), stepper, interval=0.3)
+    assert np.isfinite(found.covariances[0]).all()
+    assert (np.linalg.eigvalsh(found.covariances[0]) > 0).all()
+    assert np.isnan(found.covariances[1:]).all()
+    moved = hamiltonian_map(osc, np.array([[*q, 0.1, 0.1] for q in (inside, beyond, out)]), stepper, interval=0.3)
+    assert moved.actions[0] > 0
+    assert np.isnan(moved.actions[1:]).all()

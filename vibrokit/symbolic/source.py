@@ -13,6 +13,7 @@ from functools import cached_property
 import sympy
 
 from vibrokit.parts.scene import Scene
+from vibrokit.symbolic.borders import Border
 from vibrokit.symbolic.contact_source import ContactWriter
 from vibrokit.symbolic.flight import ORDER, FlightWriter
 from vibrokit.symbolic.flow import derive_flow, model_for
@@ -204,15 +205,23 @@ class SceneText:
         return None if form is None else SecondOrderWriter(form, self._equations, self._index)
 
     @cached_property
-    def gauges(self) -> tuple[sympy.Expr, ...]:
-        """What changes its sign at each pole; where a formula has no value, forces are NaN and need no test."""
+    def _borders(self) -> tuple[Border, ...]:
+        """The borders that need a test: forces without a value are NaN, but the square of a root of noise is not."""
         random = self.flow in (Flow.NOISY, Flow.LINEARISED, Flow.COVARIANCE_REVERSED) or self.flow.has_momenta
-        borders = self._model.borders + (self._model.noise_borders if random else ())
-        return tuple(border.gauge for border in borders if border.pole)
+        poles = tuple(border for border in self._model.borders if border.pole)
+        return poles + (self._model.noise_borders if random else ())
+
+    @property
+    def gauges(self) -> tuple[sympy.Expr, ...]:
+        """What changes its sign at each border that needs a test."""
+        return tuple(border.gauge for border in self._borders)
 
     @property
     def crossed(self) -> str:
-        """Function `crossed(states of two points…, parameters…)`: NaN if a pole lies between, otherwise 0; or empty."""
+        """Function `crossed(states of two points…, parameters…)`, or empty.
+
+        NaN if a pole lies between the points, or one of them is where a formula has no value; otherwise 0.
+        """
         if not self.gauges:
             return ""
         names, targets = self.variables[: self.states], dict[str, sympy.Expr]()
@@ -221,7 +230,11 @@ class SceneText:
             targets |= {f"{place}{n}": gauge.subs(moved, simultaneous=True) for n, gauge in enumerate(self.gauges)}
         lines, texts = assignments(targets, "c")
         arguments = [f"_{name}_{suffix}" for suffix in ("from", "to") for name in names]
-        same = " and ".join(f"({texts[f'0{n}']})*({texts[f'1{n}']}) > 0.0" for n in range(len(self.gauges)))
+        pairs = [(f"({texts[f'0{n}']})", f"({texts[f'1{n}']})") for n in range(len(self.gauges))]
+        same = " and ".join(
+            f"{one}*{other} > 0.0" if border.pole else f"{one} > 0.0 and {other} > 0.0"
+            for border, (one, other) in zip(self._borders, pairs, strict=True)
+        )
         head = ["@njit(**INLINED)", f"def crossed({', '.join([*arguments, *self.parameters])}):"]
         return "\n".join([*head, *lines, f"    return 0.0 if {same} else np.nan", ""])
 

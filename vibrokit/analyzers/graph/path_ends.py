@@ -88,8 +88,16 @@ def _labels(end: AtSaddle) -> tuple[int, ...]:
 
 
 def _straight(problem: ExitProblem, model: StepModel, states: Array) -> float:
-    """Quadratic cost of reaching the cheapest of some states in one section interval, from the attractor."""
+    """Quadratic cost of reaching the cheapest of some states in one section interval, from the attractor.
+
+    Raises StructureError where noise has no value at the attractor.
+    """
     found = model.linear(problem.attractor.points[:1, :2], 0.0, model.scene.section_interval)
+    if not np.isfinite(found.covariances).all():
+        raise StructureError(
+            f"the motion from the attractor at {tuple(problem.attractor.points[0].tolist())} cannot be linearized; the "
+            "noise may have no real value there."
+        )
     miss = states - found.images[0]
     cost = float(np.min(0.5 * np.einsum("ni,ij,nj->n", miss, np.linalg.pinv(found.covariances[0]), miss)))
     if np.isfinite(cost) and cost > 0:

@@ -16,6 +16,7 @@ from vibrokit.structure.linear_map import gaussian_map, gaussian_pieces
 from vibrokit.structure.orbits import Orbit
 
 _PIECES = 16  # of a section interval, at which the quadratic form along an orbit is given
+_SINGULAR = 1e-12  # least eigenvalue of a correlation matrix, as rounding errors may leave of 0
 _NEUTRAL = 1e-6  # distance of a multiplier from 1 below which nothing decays
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
     Raises
     ------
     StructureError
-        The orbit is not stable, so that it has no stationary covariance.
+        The orbit is not stable, so that it has no stationary covariance; or noise does not make it spread.
     """
     found = gaussian_map(osc, orbit.point[None], stepper, intervals=orbit.period)
     return _stationary(orbit, found.derivatives[0], found.covariances[0])
@@ -88,7 +89,7 @@ def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotenti
     if not (np.isfinite(monodromy).all() and np.isfinite(gathered).all()):
         raise StructureError(
             f"the motion along the orbit at {tuple(orbit.point.tolist())} cannot be linearized; it may rest exactly "
-            "where it touches a stop, or graze one."
+            "where it touches a stop, or graze one, or the noise has no real value there."
         )
     largest = float(np.abs(np.linalg.eigvals(monodromy)).max())
     if not largest < 1 - _NEUTRAL:
@@ -96,7 +97,14 @@ def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotenti
             f"the orbit at {tuple(orbit.point.tolist())} has a multiplier of size {largest:.6g}; only a stable one "
             "(all below 1) has a quasi-potential around it."
         )
-    return LocalPotential(monodromy, gathered, stationary_covariance(monodromy, gathered))
+    covariance = stationary_covariance(monodromy, gathered)
+    sizes = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if not (sizes.all() and np.linalg.eigvalsh(covariance / np.outer(sizes, sizes))[0] > _SINGULAR):
+        raise StructureError(
+            f"the noise is 0 along the orbit at {tuple(orbit.point.tolist())}, or nearly so: it does not spread the "
+            "motion around the orbit in all directions, so that leaving it has no activation energy."
+        )
+    return LocalPotential(monodromy, gathered, covariance)
 
 
 def stationary_covariance(slope: Array, added: Array) -> Array:
