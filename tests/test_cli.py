@@ -16,7 +16,7 @@ from vibrokit import registry
 from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.settings import configured, setting
 from vibrokit.cli import main, parsed
-from vibrokit.errors import StructureError
+from vibrokit.errors import FileError, StructureError
 from vibrokit.progress import Deadline, advance, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -259,12 +259,24 @@ def test_an_analyzer_that_crashes_leaves_the_others(toys, monkeypatch, capsys):
 
 
 def test_a_file_that_cannot_be_written_leaves_the_tables(toys, monkeypatch, capsys):
-    (toys / "r.nc").mkdir()
+    def full(path, content):
+        raise FileError(f"{path} cannot be written (No space left on device).")
+
+    monkeypatch.setattr("vibrokit.results.files.write_atomically", full)
     assert main([*TOY, "-o", "r.nc"]) == 1
     out, err = capsys.readouterr()
     assert "left-rest → right-rest" in out
-    assert "no file was written" in out
+    assert "no result was saved" in out
     assert "r.nc was not written" in err
+
+
+@pytest.mark.parametrize("option", ["-o", "--figure", "--checkpoint"])
+def test_a_place_where_no_file_can_be_is_refused_before_any_work(toys, capsys, option):
+    (toys / "r.png").mkdir()
+    assert main([*TOY, option, "r.png"]) == 2
+    out, err = capsys.readouterr()
+    assert not out
+    assert "r.png is a folder" in err
 
 
 # Interrupts and time limits
@@ -317,7 +329,7 @@ def test_ctrl_c_before_anything_was_found_writes_nothing(toys, monkeypatch, caps
     monkeypatch.setattr("vibrokit.structure.find.find_structure", nothing_found)
     assert main([*TOY, "-o", "r.nc", "--json"]) == 130
     out, err = capsys.readouterr()
-    assert "no file was written" in err
+    assert "no result was saved" in err
     assert files(toys) == []
     assert [one["code"] for one in json.loads(out)["findings"]] == ["stopped"]
 
@@ -337,7 +349,7 @@ def test_ctrl_c_while_the_input_is_read_ends_before_the_work(toys, monkeypatch, 
     monkeypatch.setattr("vibrokit.scene_file.load_scene", lambda name: press() or original(name))
     monkeypatch.setattr("vibrokit.structure.find.find_structure", lambda osc, **options: advance())
     assert main([*TOY, "-o", "r.nc"]) == 130
-    assert "no file was written" in capsys.readouterr().err
+    assert "no result was saved" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("where", ["vibrokit.cli.run._save", "vibrokit.cli.run._print"])

@@ -74,7 +74,8 @@ def _check(caller: str, takes: Iterable[inspect.Parameter], values: tuple[Any, .
         if name not in names and inspect.Parameter.VAR_KEYWORD not in open_ended:
             raise ArgumentError(f"{caller} has no parameter {name!r}{nearest(name, names)}") from None
         if name in given:
-            raise ArgumentError(f"{caller}: {name} has two values; give one.") from None
+            rename = f", and another name to a constant {name}" if inspect.Parameter.VAR_KEYWORD in open_ended else ""
+            raise ArgumentError(f"{caller}: {name} has two values; give one{rename}.") from None
     if len(values) > len(places) and inspect.Parameter.VAR_POSITIONAL not in open_ended:
         raise ArgumentError(
             f"{caller} takes {counted(len(places), 'value')} without a name, got {len(values)}; its parameters "

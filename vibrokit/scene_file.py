@@ -75,7 +75,8 @@ def _find(source: str | os.PathLike[str]) -> Path:
     if os.path.isdir(path):
         raise SceneError(f"{path} is a folder; give a TOML file or one of {_bundled()}.")
     if not os.path.exists(path):  # False too for text that cannot be the name of a file
-        known = {name: name for name in bundled_scenes()} | {file.stem: str(file) for file in _beside(path)}
+        known = {name: name for name in bundled_scenes()}
+        known |= {name: str(file) for file in _beside(path) for name in (file.stem, file.name)}
         wanted = path.stem if path.suffix.lower() == ".toml" else path.name
         raise UnknownNameError(f"there is no file or bundled scene {shown(str(source))}{nearest_form(wanted, known)}")
     return path

@@ -18,12 +18,12 @@ from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.metastability import metastability
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.settings import settings_of
-from vibrokit.arguments import path_of
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, stage, working
+from vibrokit.results.atomic import checked_target
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
@@ -237,9 +237,7 @@ class Analyzer(ABC, metaclass=Constructed):
             return Checkpoint(None, {})
         if not self.keeps_checkpoints:
             raise StructureError(f"{type(self).__name__} does not write checkpoints; leave out checkpoint=.")
-        where = path_of(path)
-        if not where.parent.is_dir():
-            raise StructureError(f"the folder {where.parent} of the checkpoint does not exist; make it first.")
+        where = checked_target(path)
         points = [attractor.points.tolist() for attractor in structure.attractors]
         labels = hashlib.sha256(structure.basins.labels.tobytes()).hexdigest()
         return Checkpoint(

@@ -104,14 +104,17 @@ def planned(options: argparse.Namespace) -> Plan:
     from vibrokit.kernels.named import named_stepper
     from vibrokit.progress import checked_time_limit
     from vibrokit.registry import Group, load
+    from vibrokit.results.atomic import checked_target
     from vibrokit.results.pictures import checked_picture
     from vibrokit.scene_file import load_scene
 
     for target in (options.output, options.figure, options.checkpoint):
-        if target is not None and not target.parent.is_dir():
-            raise VibrokitError(f"the folder {target.parent} of {target} does not exist; make it first.")
+        if target is not None:
+            checked_target(target)
     if options.figure is not None:
         checked_picture(options.figure)
+    if not options.seed >= 0:
+        raise VibrokitError(f"--seed must be a whole number, at least 0, got {options.seed}.")
     if not 2 <= options.cells <= 20_000:
         raise VibrokitError(f"--cells must be a whole number from 2 to 20000, got {options.cells}.")
     checked_time_limit(options.time_limit)
@@ -250,7 +253,7 @@ def _draw(outcome: Outcome, options: argparse.Namespace) -> None:
 
 def _written(outcome: Outcome) -> str:
     files = ", ".join(f"{path} ({name})" for name, path in outcome.files.items())
-    return f"written: {files}" if files else "no file was written"
+    return f"written: {files}" if files else "no result was saved; -o FILE saves them"
 
 
 def scene_stem(scene: str) -> str:

@@ -42,6 +42,11 @@ def named_stepper(text: str) -> Stepper:
         raise StepperError(f"there is no stepper {name!r}{nearest(name, _KINDS)}")
     kind, read = _KINDS[name]
     try:
-        return kind(read(number)) if colon else kind()
+        value = read(number) if colon else None
+    except ValueError:
+        form = "a whole number, as in rk4:512" if read is int else "a number, as in order8:1e-10"
+        raise StepperError(f"stepper {text!r}: {name} takes {form}, got {number!r}.") from None
+    try:
+        return kind() if value is None else kind(value)
     except ValueError as error:
         raise StepperError(f"stepper {text!r}: {error}") from error

@@ -12,11 +12,7 @@ from vibrokit.errors import FileError, NoSuchFileError, reason
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a file so that at any moment it is the old one or the whole new one; raises FileError."""
-    target = path_of(path)
-    if not target.parent.is_dir():
-        raise NoSuchFileError(f"{target} would be in {target.parent}, which is no folder; make it first.")
-    if target.is_dir():
-        raise FileError(f"{target} is a folder; add the name of a file.")
+    target = checked_target(path)
     try:
         _write(target, content)
     except (OSError, ValueError) as error:
@@ -24,6 +20,18 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
             f"{target} cannot be written ({reason(error)}); give a path in a folder that "
             "you may write to, on a disk that has room."
         ) from error
+
+
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """Return a path that a file can have; raises FileError before any work for it is done."""
+    target = path_of(path)
+    if not target.parent.is_dir():
+        raise NoSuchFileError(f"{target} would be in {target.parent}, which is no folder; make it first.")
+    if target.is_dir():
+        raise FileError(f"{target} is a folder; add the name of a file.")
+    if not os.access(target.parent, os.W_OK):
+        raise FileError(f"{target} cannot be written, because you may not write to {target.parent}; choose another.")
+    return target
 
 
 def _write(path: Path, content: bytes) -> None:
