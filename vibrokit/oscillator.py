@@ -101,6 +101,7 @@ class Oscillator(Scene):
         from vibrokit.kernels.ending import ending
         from vibrokit.kernels.named import check_stepper
         from vibrokit.kernels.single import record
+        from vibrokit.kernels.vector_field import VectorField
 
         start = self._checked_states(state, 1)[0]
         start_time = _START_TIME.checked("trajectory", start_time)
@@ -120,6 +121,8 @@ class Oscillator(Scene):
                     when,
                     last,
                 )
+            if not np.isfinite(VectorField(self).rate(path[-1], since)).all():
+                raise IntegrationError(f"at t = {since:.6g} the trajectory came to {last}, {_NO_VALUE}", since, last)
             raise IntegrationError(
                 f"the trajectory diverged, or needed too many steps, between t = {since:g} and "
                 f"{times[len(path)]:g}, after the state {last}; {_advice(chosen)}",
@@ -259,6 +262,7 @@ class Oscillator(Scene):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
+_NO_VALUE = "where a force has no value: a formula is 0/0 there, or infinite; write it without that division."
 _AT_BORDER = "no motion goes on from there: start elsewhere, follow it for a shorter time, or put a stop before it."
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed
-from vibrokit.errors import ParameterError, nearest
+from vibrokit.errors import ArgumentError, ParameterError, nearest
 from vibrokit.parts.exponents import exponents
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
 
@@ -36,7 +36,7 @@ class Part(ABC, metaclass=Constructed):
         for base in cls.__bases__:
             if issubclass(base, Part) and base._is_final():
                 kind = next(b.__name__ for b in base.__mro__[1:] if issubclass(b, Part))
-                raise TypeError(
+                raise ArgumentError(
                     f"{cls.__name__} inherits from {base.__name__}, which is a concrete part and final; inherit from "
                     f"{kind} and write the whole formula."
                 )
@@ -52,7 +52,7 @@ class Part(ABC, metaclass=Constructed):
             own = {field.name for field in dataclasses.fields(base)} if dataclasses.is_dataclass(base) else set()
             for field in dataclasses.fields(cls):  # type: ignore[arg-type]
                 if issubclass(base, Part) and field.name in vars(base) and field.name not in own:
-                    raise TypeError(
+                    raise ArgumentError(
                         f"{cls.__name__}: the field {field.name!r} would hide what every {base.__name__} has by that "
                         "name; give the field another name, and its parameter the name that you want by "
                         f"parameter(..., name={field.name!r})."

@@ -78,6 +78,11 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
             f"Newton's method found no equilibrium near {tuple(np.round(guess, 6).tolist())}: the residual is "
             f"{residual:.1e}; start nearer to one."
         )
+    if not np.isfinite(jacobian).all():
+        raise StructureError(
+            f"the forces have no finite derivative at the equilibrium {tuple(np.round(point, 6).tolist())}, so its "
+            "stability is not known; write them with a finite slope there."
+        )
     # Balanced: a stiff stop makes the rate of v huge in units of x, which would cost as many digits.
     balanced, balance = scipy.linalg.matrix_balance(jacobian, permute=False)
     monodromy = balance @ scipy.linalg.expm(balanced) @ np.linalg.inv(balance)
@@ -99,7 +104,13 @@ def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
         return field.rate(states)[:, 1]
 
     def force_at(x: float) -> float:
-        return float(force(np.array([x]))[0])
+        found = float(force(np.array([x]))[0])
+        if not math.isfinite(found):
+            raise StructureError(
+                f"the force at rest has no value at x = {x:.6g}, where it is needed: a formula is 0/0 there, or "
+                "infinite; write it without that division, or give a region without that place."
+            )
+        return found
 
     guesses, found = list[float](), list[Equilibrium]()
     for one, other in intervals_within(osc, low, high):

@@ -245,8 +245,13 @@ def _growing(steps: Array) -> Array:
 def multipliers_of(steps: Array) -> NDArray[np.complex128]:
     """Return the eigenvalues (n,) of a product of matrices (count, n, n), the first of them applied first.
 
-    One that is larger than any floating-point number is given as the largest of these.
+    One that is larger than any floating-point number is given as the largest of these. A StructureError is raised for
+    matrices that are not finite.
     """
+    if not np.isfinite(steps).all():
+        raise StructureError(
+            "the motion cannot be linearized along the orbit: a formula of a force has no finite slope there."
+        )
     if len(steps) == 1:
         return np.asarray(np.linalg.eigvals(steps[0]), dtype=complex)
     return np.nan_to_num([complex(value) for value in _eigenvalues(steps)])

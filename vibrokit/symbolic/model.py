@@ -15,6 +15,7 @@ from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.friction import refuse_friction
 from vibrokit.symbolic.printer import as_latex, as_text
+from vibrokit.symbolic.removable import without_removable
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
 
 
@@ -71,7 +72,7 @@ class Model:
         spring = omega**2 * x
         if self.scene.spring is not None:
             symbols = self._symbols_of("spring")
-            spring = derived_formula(self.scene.spring, "force", symbols, (x, v))
+            spring = without_removable(derived_formula(self.scene.spring, "force", symbols, (x, v)), (x, v))
             refuse_friction(self.scene.spring, spring, v, symbols, self.scene.natural_frequency)
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = derived_formula(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
