@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.exits import Exit as Exit
     from vibrokit.analyzers.exits import FirstContact as FirstContact
     from vibrokit.analyzers.exits import LeaveBasin as LeaveBasin
+    from vibrokit.analyzers.exits import LeaveBounds as LeaveBounds
     from vibrokit.analyzers.exits import LeaveRegion as LeaveRegion
     from vibrokit.analyzers.graph.search import GraphSearch as GraphSearch
     from vibrokit.analyzers.least_action import LeastAction as LeastAction
@@ -80,6 +81,7 @@ _MODULES = {
     "Exit": "vibrokit.analyzers.exits",
     "FirstContact": "vibrokit.analyzers.exits",
     "LeaveBasin": "vibrokit.analyzers.exits",
+    "LeaveBounds": "vibrokit.analyzers.exits",
     "LeaveRegion": "vibrokit.analyzers.exits",
     "GraphSearch": "vibrokit.analyzers.graph.search",
     "LeastAction": "vibrokit.analyzers.least_action",

@@ -64,7 +64,7 @@ def test_a_scene_without_noise(analyzer, structure):
 def test_only_one_attractor_and_no_other_basin(analyzer):
     one = vk.find_structure(WELL, region=((0.5, 1.5), (-0.1, 0.1)), starts=(3, 3), cells=(4, 4))
     assert len(one.attractors) == 1
-    refused(StructureError, lambda: analyzer().run(WELL, one), r"only one attractor.*FirstContact\(\)")
+    refused(StructureError, lambda: analyzer().run(WELL, one), r"only one attractor.*LeaveBounds\(x=\(")
 
 
 @pytest.mark.parametrize(("side", "words"), [(None, "no stop"), ("left", "no left stop")])
@@ -300,3 +300,18 @@ def test_noise_without_a_value_or_without_effect_at_the_attractor(structure, ana
     found = analyzer.run(osc, structure)
     assert found.energies == ()
     assert len(found.found(Code.SOURCE_FAILED)) == 2
+
+
+@pytest.mark.parametrize(
+    ("bounds", "words"),
+    [
+        ({}, "no bound"),
+        ({"x": (1.0, 1.0)}, "lower bound first"),
+        ({"v": (2.0, -2.0)}, "lower bound first"),
+        ({"x": 1.0}, "least and the largest"),
+        ({"x": ("a", 1.0)}, "least and the largest"),
+        ({"x": (float("nan"), 1.0)}, "lower bound first"),
+    ],
+)
+def test_bounds_that_are_none(bounds, words):
+    refused(StructureError, lambda: vk.LeaveBounds(**bounds), words)

@@ -52,13 +52,6 @@ def test_shots_find_the_escape():
     assert energy.value == pytest.approx(4 * DAMPING / 6, rel=1e-3)
 
 
-def test_exit_times_need_an_attractor_to_reach():
-    osc, structure = cubic_well()
-    for analyzer in (vk.MFET(intensities=(1e-2,)), vk.SGCM(intensities=(1e-2,))):
-        result = analyzer.run(osc, structure)
-        assert [finding.code for finding in result.findings] == [Code.SOURCE_FAILED]
-
-
 @pytest.mark.parametrize("push", [0.0, PUSH])
 def test_a_pendulum_has_one_rest_that_is_left_over_the_lower_barrier(push):
     osc, structure = pendulum(push)

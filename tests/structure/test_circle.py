@@ -80,15 +80,6 @@ def test_what_leaves_a_running_state_is_refused(driven):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("analyzer", [vk.MFET(source="rest", intensities=(0.01,)), vk.SGCM(source="rest")])
-def test_exit_times_to_a_running_state_are_refused(driven, analyzer):
-    noisy = pendulum(vk.Constant(0.5)).replace(noise=vk.WhiteNoise(0.01))
-    result = analyzer.run(noisy, driven)
-    assert not result.rates
-    assert any("does not recognise" in str(finding) for finding in result.findings)
-
-
-@pytest.mark.slow
 def test_a_mirrored_pendulum_runs_the_other_way():
     found = vk.find_structure(
         pendulum(vk.Constant(-0.25), force="-sin(k*x)/k", k=2.0), cells=(40, 40), manifolds=False

@@ -36,6 +36,7 @@ class ActionGraph(GraphSearch, Analyzer):
 
         If the work is stopped after a first solution, that is returned, marked incomplete.
         """
+        problem.check_path_begins()
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.ESTIMATE)
         found: GraphSolution | None = None

@@ -31,6 +31,7 @@ class ActionPlot(Shooting, Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Search the exit paths from one attractor."""
+        problem.check_path_begins()
         if problem.at_exit:
             return at_exit(problem, FINDER, Bound.UPPER)
         found = self.search(problem)

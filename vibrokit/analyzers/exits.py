@@ -10,6 +10,7 @@ from typing import Any, ClassVar, dataclass_transform
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.escape import escape_faces, escapes
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
@@ -79,8 +80,11 @@ class Exit(ABC, metaclass=Constructed):
         """
         return np.where(self.is_out(osc, states), 1.0, -1.0)
 
-    def faces(self, osc: Oscillator) -> Array:
-        """Return the bounds of x and of v that a state must be beyond, shape (2, 2); infinite if there are none."""
+    def faces(self, osc: Oscillator, structure: Structure, source: int) -> Array:
+        """Return the bounds of x and of v beyond which a state has left the attractor `source`, shape (2, 2).
+
+        They are infinite if there are none.
+        """
         return UNBOUNDED
 
     @abstractmethod
@@ -106,8 +110,19 @@ class Exit(ABC, metaclass=Constructed):
         return bool(self.is_out(osc, attractor.orbit).any())
 
 
+def beyond_faces(faces: Array, states: Array) -> Array:
+    """Return how far states (…, n) are beyond the bound of x or of v that they exceed most; negative between all."""
+    low, high = faces.T
+    distance: Array = np.maximum(low - states[..., :2], states[..., :2] - high).max(axis=-1)
+    return distance
+
+
 class LeaveBasin(Exit):
-    """Leaving the basin of attraction, tested on the section, for the basin of another attractor.
+    """Leaving the basin of attraction, tested on the section, for the basin of another attractor, or by escape.
+
+    Motion escapes if it leaves the region of the structure for good: without noise it never comes back. At finite noise
+    a state has escaped when x is beyond all that comes back, where the first escaping motion settles or a width of the
+    region farther, at any time; or when motion ended, as at a pole.
 
     Parameters
     ----------
@@ -140,17 +155,19 @@ class LeaveBasin(Exit):
 
     def check(self, osc: Oscillator, structure: Structure) -> None:
         """Refuse a structure of one attractor that no motion escapes from."""
-        escapes = any(ESCAPED in saddle.leads_to for saddle in structure.saddles)
-        if len(structure.attractors) < 2 and not escapes:
+        if len(structure.attractors) < 2 and not escapes(structure):
+            low, high = structure.region.x
+            instead = f"ask for the first time that x passes a bound (exit=LeaveBounds(x=({low:.3g}, {high:.3g})))"
+            if osc.barriers:
+                instead = f"ask for the first contact with a stop (exit=FirstContact()), or {instead}"
             if not structure.complete:
                 raise StructureError(
                     "the structure is incomplete, because its search was stopped: only one attractor and no way out "
-                    "are known; find the structure with more time, or ask for the first contact with a stop "
-                    "(exit=FirstContact())."
+                    f"are known; find the structure with more time, or {instead}."
                 )
             raise StructureError(
-                "the structure has only one attractor, so there is no other basin to leave for; widen the region, "
-                "change the scene, or ask for the first contact with a stop (exit=FirstContact())."
+                "the structure has only one attractor, and no motion escapes from its region, so there is no other "
+                f"basin to leave for; widen the region, change the scene, or {instead}."
             )
         if self.to is not None:
             structure.attractor(self.to)
@@ -167,6 +184,10 @@ class LeaveBasin(Exit):
     def is_out(self, osc: Oscillator, states: Array) -> Mask:
         """No state: only the attractor that it leads to decides."""
         return np.zeros(np.shape(states)[:-1], dtype=bool)
+
+    def faces(self, osc: Oscillator, structure: Structure, source: int) -> Array:
+        """Bounds of x beyond which motion has escaped from the region for good."""
+        return escape_faces(osc, structure, structure.attractors[source])
 
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the basin grid."""
@@ -218,26 +239,55 @@ class LeaveRegion(Exit):
 
     def beyond(self, osc: Oscillator, states: Array) -> Array:
         """Distance beyond the face that is exceeded most, in x or in v."""
-        low, high = self.faces(osc).T
-        distance: Array = np.maximum(low - states[..., :2], states[..., :2] - high).max(axis=-1)
-        return distance
+        return beyond_faces(np.asarray(self.bounds(osc), dtype=float), states)
 
-    def faces(self, osc: Oscillator) -> Array:
+    def faces(self, osc: Oscillator, structure: Structure, source: int) -> Array:
         """The bounds."""
         return np.asarray(self.bounds(osc), dtype=float)
 
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the bounds."""
-        return Stop(region=self.faces(osc))
+        return Stop(region=self.faces(osc, structure, source))
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:
         """The faces."""
         return tuple(
             AtFace((-1,), axis, float(level), outward)
-            for axis, pair in enumerate(self.faces(osc))
+            for axis, pair in enumerate(self.faces(osc, structure, source))
             for outward, level in zip((-1, 1), pair, strict=True)
             if math.isfinite(level)
         )
+
+
+class LeaveBounds(LeaveRegion):
+    """Passing a bound of x or of v for the first time; a scene with one attractor and no stop has this exit too.
+
+    Parameters
+    ----------
+    x, v : (float, float), optional
+        Least and largest displacement (m) and velocity (m s⁻¹); one may be infinite. By default without bounds.
+    """
+
+    x: tuple[float, float] = (-math.inf, math.inf)
+    v: tuple[float, float] = (-math.inf, math.inf)
+
+    def __post_init__(self) -> None:
+        for name, bounds in (("x", self.x), ("v", self.v)):
+            try:
+                low, high = map(float, bounds)
+            except (TypeError, ValueError) as error:
+                raise StructureError(
+                    f"LeaveBounds: {name} must be the least and the largest value, got {shown(bounds)}."
+                ) from error
+            if not low < high:
+                raise StructureError(f"LeaveBounds: {name} goes from {low:g} to {high:g}; give the lower bound first.")
+            object.__setattr__(self, name, (low, high))
+        if not np.isfinite([self.x, self.v]).any():
+            raise StructureError("LeaveBounds: there is no bound to pass; give one, such as x=(-0.1, 0.1).")
+
+    def bounds(self, osc: Oscillator) -> Array:
+        """The bounds of x and of v."""
+        return np.array([self.x, self.v])
 
 
 class FirstContact(LeaveRegion):

@@ -93,6 +93,7 @@ class LeastAction(Analyzer):
         SceneError, StructureError, StepperError
             The only search cannot be used for this attractor.
         """
+        problem.check_path_begins()
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.CERTIFIED)
         return ExitSearch(self, problem).run()

@@ -41,8 +41,9 @@ class MFET(Analyzer):
 
     Walkers start in the core of an attractor and go on until they leave. A core is an ellipse on the section with the
     shape and the standard deviations of the density around the attractor. With `LeaveBasin`, a walker has left when it
-    is in the core of another attractor. With `LeaveBasin(for_good=False)` it has left at the first section in another
-    basin, and with an exit by position at the first time that satisfies the condition.
+    is in the core of another attractor, or has escaped from the region for good. With `LeaveBasin(for_good=False)` it
+    has left at the first section in another basin, and with an exit by position at the first time that satisfies the
+    condition.
 
     Where direct simulation would take too long, adaptive multilevel splitting gives the rate, down to e⁻¹⁰⁰ and below.
 
@@ -116,7 +117,7 @@ class MFET(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
-        problem.check_targets("MFET")
+        problem.check_turns("MFET")
         wanted = self._intensities(problem.osc)
         bystanders = problem.has_bystanders
         if self.splitting and bystanders:
@@ -175,7 +176,7 @@ def _importance(walk: Walk) -> Importance | None:
         found = committor_stages(problem, walk.intensity)
     except (SceneError, StructureError):
         return None
-    points = found.grid.places(problem.attractor.points[:, :2])
+    points = found.grid.places(problem.on_turn(problem.attractor.points[:, :2]))
     (i, j) = np.clip(np.rint(points), 0, np.array(found.grid.shape) - 1).astype(int).T
     depth = max(1.0, -float(found.log_values[0, i, j].min()) * found.intensity / walk.intensity)
     count = min(walk.looks(depth), _MOST_STAGES)

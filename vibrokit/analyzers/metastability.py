@@ -40,7 +40,8 @@ def metastability(problem: ExitProblem, data: xarray.Dataset) -> tuple[xarray.Da
     if "log_rate" not in data or "rate_intensity" not in data:
         return data, ()
     attractors, intensities = problem.structure.attractors, data["rate_intensity"].values.tolist()
-    relaxations = np.array([relaxation_of(attractor) for attractor in attractors]) * problem.osc.section_interval
+    interval = problem.osc.section_interval
+    relaxations = interval * np.array([relaxation_of(attractor, interval) for attractor in attractors])
     shares = np.array([[core_shares(problem, a, intensity) for a in attractors] for intensity in intensities])
     added = data.assign(
         relaxation_time=(
@@ -82,7 +83,7 @@ def with_states(problem: ExitProblem, intensities: Sequence[float]) -> tuple[tup
             findings.append(Finding.of(Code.CORE_EXCEEDS_BASIN, problem.source, intensity=intensity, share=own))
             continue
         held = {target.label: _held(problem, target, intensity) for target in problem.targets}
-        if max(held.values()) >= HELD:
+        if problem.outlet is not None or max(held.values()) >= HELD:
             kept.append(intensity)
         for label, share in held.items():
             if share < HELD:
@@ -114,7 +115,7 @@ def core_shares(problem: ExitProblem, attractor: Attractor, intensity: float) ->
     order = np.arange(_SAMPLES) + 0.5
     radius, angle = np.sqrt(order / _SAMPLES), math.pi * (1.0 + math.sqrt(5.0)) * order
     disk = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    labels = basins.at(centres[some, None] + np.einsum("nij,kj->nki", axes, disk))
+    labels = basins.at(problem.on_turn(centres[some, None] + np.einsum("nij,kj->nki", axes, disk)))
     return np.array([np.mean(labels == other.label) for other in structure.attractors])
 
 

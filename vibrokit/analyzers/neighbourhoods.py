@@ -46,7 +46,7 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
 def _covariances(osc: Oscillator, attractor: Attractor, stepper: Stepper) -> Array:
     """The same, kept: each attractor is a target of all others, at several intensities."""
     if not attractor.is_fixed:
-        return np.zeros((len(attractor.points), 2, 2))
+        return np.zeros((len(places_of(attractor)), 2, 2))
     orbit = refine_orbit(osc, attractor.points[0], attractor.period, stepper)
     covariances = [local_potential(osc, orbit, stepper).covariance]
     for point in attractor.points[:-1]:
@@ -72,15 +72,41 @@ def core_of(attractor: Attractor, covariances: Array, intensity: float, region: 
     """Return the core of an attractor as ellipses: centres c (count, 2) and matrices R, |R (q − c)| ≤ 1 inside."""
     widths = _LEAST * np.array([np.ptp(region.x), np.ptp(region.v)])
     least = np.tile(1e-9 * widths if attractor.is_fixed else widths, (len(covariances), 1))
-    return attractor.points[:, :2], metrics_of(attractor, CORE_SIZE**2 * intensity * covariances, least)
+    return places_of(attractor), metrics_of(attractor, CORE_SIZE**2 * intensity * covariances, least)
 
 
-def relaxation_of(attractor: Attractor, least: float = 1.0) -> float:
-    """Return the section intervals in which deviations of the density around an attractor fall by a factor e."""
+def places_of(attractor: Attractor) -> Array:
+    """Return x and v of the places where motion on an attractor may be on a section, shape (count, 2)."""
+    cycle = attractor.kind == "limit cycle"  # noise makes its phase any
+    return attractor.orbit[:-1] if cycle else attractor.points[:, :2]
+
+
+def relaxation_of(attractor: Attractor, interval: float, least: float = 1.0) -> float:
+    """Return the section intervals in which deviations of the density around an attractor fall by a factor e.
+
+    Parameters
+    ----------
+    attractor : Attractor
+    interval : float
+        From section to section (s).
+    least : float
+        Section intervals.
+    """
+    if attractor.kind == "limit cycle" and len(attractor.exponents) > 1:
+        slowest = float(np.sort(attractor.exponents.real)[-2])  # the last one is that of the phase
+        return max(least, -1.0 / (slowest * interval)) if slowest < 0 else _RELAXATION
     largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
     if not 0.0 < largest < 1.0 or not attractor.is_fixed:
         return _RELAXATION
     return max(least, -max(attractor.period, 1) / math.log(largest))
+
+
+def repeated(centres: Array, roots: Array, turn: float) -> tuple[Array, Array]:
+    """Return ellipses with their copies a turn away along x on both sides; the same ones if there is no turn."""
+    if not turn:
+        return centres, roots
+    away = np.array([[-turn, 0.0], [0.0, 0.0], [turn, 0.0]])
+    return (centres + away[:, None]).reshape(-1, 2), np.tile(roots, (3, 1, 1))
 
 
 def nearest(states: Array, centres: Array, roots: Array) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.checkpoint import Checkpoint
-from vibrokit.analyzers.exits import Exit
+from vibrokit.analyzers.escape import escapes
+from vibrokit.analyzers.exits import Exit, beyond_faces
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError
@@ -24,6 +25,7 @@ from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.structure import Structure
 from vibrokit.structure.borders import apart
+from vibrokit.structure.circle import wrapped
 from vibrokit.structure.orbits import Orbit, refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -77,12 +79,7 @@ class ExitProblem(metaclass=Constructed):
         return len(self.targets) + 1 < len(self.structure.attractors)
 
     def check_basin(self) -> None:
-        """Refuse an attractor that turns over, or that the grid puts into another basin; raises StructureError."""
-        if self.attractor.turns:
-            raise StructureError(
-                f"{self.attractor.name} turns over and over, and how such motion is left is not computed; choose "
-                "another source."
-            )
+        """Refuse an attractor that the grid puts into another basin; raises StructureError."""
         basins = self.structure.basins
         if not self.exit.by_position and basins.lost(self.attractor, self.source):
             cells = " × ".join(map(str, basins.labels.shape))
@@ -91,19 +88,43 @@ class ExitProblem(metaclass=Constructed):
                 "its basin cannot be told from staying; find the structure with more cells or on a smaller region."
             )
 
-    def check_targets(self, method: str) -> None:
-        """Refuse an exit for which a method has no attractor to reach; raises StructureError."""
-        running = [target.name for target in self.targets if target.turns]
-        if running and not self.exit.by_position:
+    def check_path_begins(self) -> None:
+        """Refuse an attractor from which no path of least action is computed; raises StructureError."""
+        if self.attractor.turns:
             raise StructureError(
-                f"{method}: {', '.join(running)} turns over and over, and {method} does not recognise motion that has "
-                "come to it far along x; use LeastAction, or an exit by position such as FirstContact()."
+                f"{self.attractor.name} turns over and over, and the least action to leave such motion is not "
+                "computed; use MFET or SGCM, or choose another source."
             )
-        if not self.targets and not self.exit.by_position:
+
+    def check_turns(self, method: str) -> None:
+        """Refuse motion that turns over where copies of states are told apart; raises StructureError."""
+        running = [one.name for one in (self.attractor, *self.targets) if one.turns]
+        if running and not self.structure.circle and not self.exit.by_position:
             raise StructureError(
-                f"{method}: {self.attractor.name} is left by escape from the region only, and {method} needs another "
-                "attractor to reach; use LeastAction, or an exit by position such as FirstContact()."
+                f"{method}: {running[0]} turns over and over, and in a region wider than one turn x is a line, on "
+                "which such motion is nowhere for long; find the structure without region=, or on one turn along x."
             )
+
+    @cached_property
+    def faces(self) -> NDArray[np.float64]:
+        """Bounds of x and of v beyond which a state has left at any time, shape (2, 2); infinite if there are none."""
+        return self.exit.faces(self.osc, self.structure, self.source)
+
+    @cached_property
+    def outlet(self) -> int | None:
+        """The target of what leaves by position, −1 or −2 for escape; None if nothing does."""
+        if self.exit.by_position:
+            return -1
+        return ESCAPED if escapes(self.structure) else None
+
+    @property
+    def turn(self) -> float:
+        """Distance along x (m) after which states are the same, as on a circle; 0 if they are not."""
+        return self.structure.shift if self.structure.circle and not self.exit.by_position else 0.0
+
+    def on_turn(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return states (…, n), moved along x to the turn around the middle of the region where x is on a circle."""
+        return wrapped(self.osc, states, float(np.mean(self.structure.region.x))) if self.turn else states
 
     @cached_property
     def scene(self) -> Oscillator:
@@ -146,7 +167,7 @@ class ExitProblem(metaclass=Constructed):
 
     def beyond(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how far states have left, by position alone; see `Exit.beyond`."""
-        return self.exit.beyond(self.osc, states)
+        return self.exit.beyond(self.osc, states) if self.exit.by_position else beyond_faces(self.faces, states)
 
     def orbit(self, stepper: Stepper) -> Orbit:
         """Return the attractor's orbit as a stepper gives it; raises StructureError if it gives none."""

@@ -43,9 +43,9 @@ class SGCM(Analyzer):
     one; what is lost in a section interval is the exit rate.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
-    shape and the standard deviations of the density there, or 2.5 node spacings where that is more. With
-    `LeaveBasin(for_good=False)` it has left when it is in another basin on the section, and with an exit by position at
-    the first time that satisfies the condition.
+    shape and the standard deviations of the density there, or 2.5 node spacings where that is more; or when it has
+    escaped from the region for good. With `LeaveBasin(for_good=False)` it has left when it is in another
+    basin on the section, and with an exit by position at the first time that satisfies the condition.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class SGCM(Analyzer):
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
-        problem.check_targets("SGCM")
+        problem.check_turns("SGCM")
         noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))

@@ -48,6 +48,8 @@ class Stop:
     home : int
     points : array (m, 2), point_labels : int64 array (m,), metrics : array (m, 2, 2)
         Known points of the section; a trajectory has reached c if it is at q with R (q − c) has a length of 1 or less.
+    turn : float
+        Distance along x at which cells and points repeat, as on a circle; 0 where they do not.
     """
 
     region: Array = dataclasses.field(default_factory=UNBOUNDED.copy)
@@ -59,6 +61,7 @@ class Stop:
     points: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
     point_labels: Array = dataclasses.field(default_factory=lambda: np.empty(0, dtype=np.int64))
     metrics: Array = dataclasses.field(default_factory=lambda: np.empty((0, 2, 2)))
+    turn: float = 0.0
 
     def with_cells(self, bounds: Array, labels: Array, home: int = -1) -> Stop:
         """Return this test, also in the cells of a grid, outside of which a trajectory has left the region."""
@@ -228,7 +231,7 @@ def advance_block(
     kernel.advance(
         _plain(starts, float), *common, streams, given, budget, phases,
         stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
-        ended.states, ended.intervals, ended.status, ended.label, ended.visits,
+        float(stop.turn), ended.states, ended.intervals, ended.status, ended.label, ended.visits,
     )  # fmt: skip
     if kernel.module.BORDERED:  # next to a pole time does not go on: the motion ends there
         status[status == STALLED] = DIVERGED

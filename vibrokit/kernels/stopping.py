@@ -27,6 +27,7 @@ def stop_status(
     points: NDArray[np.float64],  # (K, 2): known points of the section
     point_labels: NDArray[np.int64],  # (K,)
     metrics: NDArray[np.float64],  # (K, 2, 2): R; a point c is reached where |R (q − c)| ≤ 1
+    turn: float,  # distance along x at which cells and points repeat; 0 where they do not
 ) -> tuple[int, int]:
     """Return how a trajectory ends here, and with which label: `COMPLETED` and −1 if it goes on."""
     if not (np.isfinite(x) and np.isfinite(v)):
@@ -38,6 +39,8 @@ def stop_status(
     nearest, least = -1, 1.0
     for k in range(points.shape[0]):
         dx, dv = x - points[k, 0], v - points[k, 1]
+        if turn > 0.0:
+            dx -= turn * np.rint(dx / turn)
         distance = np.hypot(
             metrics[k, 0, 0] * dx + metrics[k, 0, 1] * dv, metrics[k, 1, 0] * dx + metrics[k, 1, 1] * dv
         )
@@ -45,6 +48,8 @@ def stop_status(
             nearest, least = k, distance
     if nearest >= 0:
         return REACHED, int(point_labels[nearest])
+    if turn > 0.0 and labels.size > 0:
+        x -= turn * np.floor((x - area[0, 0]) / turn)
     if labels.size > 0 and area[0, 0] <= x <= area[0, 1] and area[1, 0] <= v <= area[1, 1]:
         label = labels[
             cell_of(x, area[0, 0], area[0, 1], labels.shape[0]),

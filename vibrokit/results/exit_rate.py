@@ -17,7 +17,8 @@ class ExitRate(metaclass=Constructed):
     Attributes
     ----------
     source, target : int
-        Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor.
+        Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor, −2 for
+        escape.
     intensity : float
         D (m² s⁻³).
     log_value : float
@@ -25,9 +26,9 @@ class ExitRate(metaclass=Constructed):
     log_error : float
         Error estimate of it.
     event : str
-        What counts: ``"commitment"``, the first state on the section in the core of another attractor; ``"basin"``,
-        the first one in another basin; or ``"contact"``, the first time at which position and velocity satisfy the exit
-        condition.
+        What counts: ``"commitment"``, the first state on the section in the core of another attractor, or escape for
+        good; ``"basin"``, the first one in another basin; or ``"contact"``, the first time at which position and
+        velocity satisfy the exit condition.
     method : str
     """
 

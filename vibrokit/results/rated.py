@@ -12,6 +12,7 @@ from vibrokit.construction import called
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.labels import exit_between, goal_of, source_among
@@ -57,7 +58,7 @@ class RatedResult(Result):
         )
         intensities = arrays.numbers("rate_intensity", values.shape[:2], finite=False)
         methods = np.reshape(arrays.words("rate_method", values.shape[:2]), values.shape[:2])
-        targets = arrays.wholes("rate_target", (values.shape[0], values.shape[2]), -1, len(self.names) - 1)
+        targets = arrays.wholes("rate_target", (values.shape[0], values.shape[2]), ESCAPED, len(self.names) - 1)
         events = arrays.words("rate_event", (len(labels),))
         known = np.argwhere(np.isfinite(values) & np.isfinite(errors)).tolist()
         return tuple(

@@ -33,7 +33,7 @@ class Exits:
     tests : int64 array (count,)
         Exit tests until each exit, in ascending order.
     targets : int64 array (count,)
-        Label of the attractor that each exit leads to; −1 for an exit that is no attractor.
+        Label of the attractor that each exit leads to; −1 for an exit that is no attractor, −2 for escape.
     at_risk : int
         Exit tests of all walkers together, also of those that have not left.
     censored : int

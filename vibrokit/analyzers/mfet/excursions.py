@@ -11,8 +11,9 @@ from vibrokit.analyzers.mfet.importance import Importance
 from vibrokit.analyzers.mfet.walk import Walk, Walkers
 from vibrokit.kernels.stopping import COMPLETED, REACHED
 from vibrokit.kernels.streams import streams_of
+from vibrokit.results.basins import NOT_FOLLOWED
 
-NOT_OUT = -2
+NOT_OUT = NOT_FOLLOWED
 """In place of a target: the excursion returned."""
 
 _MORE = 8  # times as many beginnings as are followed are wanted
@@ -94,7 +95,7 @@ class Excursions:
     scores : array (count,)
         The largest score of each; infinite for one that has left.
     targets : int64 array (count,)
-        Where it led: `NOT_OUT`, a label, or −1 for an exit that is no attractor.
+        Where it led: `NOT_OUT`, a label, or the negative one of an exit that is no attractor.
     """
 
     def __init__(self, walk: Walk, importance: Importance, states: Array, *key: int) -> None:
@@ -106,7 +107,7 @@ class Excursions:
         self._phases = np.zeros(len(states), dtype=np.int64)  # looks since a section
         self.scores = np.full(len(states), -np.inf)
         one = np.ones(len(states), dtype=np.int64)
-        importance.records(states[:, None], one, -one, self._looks, self.scores)
+        importance.records(walk.problem.on_turn(states[:, None]), one, -one, self._looks, self.scores)
         self.targets = np.full(len(states), NOT_OUT, dtype=np.int64)
         begun = zip(self.scores.tolist(), states, strict=True)
         self._records: list[list[tuple[float, Array, int]]] = [[(score, state, 0)] for score, state in begun]
@@ -124,7 +125,8 @@ class Excursions:
             ended = walk.pieced(begun, at_once * each, self._pieces, phases * each, at_once, each)
             self._states[which], self._streams[which] = ended.states, ended.streams
             highest, counts = self.scores[which], ended.intervals // each
-            scores = self._importance.records(ended.visits, counts, phases, looks, highest)
+            visits = walk.problem.on_turn(ended.visits)
+            scores = self._importance.records(visits, counts, phases, looks, highest)
             self.scores[which] = highest
             rows, places = np.nonzero(np.isfinite(scores))
             at = (phases[rows] + 1 + places) % looks

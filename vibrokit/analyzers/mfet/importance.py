@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.mfet.walk import Walk
-from vibrokit.analyzers.neighbourhoods import metrics_of, nearest
+from vibrokit.analyzers.neighbourhoods import metrics_of, nearest, repeated
 from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.kernels.climbing import climb
 from vibrokit.results.attractor import Attractor
@@ -65,30 +65,43 @@ class Importance:
 
 
 def from_distances(walk: Walk) -> Importance:
-    """Return a / (a + b), with the squared distances a from the attractor and b from the nearest other one.
+    """Return a / (a + b), with the squared distances a from the attractor and b from the nearest other exit.
 
-    Distances are in standard deviations of the densities around the attractors, which move with the forcing. This is a
-    score where no density is at hand; the more the motion turns on its way out, the less good.
+    That is another attractor, or a bound beyond which motion has left. Distances are in standard deviations of the
+    densities around the attractors, which move with the forcing. This is a score where no density is at hand; the more
+    the motion turns on its way out, the less good.
     """
-    region = walk.problem.structure.basins.region
+    problem, region = walk.problem, walk.problem.structure.basins.region
+    bounds = np.stack([region.bounds, np.where(np.isfinite(problem.faces), problem.faces, region.bounds)])
     x, v = (
         np.linspace(low - _BEYOND * (high - low), high + _BEYOND * (high - low), _NODES)
-        for low, high in (region.x, region.v)
+        for low, high in zip(bounds[:, :, 0].min(axis=0), bounds[:, :, 1].max(axis=0), strict=True)
     )
     nodes = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
     times = np.arange(_TIMES) / _TIMES
-    own = _distances(walk, walk.problem.attractor, nodes)
-    others = [_distances(walk, a, nodes) for a in walk.problem.structure.attractors if a.label != walk.problem.source]
+    own = _distances(walk, problem.attractor, nodes)
+    others = [_distances(walk, a, nodes) for a in problem.structure.attractors if a.label != problem.source]
+    others += [np.broadcast_to(each, own.shape) for each in _distances_from_faces(walk, nodes)]
     to_others = np.min(others, axis=0) if others else np.full_like(own, own.max())
     values = own / (own + to_others)
     return Importance(times, x, v, values, _DEPTH)
+
+
+def _distances_from_faces(walk: Walk, nodes: Array) -> list[Array]:
+    """Squared distances of nodes from each bound beyond which motion has left, shape (nx, nv); 0 beyond it."""
+    root, found = walk.own.metrics[0], []
+    for axis, side in np.argwhere(np.isfinite(walk.problem.faces)).tolist():
+        inward = (1.0 if side else -1.0) * (walk.problem.faces[axis, side] - nodes[..., axis])
+        found.append(np.maximum(inward, 0.0) ** 2 * float(root[:, axis] @ root[:, axis]))
+    return found
 
 
 def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:
     """Squared distances of nodes from an attractor at the times of a section interval, shape (times, nx, nv)."""
     if not attractor.is_fixed:
         stop = walk.around([attractor])
-        return np.repeat(nearest(nodes, stop.points, stop.metrics)[None], _TIMES, axis=0)
+        centres, roots = repeated(stop.points, stop.metrics, stop.turn)
+        return np.repeat(nearest(nodes, centres, roots)[None], _TIMES, axis=0)
     stepper = walk.problem.single_stepper(Flow.LINEARISED)
     orbit = refine_orbit(walk.problem.osc, attractor.points[0], attractor.period, stepper)
     phases = potential_along(walk.problem.osc, orbit, stepper)
@@ -97,6 +110,7 @@ def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:
         here = phases[first::_TIMES]
         covariances = walk.intensity * np.array([phase.covariance[:2, :2] for phase in here])
         least = 1e-9 * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-        points = np.array([phase.point[:2] for phase in here])
-        found.append(nearest(nodes, points, metrics_of(attractor, covariances, least)))
+        points = walk.problem.on_turn(np.array([phase.point[:2] for phase in here]))
+        ellipses = repeated(points, metrics_of(attractor, covariances, least), walk.problem.turn)
+        found.append(nearest(nodes, *ellipses))
     return np.array(found)

@@ -29,6 +29,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 
@@ -223,7 +224,8 @@ class Measurement:
         """Labels of the targets for which something is said even if no exit leads there: a bound."""
         if self.problem.exit.by_position:
             return ()
-        return tuple(target.label for target in targets_at(self.problem, self.walk.intensity))
+        targets = [target.label for target in targets_at(self.problem, self.walk.intensity)]
+        return (*targets, ESCAPED) if np.isfinite(self.problem.faces).any() else tuple(targets)
 
     def _kept(self, target: int) -> float:
         """Share of walkers that stay at a target for a few relaxations of it."""

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of
+from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of, repeated
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import UNBOUNDED, Ensemble, Stop, run_ensemble
+from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
 from vibrokit.kernels.streams import streams_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import ESCAPED
 from vibrokit.symbolic.flow_kind import Flow
 
 _FORGETS = 5.0  # relaxations after which the start on the orbit is forgotten to e⁻⁵ of the deviations
@@ -100,18 +101,24 @@ class Walk:
     @cached_property
     def relaxation(self) -> float:
         """Section intervals in which deviations from the attractor fall by a factor e."""
-        return relaxation_of(self.problem.attractor)
+        return relaxation_of(self.problem.attractor, self.scene.section_interval)
 
     @cached_property
     def stop(self) -> Stop:
         """The test for the exit."""
-        exit_ = self.problem.exit
-        if exit_.by_position:
-            bounds = self.problem.stop.region + self._seen_late
-            return dataclasses.replace(self.problem.stop, region=bounds, between=True, every=self.checks)
-        if exit_.at_boundary:
-            return dataclasses.replace(self.problem.stop, region=UNBOUNDED)
-        return self.arrival
+        problem = self.problem
+        stop = problem.stop if problem.exit.by_position or problem.exit.at_boundary else self.arrival
+        if problem.outlet is not None:
+            bounds = problem.faces + self._seen_late
+            stop = dataclasses.replace(stop, region=bounds, between=True, every=self.checks)
+        if problem.exit.at_boundary:  # escape has a label of its own, since the test passes over negative ones
+            labels = np.where(stop.labels == ESCAPED, self._escape_label, stop.labels)
+            stop = dataclasses.replace(stop, labels=labels, region=problem.faces, turn=problem.turn)
+        return stop
+
+    @property
+    def _escape_label(self) -> int:
+        return len(self.problem.structure.attractors)
 
     @property
     def _seen_late(self) -> Array:
@@ -120,7 +127,7 @@ class Walk:
         Where white noise drives v, it is a Brownian motion, which may pass a bound within a step and return: the exit
         is that of a bound 0.5826 √(D h) farther away, to the order of h. The displacement has no such error.
         """
-        scene, bounds = self.scene, self.problem.stop.region
+        scene, bounds = self.scene, self.problem.faces
         shift, faces = np.zeros((2, 2)), np.flatnonzero(np.isfinite(bounds[1]))
         if not len(faces):
             return shift
@@ -158,7 +165,8 @@ class Walk:
     def at_home(self, states: Array) -> NDArray[np.bool_]:
         """Return which states (…, n) on the section are in the attractor's core."""
         own = self.own
-        inside: NDArray[np.bool_] = nearest(states[..., :2], own.points, own.metrics) <= 1
+        centres, roots = repeated(own.points, own.metrics, own.turn)
+        inside: NDArray[np.bool_] = nearest(self.problem.on_turn(states[..., :2]), centres, roots) <= 1
         return inside
 
     def from_orbit(self, attractor: Attractor, count: int, *key: int) -> Walkers:
@@ -226,11 +234,18 @@ class Walk:
 
         `visits` then holds states after each piece; without pieces, after each section interval.
         """
-        return run_ensemble(
+        ended = run_ensemble(
             self.scene, Flow.NOISY, self.stepper, walkers.states, tests,
             stop=stop, interval=self.interval / pieces, streams=walkers.streams, visits=visits,
             keep=1 if pieces > 1 else self.checks, executor=self.problem.executor,
         )  # fmt: skip
+        return self._labelled(ended)
+
+    def _labelled(self, ended: Ensemble) -> Ensemble:
+        """The same with the label of the target where motion left by position, escaped or diverged."""
+        away = np.isin(ended.status, (LEFT_REGION, DIVERGED, STALLED)) | (ended.label == self._escape_label)
+        outlet = ESCAPED if self.problem.outlet is None else self.problem.outlet
+        return dataclasses.replace(ended, label=np.where(away, outlet, ended.label))
 
     def pieced(
         self, walkers: Walkers, count: int, pieces: int, phases: NDArray[np.int64], visits: int, keep: int
@@ -248,12 +263,13 @@ class Walk:
         visits, keep : int
             How many states are kept, one every `keep` pieces.
         """
-        return run_ensemble(
+        ended = run_ensemble(
             self.scene, Flow.NOISY, self.stepper, walkers.states, count,
             stop=dataclasses.replace(self.stop_or_return, every=pieces),
             interval=self.scene.section_interval / pieces, streams=walkers.streams, phases=phases,
             visits=visits, keep=keep, executor=self.problem.executor,
         )  # fmt: skip
+        return self._labelled(ended)
 
     def looks(self, depth: float) -> int:
         """Return how often an excursion that climbs so far is looked at in a section interval: a power of two.
@@ -262,7 +278,7 @@ class Walk:
         steps are multiples of these intervals.
         """
         steps = self.stepper.steps_in(self.scene, self.scene.section_interval)
-        wanted = _LOOKS * depth / relaxation_of(self.problem.attractor, least=_SHORTEST)
+        wanted = _LOOKS * depth / relaxation_of(self.problem.attractor, self.scene.section_interval, _SHORTEST)
         most = self.checks if self.problem.exit.by_position else steps
         allowed = [n for n in _POWERS if most % n == 0 and steps % n == 0]
         return min((n for n in allowed if n >= wanted), default=max(allowed))
@@ -284,7 +300,10 @@ class Walk:
         region = self.problem.structure.basins.region
         for attractor in attractors:
             centres, roots = core_of(attractor, self.covariances[attractor.label], self.intensity, region)
-            points.append(centres)
+            points.append(self.problem.on_turn(centres))
             metrics.append(roots)
             labels.append(np.full(len(centres), attractor.label, dtype=np.int64))
-        return Stop(points=np.concatenate(points), point_labels=np.concatenate(labels), metrics=np.concatenate(metrics))
+        return Stop(
+            points=np.concatenate(points), point_labels=np.concatenate(labels), metrics=np.concatenate(metrics),
+            turn=self.problem.turn,
+        )  # fmt: skip

@@ -72,7 +72,7 @@ def committor(
     earlier : Backward
     density : QuasiStationary
     cores : CoreSets
-        Those of others absorb on the section. If there are no others, the exit is one by position.
+        Those of others absorb on the section, and at the outlet motion ends at any time.
     areas : array (nx, 1)
         Area that belongs to each node.
     target : int
@@ -83,7 +83,7 @@ def committor(
     start : array (nx, nv), optional
         ln c, for example of stronger noise.
     """
-    floor = density.log_rates[target] - _BELOW
+    floor, at_exit = density.log_rates[target] - _BELOW, 0.0 if target == cores.outlet else -math.inf
     own = cores.own
     reached = cores.others.get(target, np.zeros_like(own))
     elsewhere = sum((covered for label, covered in cores.others.items() if label != target), own)
@@ -95,7 +95,7 @@ def committor(
     most = most_intervals(relaxation)
     with stage("committor", unit="section intervals"):
         while len(rates) < most and change > converged:
-            later = np.minimum(earlier(found, floor), 0.0)
+            later = np.minimum(earlier(found, floor, at_exit), 0.0)
             rate = float(np.logaddexp.reduce((in_core + later)[own > 0]))
             rates.append(rate if rate > floor + 0.5 * _BELOW else -math.inf)
             found = np.clip(np.logaddexp(reached_log, later + stays), floor, 0.0)

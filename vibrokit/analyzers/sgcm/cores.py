@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import CORE_SIZE, covariances_of, metrics_of, nearest, relaxation_of
+from vibrokit.analyzers.neighbourhoods import (
+    CORE_SIZE,
+    covariances_of,
+    metrics_of,
+    nearest,
+    places_of,
+    relaxation_of,
+    repeated,
+)
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor
@@ -36,11 +44,14 @@ class CoreSets:
         By label: the same for the cores of others, or for their basins if those count; empty if position decides.
     entry : array (nx, nv)
         ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
+    outlet : int or None
+        Target of what leaves by position, at any time; None if nothing does.
     """
 
     own: Array
     others: Mapping[int, Array]
     entry: Array
+    outlet: int | None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,13 +76,15 @@ class Cores:
         own = self._core(self.problem.attractor, grid, intensity, size)
         with np.errstate(divide="ignore"):
             entry: Array = self.start(grid, intensity) + np.log(own)
-        if self.problem.exit.by_position:
-            return CoreSets(own, {}, entry)
-        others = self.problem.targets
+        outlet, targets = self.problem.outlet, self.problem.targets
+        others: dict[int, Array] = {}
         if self.problem.exit.at_boundary:
-            return CoreSets(own, {a.label: self._basin(a, grid, own, every) for a in others}, entry)
-        settled = targets_at(self.problem, intensity) or others  # exploration may take more noise than is asked for
-        return CoreSets(own, {a.label: self._core(a, grid, intensity, size) for a in settled}, entry)
+            labels = [a.label for a in targets] + ([] if outlet is None else [outlet])
+            others = {label: self._basin(label, grid, own, every) for label in labels}
+        elif not self.problem.exit.by_position:
+            settled = targets_at(self.problem, intensity) or targets  # exploration may take more noise than is wanted
+            others = {a.label: self._core(a, grid, intensity, size) for a in settled}
+        return CoreSets(own, others, entry, outlet)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
@@ -102,11 +115,12 @@ class Cores:
         beyond = np.maximum(beyond, _WIDER * np.ptp(orbits, axis=0))
         low, high = orbits.min(axis=0) - beyond, orbits.max(axis=0) + beyond
         own = self._with_faces(structure.basins.region.bounds)
-        return Region.of(np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1))
+        found = np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1)
+        return Region.of([structure.region.x, found[1]] if self.problem.turn else found)
 
     def _with_faces(self, bounds: Array) -> Array:
         """Bounds that hold the exit's faces; if x must be wider for that then v is too, as a motion there needs it."""
-        faces, outward = self.problem.exit.faces(self.problem.osc), np.array([-1.0, 1.0])
+        faces, outward = self.problem.faces, np.array([-1.0, 1.0])
         margins = _BEYOND_FACE * np.diff(bounds)
         beyond = np.where(np.isfinite(faces), np.maximum(outward * (faces - bounds) + margins, 0.0), 0.0)
         grown = np.max(beyond / np.diff(bounds))
@@ -116,12 +130,12 @@ class Cores:
     @property
     def relaxation(self) -> float:
         """Section intervals in which deviations of the density fall by a factor e."""
-        return relaxation_of(self.problem.attractor)
+        return relaxation_of(self.problem.attractor, self.problem.osc.section_interval)
 
-    def _basin(self, attractor: Attractor, grid: DensityGrid, own: Array, every: int) -> Array:
-        """How much of each cell belongs to the basin of another attractor, and not to the own core."""
-        basins = self.problem.structure.basins
-        covered = grid.covered(lambda states: basins.at(states, every) == attractor.label)
+    def _basin(self, label: int, grid: DensityGrid, own: Array, every: int) -> Array:
+        """How much of each cell belongs to the basin of another attractor or to escape, and not to the own core."""
+        basins, problem = self.problem.structure.basins, self.problem
+        covered = grid.covered(lambda states: basins.at(problem.on_turn(states), every) == label)
         return np.minimum(covered, 1.0 - own)
 
     def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:
@@ -133,5 +147,6 @@ class Cores:
         self, attractor: Attractor, covariances: Array, least: float, grid: DensityGrid
     ) -> tuple[Array, Array]:
         """Centres and metrics; no semi-axis is below `least` node spacings."""
-        points = attractor.points[:, :2]
-        return points, metrics_of(attractor, covariances, least * grid.local_spacing(points))
+        points = self.problem.on_turn(places_of(attractor))
+        roots = metrics_of(attractor, covariances, least * grid.local_spacing(points))
+        return repeated(points, roots, self.problem.turn)

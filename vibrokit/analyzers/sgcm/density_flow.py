@@ -60,15 +60,15 @@ class Leg:
         position does not decide.
     noise : float
         For how long noise acts (s).
-    leaving : bool array (nx, nv) or None
-        Nodes from which the motion leaves the grid, if that is asked for.
+    leaving : array (nx, nv) or None
+        Share of each cell whose motions leave the grid, if that is asked for; where position decides, past the exit.
     """
 
     feet: Array
     growth: Array
     crossed: Array
     noise: float = 0.0
-    leaving: NDArray[np.bool_] | None = None
+    leaving: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -181,10 +181,12 @@ class DensityFlow:
             growth[inside] = -np.log(np.abs(np.linalg.det(local.derivatives)))
         places[~np.isfinite(growth)] = np.nan
         shape = self.grid.shape
-        leaving: NDArray[np.bool_] | None = None
+        leaving: Array | None = None
         if self.watches_edge:
-            images, _ = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
-            leaving = ~self.grid.holds(self.grid.places(images)).reshape(shape)
+            images, passed = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
+            leaving = (~self.grid.holds(self.grid.places(images))).reshape(shape).astype(float)
+            if self.beyond is not None:
+                leaving *= passed
         return Leg(places.reshape(*shape, 2), np.nan_to_num(growth).reshape(shape), crossed, leaving=leaving)
 
     def _from(self, start: float, end: float) -> Leg:

@@ -23,6 +23,8 @@ _UNRESOLVED = 2.0  # in ln p above the floor: what is cut at 1 above it leaves a
 _FINER = 5  # points along each side of a cell, which decide how much of it a set covers
 _PLACES = 4001  # in x, where the stiffness is evaluated
 _CLOSEST = 8.0  # times closer than elsewhere, at most
+_REPEATED = 4  # nodes beyond one turn on each side: a quintic reaches 3
+_NO_AREA = 1e-300  # of nodes that repeat others: its logarithm is finite
 _SMOOTHED = 0.01  # of the region, over which the density of nodes is smoothed
 
 Array = NDArray[np.float64]
@@ -35,19 +37,28 @@ class DensityGrid:
     Attributes
     ----------
     x, v : array (nx,), (nv,)
+    turn : float
+        Distance along x after which states are the same, as on a circle; 0 if they are not. Beyond one turn there are
+        some nodes more on both sides, whose cells have no area: the flow brings to them what it brings to their copies.
     """
 
     x: Array
     v: Array
+    turn: float = 0.0
 
     @classmethod
-    def of(cls, osc: Oscillator, region: Region, shape: tuple[int, int], faces: Array = UNBOUNDED) -> DensityGrid:
+    def of(
+        cls, osc: Oscillator, region: Region, shape: tuple[int, int], faces: Array = UNBOUNDED, turn: float = 0.0
+    ) -> DensityGrid:
         """Return a grid whose nodes in x are closer where the oscillator is stiffer.
 
         In a contact of natural frequency ω a density is as wide in v as outside, and narrower in x by ω_n/ω. Faces of
         an exit, array (2, 2), are halfway between nodes, so that each cell is on one side of them; those that are
-        outside the region do not count.
+        outside the region do not count. With a turn along x the region is one turn, and nodes are at equal distances.
         """
+        if turn:
+            places = np.arange(-_REPEATED, shape[0] + _REPEATED)
+            return cls(region.x[0] + turn * (places + 0.5) / shape[0], np.linspace(*region.v, shape[1]), turn)
         widened = 2.0 * np.ptp(region.x) / shape[0]
         places = np.linspace(region.x[0] - widened, region.x[1] + widened, _PLACES)
         stiffness = -VectorField(osc).jacobian(np.stack([places, np.zeros_like(places)], axis=-1))[:, 1, 0]
@@ -67,12 +78,21 @@ class DensityGrid:
     @property
     def region(self) -> Region:
         """What the nodes cover."""
-        return Region.of([(self.x[0], self.x[-1]), (self.v[0], self.v[-1])])
+        return Region.of([self._turn if self.turn else (self.x[0], self.x[-1]), (self.v[0], self.v[-1])])
+
+    @property
+    def _turn(self) -> tuple[float, float]:
+        """One turn along x, from halfway between two nodes on."""
+        low = 0.5 * (self.x[_REPEATED - 1] + self.x[_REPEATED])
+        return low, low + self.turn
 
     @cached_property
     def areas(self) -> Array:
         """Area that belongs to each node, shape (nx, 1)."""
-        return (np.gradient(self.x) * self.v_spacing)[:, None]
+        areas = np.gradient(self.x) * self.v_spacing
+        if self.turn:
+            areas[:_REPEATED] = areas[-_REPEATED:] = _NO_AREA
+        return areas[:, None]
 
     @property
     def v_spacing(self) -> float:
@@ -91,6 +111,8 @@ class DensityGrid:
     def places(self, states: Array) -> Array:
         """Return states (…, 2) in units of nodes; outside the grid they are outside its range of nodes."""
         x, v = states[..., 0], states[..., 1]
+        if self.turn:
+            x = x - self.turn * np.floor((x - self._turn[0]) / self.turn)
         inside = self._place(np.clip(x, self.x[0], self.x[-1]))
         beyond = np.where(x < self.x[0], -1.0, np.where(x > self.x[-1], float(len(self.x)), inside))
         return np.stack([np.where(np.isnan(x), np.nan, beyond), (v - self.v[0]) / self.v_spacing], axis=-1)
@@ -143,8 +165,10 @@ class DensityGrid:
 
     def around(self, wanted: NDArray[np.bool_], margin: int) -> Region:
         """Return a region around the wanted nodes and `margin` nodes more on each side."""
-        bounds = []
+        bounds = [self._turn] if self.turn else []
         for axis, places in enumerate((self.x, self.v)):
+            if axis < len(bounds):
+                continue
             found = np.flatnonzero(wanted.any(axis=1 - axis))
             first, last = max(found[0] - margin, 0), min(found[-1] + margin, len(places) - 1)
             bounds.append((places[first], places[last]))

@@ -55,11 +55,6 @@ class Propagator:
         """The nodes."""
         return self.flow.grid
 
-    @property
-    def by_position(self) -> bool:
-        """Whether probability leaves by position, at any time."""
-        return self.flow.beyond is not None
-
     @cached_property
     def deviation(self) -> Array:
         """Standard deviation of the velocity that noise adds in a unit of time, in node spacings."""
@@ -78,9 +73,13 @@ class Propagator:
 
         `highest`, if given, keeps the largest φ at each node over all legs.
         """
-        lost, carried = -np.inf, phi
-        for _, carried, taken in self._carried(self.flow.legs, phi, self._weight, floor):
+        lost, before, carried = -np.inf, phi, phi
+        for leg, carried, taken in self._carried(self.flow.legs, phi, self._weight, floor):
             lost = np.logaddexp(lost, taken)
+            if self.flow.beyond is not None and leg.leaving is not None and leg.leaving.any():
+                passing = leg.leaving > 0
+                lost = np.logaddexp(lost, self.grid.mass(before + np.log(np.where(passing, leg.leaving, 1.0)), passing))
+            before = carried
             if highest is not None:
                 np.maximum(highest, carried, out=highest)
         return carried, float(lost)
@@ -93,7 +92,7 @@ class Propagator:
         mass, factor, before = self.grid.mass(phi), 0.0, phi
         for leg, carried, _ in self._carried(legs, phi, self._weight, floor):
             if leg.leaving is not None and leg.leaving.any():
-                mass += math.log1p(-min(math.exp(self.grid.mass(before, leg.leaving) - mass), ABSORBED))
+                mass += math.log1p(-min(math.exp(self.grid.mass(before, leg.leaving > 0) - mass), ABSORBED))
             change = self.grid.mass(carried) - mass
             kept = carried > floor
             carried[kept] -= change
@@ -101,15 +100,15 @@ class Propagator:
         return before, factor
 
     def backward(self, density: QuasiStationary, cores: CoreSets) -> Backward:
-        """Return what gives ln of an expected value one section interval earlier; 1 at the exit, if position decides.
+        """Return what gives ln of an expected value one section interval earlier.
 
         Where the density, at its time, is too small to matter there is no value, so that nothing is computed, unless
         the node belongs to a core.
         """
         legs = self._backward_legs(density, cores)
 
-        def earlier(values: Array, floor: float) -> Array:
-            *_, (_, found, _) = self._carried(legs, values, _NO_WEIGHT, floor, at_exit=0.0)
+        def earlier(values: Array, floor: float, at_exit: float) -> Array:
+            *_, (_, found, _) = self._carried(legs, values, _NO_WEIGHT, floor, at_exit)
             return found
 
         return earlier

@@ -30,8 +30,8 @@ _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by
 
 Array = NDArray[np.float64]
 
-Backward = Callable[[Array, float], Array]
-"""From ln of an expected value and its floor to the same one section interval earlier."""
+Backward = Callable[[Array, float, float], Array]
+"""From ln of an expected value, its floor and its value where position ends motion to the same an interval earlier."""
 
 
 class Transition(Protocol):
@@ -40,10 +40,6 @@ class Transition(Protocol):
     @property
     def grid(self) -> DensityGrid:
         """The nodes."""
-
-    @property
-    def by_position(self) -> bool:
-        """Whether probability leaves by position, at any time."""
 
     def interval(self, phi: Array, floor: float, highest: Array | None = None) -> tuple[Array, float]:
         """Return φ one section interval later, and the logarithm of the probability that left by position.
@@ -107,7 +103,7 @@ def quasi_stationary(
     start : array (nx, nv)
         ln p.
     cores : CoreSets
-        Those of others absorb on the section. If there are no others, probability leaves by position, with target −1.
+        Those of others absorb on the section.
     relaxation : float
         Section intervals in which deviations of the density fall by a factor e.
     converged : float
@@ -119,7 +115,8 @@ def quasi_stationary(
     phi, rates, change, intervals = start - grid.mass(start), list[float](), np.inf, 0
     most, sets = most_intervals(relaxation), cores.others
     areas = {target: float(np.log((covered * grid.areas).sum())) for target, covered in sets.items()}
-    areas = areas or {-1: float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))}
+    if cores.outlet is not None:
+        areas[cores.outlet] = float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
     highest = np.empty_like(phi)
@@ -130,9 +127,9 @@ def quasi_stationary(
             phi, lost = transition.interval(phi, floor, highest)
             empty = phi <= floor
             mass = grid.mass(phi)
-            if transition.by_position:
+            if cores.outlet is not None:
                 mass = float(np.logaddexp(mass, lost))
-                log_rates = {-1: lost - mass}
+                log_rates = {cores.outlet: lost - mass}
             drift = float(np.expm1(mass))
             for target, covered in sets.items():
                 held = covered > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from concurrent.futures import Executor
 from functools import cached_property
 
@@ -55,11 +56,6 @@ class SampledMatrix:
     beyond: Beyond | None
     executor: Executor
 
-    @property
-    def by_position(self) -> bool:
-        """Whether probability leaves by position, at any time."""
-        return self.beyond is not None
-
     def interval(self, phi: Array, floor: float, highest: Array | None = None) -> tuple[Array, float]:
         """Return φ one section interval later, and the logarithm of the probability that left by position."""
         stays, leaves = self._matrix
@@ -78,8 +74,8 @@ class SampledMatrix:
         stays, leaves = self._matrix
         transposed = stays.T.tocsr()
 
-        def earlier(values: Array, floor: float) -> Array:
-            expected = transposed @ np.exp(values).ravel() + leaves
+        def earlier(values: Array, floor: float, at_exit: float) -> Array:
+            expected = transposed @ np.exp(values).ravel() + math.exp(at_exit) * leaves
             with np.errstate(divide="ignore"):
                 found: Array = np.maximum(np.log(expected.reshape(self.grid.shape)), floor)
             return found

@@ -23,6 +23,7 @@ from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, Transition, quasi_stationary
 from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
 from vibrokit.errors import StructureError
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.region import Region
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -159,7 +160,7 @@ class DensitySolver:
                 needed = cores if stronger == intensity else self._cores.on(grid, intensity)
                 for covered in needed.others.values():
                     wanted |= covered > 0
-            if self.problem.exit.by_position:
+            if self.problem.outlet is not None:
                 wanted |= propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted
             closer = self._grid(grid.around(wanted, _MARGIN), shape)
             smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
@@ -170,7 +171,7 @@ class DensitySolver:
         return AtIntensity(stronger, propagator.grid, found, propagator, cores, committors), closer
 
     def _grid(self, region: Region, shape: tuple[int, int]) -> DensityGrid:
-        return DensityGrid.of(self.problem.scene, region, shape, self.problem.exit.faces(self.problem.osc))
+        return DensityGrid.of(self.problem.scene, region, shape, self.problem.faces, self.problem.turn)
 
     def _shape(self, explored: DensityGrid, intensity: float) -> tuple[int, int]:
         """The nodes that are wanted, or those that the narrowest density needs."""
@@ -211,8 +212,9 @@ class DensitySolver:
 
     def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
         stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
-        beyond = self.problem.beyond if self.problem.exit.by_position else None
-        return DensityFlow(self.problem.scene, stepper, grid, steps, beyond)
+        beyond = None if self.problem.outlet is None else self.problem.beyond
+        escaping = self.problem.outlet == ESCAPED  # may take motion far beyond the grid in a leg
+        return DensityFlow(self.problem.scene, stepper, grid, steps, beyond, watches_edge=escaping)
 
     def _transition(self, flow: DensityFlow, intensity: float, executor: Executor) -> Transition:
         if self.samples is None:

@@ -67,6 +67,7 @@ def advance(
     points,
     point_labels,
     metrics,
+    turn,
     out_states,
     out_intervals,
     out_status,
@@ -176,8 +177,9 @@ def advance(
                     visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
                     for e in range(equations):
                         visits[index, visit, e] = z[e, lane]
+                x, v = z[0, lane], z[1, lane]
                 status, label = stop_status(
-                    z[0, lane], z[1, lane], at_section, region, area, labels, home, points, point_labels, metrics
+                    x, v, at_section, region, area, labels, home, points, point_labels, metrics, turn
                 )
                 if status == COMPLETED and outside[lane]:
                     status = LEFT_REGION

@@ -117,6 +117,7 @@ def advance(
     points,
     point_labels,
     metrics,
+    turn,
     out_states,
     out_intervals,
     out_status,
@@ -167,7 +168,7 @@ def advance(
                                 visits[index, visit, e] = out_states[index, e]
                         here = out_states[index, 0], out_states[index, 1]
                         status, label = stop_status(
-                            here[0], here[1], at_section, region, area, labels, home, points, point_labels, metrics
+                            *here, at_section, region, area, labels, home, points, point_labels, metrics, turn
                         )
                         if between and status == COMPLETED and turned_outside(x, v, here[0], here[1], interval, region):
                             status = LEFT_REGION
