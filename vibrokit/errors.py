@@ -84,6 +84,23 @@ class IntegrationError(VibrokitError, ArithmeticError):
         self.state = state
 
 
+class TooManyStepsError(IntegrationError):
+    """The number of steps in one interval reached its limit; the state is finite.
+
+    Attributes
+    ----------
+    time_scale : float
+        The shortest time of a force at the state (s), which limits the steps; infinite where none was found.
+    friction : bool
+        Whether that force is steep in the velocity of the mass, as dry friction is.
+    """
+
+    def __init__(self, message: str, time: float, state: tuple[float, ...], time_scale: float, friction: bool) -> None:
+        super().__init__(message, time, state)
+        self.time_scale = time_scale
+        self.friction = friction
+
+
 def shown(value: object) -> str:
     """Return any value as one short line for an error message."""
     try:

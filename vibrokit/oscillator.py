@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.construction import called
-from vibrokit.errors import IntegrationError, ParameterError, SceneError, shown
+from vibrokit.errors import IntegrationError, ParameterError, SceneError, TooManyStepsError, shown
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.scene import Scene
 from vibrokit.results.trajectory import Trajectory
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _SAMPLES = 256
 _MOST_SAMPLES = 10**8
 _MOST_PERIODS = 10**15
+_FAST = 2000.0  # times of a force in an interval that needs 200 000 attempts at steps: up to 100 are made for each
 _PERIODS = Parameter("periods", "", "", "", above=0)
 _DURATION = Parameter("duration", "", "", "s", above=0)
 _START_TIME = Parameter("start_time", "", "", "s")
@@ -96,11 +97,14 @@ class Oscillator(Scene):
         ------
         IntegrationError
             The state became infinite or NaN; the error has the time and the last finite state.
+        TooManyStepsError
+            The state is finite, but the steps that a force requires are too short; the error also has its time.
         """
         from vibrokit.kernels.choice import single_stepper
         from vibrokit.kernels.ending import ending
         from vibrokit.kernels.named import check_stepper
-        from vibrokit.kernels.single import record
+        from vibrokit.kernels.single import recorded
+        from vibrokit.kernels.stopping import STALLED
         from vibrokit.kernels.vector_field import VectorField
 
         start = self._checked_states(state, 1)[0]
@@ -110,7 +114,7 @@ class Oscillator(Scene):
         check_stepper(stepper)
         chosen = stepper or single_stepper(self, flow)
         seed = None if rng is None else seed_from(rng)
-        path = record(self, flow, chosen, start, start_time, length / count, count, seed=seed)
+        path, status = recorded(self, flow, chosen, start, start_time, length / count, count, seed=seed)
         times: Array = start_time + length / count * np.arange(count + 1, dtype=float)
         if len(path) <= count:
             last, since = tuple(float(value) for value in path[-1]), float(times[len(path) - 1])
@@ -123,9 +127,11 @@ class Oscillator(Scene):
                 )
             if not np.isfinite(VectorField(self).rate(path[-1], since)).all():
                 raise IntegrationError(f"at t = {since:.6g} the trajectory came to {last}, {_NO_VALUE}", since, last)
+            if status == STALLED:
+                raise self._stalled("the trajectory needs", since, last, length / count)
             raise IntegrationError(
-                f"the trajectory diverged, or needed too many steps, between t = {since:g} and "
-                f"{times[len(path)]:g}, after the state {last}; {_advice(chosen)}",
+                f"the trajectory diverged between t = {since:g} and {times[len(path)]:g}, after the state {last}; "
+                f"{_advice(chosen)}",
                 since,
                 last,
             )
@@ -165,11 +171,14 @@ class Oscillator(Scene):
             The excitations have no common period.
         IntegrationError
             A state became infinite or NaN; the error has the trajectory, the time and the last finite state.
+        TooManyStepsError
+            A state is finite, but the steps that a force requires are too short.
         """
         from vibrokit.kernels.choice import ensemble_stepper
         from vibrokit.kernels.ending import ending
         from vibrokit.kernels.ensemble import run_ensemble
         from vibrokit.kernels.named import check_stepper
+        from vibrokit.kernels.stopping import STALLED
         from vibrokit.kernels.streams import streams_of
         from vibrokit.kernels.tasks import check_executor
 
@@ -190,6 +199,9 @@ class Oscillator(Scene):
             time = float(ended.intervals[first] * self.section_interval)
             last = tuple(float(value) for value in ended.states[first])
             _, border = ending(self, flow, chosen, ended.states[first], time, self.section_interval)
+            if ended.status[first] == STALLED and not border:
+                who = f"{failed.size} of {len(starts)} trajectories did not end; the first, number {first}, needs"
+                raise self._stalled(who, time, last, self.section_interval)
             raise IntegrationError(
                 f"{failed.size} of {len(starts)} trajectories {'ended' if border else 'diverged'}; the first, number "
                 f"{first} from {tuple(starts[first].tolist())}, in the period after t = {time:g}, after the state "
@@ -216,6 +228,21 @@ class Oscillator(Scene):
         coarse = self.section_map(states, periods, stepper=chosen)
         fine = self.section_map(states, periods, stepper=chosen.refined())
         return np.linalg.norm(coarse - fine, axis=1)
+
+    def _stalled(self, who: str, time: float, state: tuple[float, ...], interval: float) -> TooManyStepsError:
+        """Return the error of motion that needs too many steps in an interval after a state, with their cause."""
+        from vibrokit.kernels.order8 import MOST_STEPS
+        from vibrokit.kernels.stalling import fastest_force
+
+        force = fastest_force(self, np.array(state))
+        where = f"{who} more than {MOST_STEPS:.0f} steps in the {interval:g} s after t = {time:g}, at the state {state}"
+        if force is None or interval < _FAST * force.time:
+            advice = "it may run off to infinity in a finite time: check the signs of the forces"
+            return TooManyStepsError(f"{where}; {advice}.", time, state, math.inf, False)
+        advice = "give the friction a smooth form that is wider in v" if force.friction else "take a softer law"
+        cause = f"{force.words}, a time of {force.time:.3g} s, and no step may be much longer"
+        message = f"{where}: {cause}; {advice}, or follow the motion for shorter intervals."
+        return TooManyStepsError(message, time, state, force.time, force.friction)
 
     def _noisy(self) -> Flow:
         if self.noise is None:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
 FINEST, COARSEST = 1e-15, 1e-2
-_MOST_STEPS = 200_000.0
+MOST_STEPS = 200_000.0
+"""In one interval; motion that needs more is given up."""
 _JUMPING: Mapping[Flow, float] = {
     Flow.STATE_VARIATIONAL: LINEARIZED,
     Flow.LINEARISED: LINEARIZED,
@@ -51,11 +52,11 @@ class LocatedStepper(Stepper):
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
         """Tolerance, most steps in an interval, intervals until the forcing repeats, 1/ω_n; 0: each begins anew."""
         cycle = scene.intervals_in_period(interval)
-        return float(self.tolerance), _MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, 0.0
+        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, 0.0
 
     def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
         """The same, under a forcing that never repeats, and the time over which the motion goes on."""
-        return float(self.tolerance), _MOST_STEPS, 0.0, 1.0 / scene.natural_frequency, spacing * samples
+        return float(self.tolerance), MOST_STEPS, 0.0, 1.0 / scene.natural_frequency, spacing * samples
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes."""

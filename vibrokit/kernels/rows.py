@@ -23,6 +23,7 @@ LANES = 8  # those of one register; more were not faster, and fewer trajectories
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _ABSOLUTE = f"llvm.fabs.v{LANES}f64"
 _CONTRACT = ("contract", "nsz", "arcp")
+_LEAST_UNIT = 1e-290  # of an error: the inverse of a denormal number would be infinite
 
 Weights = NDArray[np.float64]
 
@@ -116,9 +117,8 @@ def compare_rows(
             unit = _load(builder, sizes, _block_of(builder, blocks, loop.index))
             more = builder.select(builder.icmp_signed("<", loop.index, hazy), _splat(1.0), blurred)
             unit = builder.fmul(unit, more, flags=_CONTRACT)
-            per = builder.select(
-                builder.fcmp_ordered(">", unit, _splat(0.0)), builder.fdiv(_splat(1.0), unit), _splat(0.0)
-            )
+            inverse = builder.fdiv(_splat(1.0), _larger(builder, unit, _splat(_LEAST_UNIT)))
+            per = builder.select(builder.fcmp_ordered(">", unit, _splat(0.0)), inverse, _splat(0.0))
             for largest, estimates in ((fifth, fifths), (third, thirds)):
                 own = builder.fmul(_load(builder, estimates, place), per, flags=_CONTRACT)
                 builder.store(_larger(builder, own, builder.load(largest)), largest)

@@ -30,13 +30,29 @@ def record(
 
     They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
+    return recorded(scene, flow, stepper, state, start_time, spacing, count, seed=seed, normals=normals)[0]
+
+
+def recorded(
+    scene: Scene,
+    flow: Flow,
+    stepper: Stepper,
+    state: NDArray[np.float64],
+    start_time: float,
+    spacing: float,
+    count: int,
+    *,
+    seed: int | None = None,
+    normals: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], int]:
+    """Return what `record` does, and why the trajectory ended: a constant of `vibrokit.kernels.stopping`."""
     kernel = kernel_for(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     common = (theta_of(scene), start_time, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
     streams = streams_of(seed or 0, np.zeros(1, dtype=np.int64)) if flow is Flow.NOISY else np.empty((1, 0), np.uint64)
     budget, phase = np.full(1, count), np.zeros(1, dtype=np.int64)
     path = advance_block(kernel, state[None], budget, common, streams, phase, Stop(), count, 1, normals)
-    return np.concatenate([state[None], path.visits[0, : path.intervals[0]]])
+    return np.concatenate([state[None], path.visits[0, : path.intervals[0]]]), int(path.status[0])
 
 
 def record_each(

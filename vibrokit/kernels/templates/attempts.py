@@ -124,7 +124,9 @@ def conclude_errors(lanes):
     for lane in range(LANES):
         length = lanes[LENGTH + lane]
         fifth, third, broken = lanes[MOST + lane], lanes[MOST + LANES + lane], lanes[MOST + 2 * LANES + lane]
-        error = abs(length) * fifth * fifth / sqrt(fifth * fifth + 0.01 * third * third)
+        largest = fifth if fifth > third else third
+        part, other = (fifth / largest, third / largest) if largest > 0.0 else (0.0, 1.0)  # squares may vanish
+        error = abs(length) * fifth * part / sqrt(part * part + 0.01 * other * other)
         least = length * third
         least = 0.01 * least * least
         error = (error if error > least else least) / lanes[ALLOWED + lane] if third > 0.0 else 0.0
