@@ -108,6 +108,12 @@ class Code(StrEnum):
         "contain all that are known.",
         "Give that region, or none.",
     )  # fmt: skip
+    TOPS_OUTSIDE = (
+        "tops-outside", INFO,
+        "The region does not contain the top of a potential barrier at {place:.6g} m, beyond which motion leaves for "
+        "other states or for good.",
+        "Give a region that contains it if such exits matter.",
+    )  # fmt: skip
     CELLS_UNSETTLED = (
         "cells-unsettled", WARNING, "{fraction:.2%} of the cells did not settle within the budget.", _RAISE_BUDGET,
     )  # fmt: skip

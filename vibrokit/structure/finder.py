@@ -27,13 +27,14 @@ from vibrokit.results.structure import Structure
 from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
+from vibrokit.structure.barrier_tops import in_front_of_stops, tops_around
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, with_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN, centres
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.circle import turn_of
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
-from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, search_region, with_barrier_tops
+from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
 from vibrokit.structure.scales import states_at
 from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request
@@ -120,12 +121,9 @@ class Finder:
 
     def _start_regions(self) -> list[Region]:
         """Regions of starts: that of the expected motion, and one that contains the tops of barriers around it."""
-        narrow = self.searched
-        if self.region is not None or self.osc.barriers:
-            return [narrow]
-        wide = with_barrier_tops(self.osc, *narrow.x)
-        reach = self.osc.natural_frequency * max(-wide[0], wide[1])
-        return [narrow] if wide == narrow.x else [narrow, Region(wide, (-reach, reach))]
+        if self.region is not None:
+            return [self.region]
+        return [self.searched, *regions_over_tops(self.osc, self.searched)]
 
     def _order(self) -> None:
         """Sort the attractors and name them, unless that was done."""
@@ -277,6 +275,7 @@ class Finder:
                     Code.REGION_TOO_SMALL, count=outside, x_min=x_min, x_max=x_max, v_min=v_min, v_max=v_max
                 )
             )  # fmt: skip
+        found += self._tops_outside(grid.basins.region)
         found += search.findings
         found += [_survival_finding(survival) for survival in search.survival]
         found += grid.findings
@@ -285,6 +284,15 @@ class Finder:
             outside = sum(not lies_in(grid.basins.region, saddle) for saddle in saddles.saddles)
             found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
         return (*found, *self.without_manifolds, *([self.stopped] if self.stopped else []))
+
+    def _tops_outside(self, region: Region) -> list[Finding]:
+        """Report tops of potential barriers around the attractors that the region does not contain."""
+        if self.circle or not self.attractors:
+            return []
+        x = np.concatenate([attractor.orbit[:, 0] for attractor in self.attractors])
+        tops = in_front_of_stops(self.osc, tops_around(self.osc, float(x.min()), float(x.max())))
+        places = sorted(top.place for top in tops if not region.x[0] <= top.place <= region.x[1])
+        return [Finding.of(Code.TOPS_OUTSIDE, place=place) for place in places]
 
 
 def _survival_finding(survival: Survival) -> Finding:

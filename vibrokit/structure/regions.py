@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.optimize import brentq
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
@@ -17,17 +17,21 @@ from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.barrier_tops import speed_to_reach, tops_around
+from vibrokit.structure.basins.stop_cells import MARGIN, is_extended
 from vibrokit.structure.borders import between_borders
 from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.harmonic_balance import SteadyForce
 from vibrokit.structure.scales import length_of, states_at, units_of
+from vibrokit.structure.validation import DEFAULT_CELLS
 
 _MARGIN = 0.25  # of the width, on each side
 _RESTING = 1e-3
 _SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
 _PLACES = 64  # in a turn, for the mean force
 _SAME_PLACE = 1e-6  # relative: difference of two places that are the same
-_FARTHEST, _TRIED = 30.0, 600  # sizes of a motion within which tops of barriers are searched for, and places tried
+_COMPARED = 256  # points of an attractor
+_RESOLVED = 2 * MARGIN + 1  # cells: fewer do not lead to one attractor with all those around them
 
 Array = NDArray[np.float64]
 
@@ -37,6 +41,15 @@ def search_region(osc: Oscillator) -> Region:
     reach = length_of(osc)
     speed = max(reach * osc.natural_frequency, _speed_of_turning(osc))
     return _without_deep_contact(osc, between_borders(osc, Region((-reach, reach), (-speed, speed))))
+
+
+def regions_over_tops(osc: Oscillator, searched: Region) -> list[Region]:
+    """Return a region for starts that contains the tops of potential barriers around a region; none for no tops."""
+    low, high = over_tops(osc, (), *searched.x)
+    if (low, high) == searched.x:
+        return []
+    speed = max(osc.natural_frequency * max(-low, high), speed_to_reach(osc, low, high))
+    return [_without_deep_contact(osc, between_borders(osc, Region((low, high), (-speed, speed))))]
 
 
 def _speed_of_turning(osc: Oscillator) -> float:
@@ -57,7 +70,8 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     or, if all attractors are at rest, as the length scale of the scene. Beyond a stop it ends at the depth that its
     largest speed can reach. Where the force of the spring repeats along x, as that of a pendulum, it contains the copy
     of each attractor that is nearest to x = 0, and is at least one turn wide; exactly that if an attractor turns over.
-    Without stops it contains the tops of the potential barriers around the attractors.
+    It contains the tops of the potential barriers around the attractors, as far as a grid then resolves what is inside,
+    and the speeds at which the mass reaches them and the stops.
     """
     attractors, turn = without_copies(osc, attractors), turn_of(osc)
     if on_circle(osc, attractors, None):
@@ -69,47 +83,50 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     gap = float(np.ptp(places)) if len(places) == 2 else 0.0
     x, v = points.T
     low, high = min([x.min(), *places]), max([x.max(), *places])
-    if not osc.barriers:
-        low, high = with_barrier_tops(osc, low, high)
+    low, high = over_tops(osc, attractors, low, high)
+    crossing = speed_to_reach(osc, low, high)
     swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
     widest = max(swings)
     least = 0.5 * max(gap, turn) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
-    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest)
+    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest, crossing)
     half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
     region = between_borders(osc, region, points[:, 0].tolist())
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
 
 
-def with_barrier_tops(osc: Oscillator, low: float, high: float) -> tuple[float, float]:
-    """Return a range of x (m) extended to the next tops of potential barriers on both sides, if these are near.
+def over_tops(osc: Oscillator, attractors: Sequence[Attractor], low: float, high: float) -> tuple[float, float]:
+    """Return a range of x (m) extended to the next tops of potential barriers on both sides, the lower first.
 
-    There a steady force that has pushed the mass back begins to push it away. Periodic forces are left out.
+    A top is left out where a grid around it would not resolve the attractors, the stops, and the lower top.
     """
-    field, length = VectorField(osc), max(length_of(osc), 0.5 * (high - low))
-    periodic = sum(field.excitation(i, 0.0) for i, part in enumerate(osc.excitations) if part.period is not None)
-    distances = length * np.geomspace(1.0 / _TRIED, _FARTHEST, _TRIED)
+    held = bool(osc.barriers)
+    for top in tops_around(osc, low, high):
+        wider = min(low, top.place), max(high, top.place)
+        widths = (1 + 2 * _MARGIN) * np.array([wider[1] - wider[0], 2 * top.speed])
+        inside = [np.array([high - low, 2 * speed_to_reach(osc, low, high)])] if held else []
+        cells = np.abs(np.array([*inside, *_differences(osc, attractors)]).reshape(-1, 2)) / (widths / DEFAULT_CELLS)
+        if np.all(cells[: len(inside)] >= _RESOLVED) and np.all(cells[len(inside) :].max(axis=1) >= _RESOLVED):
+            low, high, held = *wider, True
+    return low, high
 
-    def extended(end: float, sign: float) -> float:
-        border = osc.model.domain.around(end)[1 if sign > 0 else 0]
-        away = distances[distances < sign * (border - end)]
 
-        def push(distances: Array) -> Array:
-            places = np.stack([end + sign * distances, np.zeros_like(distances)], axis=1)
-            outward: Array = sign * (field.rate(states_at(osc, places))[:, 1] - periodic)
-            return outward
+def _differences(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Array]:
+    """Return the differences (x, v) of the nearest points of each two attractors, and the extent of each wide one."""
+    found = [np.ptp(_met(one), axis=0) for one in attractors if is_extended(one)]
+    for one, other in itertools.combinations(attractors, 2):
+        offsets = (_met(one)[:, None] - _met(other)[None]).reshape(-1, 2)
+        found.append(offsets[np.argmin(np.linalg.norm(offsets / units_of(osc)[:2], axis=1))])
+    return found
 
-        outward = push(away) > 0
-        tops = np.flatnonzero(outward[1:] & ~outward[:-1])
-        if not tops.size:
-            return end
-        near, far = away[tops[0] : tops[0] + 2]
-        return end + sign * float(brentq(lambda distance: push(np.array([distance]))[0], near, far))
 
-    return extended(low, -1.0), extended(high, 1.0)
+def _met(one: Attractor) -> Array:
+    """Points of an attractor on the section, at most so many; of a limit cycle, those of its orbit."""
+    points = one.orbit if one.kind == "limit cycle" else one.points[:, :2]
+    return points[:: -(-len(points) // _COMPARED)]
 
 
 def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Attractor]:

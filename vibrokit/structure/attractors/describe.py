@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor:
     """Describe a stable orbit or limit cycle, or the equilibrium that an orbit of an autonomous scene rests at."""
     count = _SAMPLES * max(1, round(orbit.duration / osc.section_interval))
-    path = _path(osc, orbit.point, orbit.duration, count, stepper)
+    path = _path(osc, wrapped(osc, orbit.point), orbit.duration, count, stepper)
     still = np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max())
     resting = still and osc.autonomous and orbit.kind != "limit cycle"
     return _described(
