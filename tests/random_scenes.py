@@ -1,7 +1,7 @@
 """Scenes drawn from the whole grammar of parts: a structure by a seed, and its numbers one by one.
 
 Scenes of one seed share their compiled code, whatever the numbers are, so that a test of many scenes need not compile
-each. All numbers are of order 1 in units of a length and a time that are drawn too.
+each. All numbers are of order 1 in units of a length and a time. A negative length gives the mirror image of a scene.
 """
 
 from __future__ import annotations
@@ -41,6 +41,18 @@ SPRINGS = (
     "{a}*v/{w}*cos(x/{l})",
     "{a}*abs(v/{w})**{n}*v/{w}",
 )
+# By themselves: springs that repeat along x, springs with a pole or a border, and springs that turn back to 0.
+WHOLE_SPRINGS = (
+    "{a}*sin(x/{l})",
+    "{a}*sin(x/{l}) + {b}*cos(2*x/{l} + {c})*v/{w}",
+    "{a}*sin(x/{l})*abs(sin(x/{l}))",
+    "{b}*x/{l} - {b}*{c}/(3 - x/{l})**2",
+    "{a}*x/{l}/(1 - (x/(3*{l}))**2)",
+    "{a}*log(1 + x/(3*{l}))",
+    "{a}*x/{l}/sqrt(9 - (x/{l})**2)",
+    "{a}*sin(x/{l})/(x/{l} + 4)",
+    "{a}*x/({l}**2 + x**2)**({n}/2)*{l}**({n} - 1)",
+)
 LAWS = (
     "{a}*depth/{l}",
     "{a}*(depth/{l})**{n}",
@@ -53,6 +65,10 @@ LAWS = (
     "{a}*tanh(depth/{l})",
     "{a}*depth/{l} + {b}*rate/{w}",
     "{a}*depth/{l} + max(-{a}*depth/{l}, min({a}*depth/{l}, {b}*rate/{w}))",
+    "{a}*(depth/{l})**{n}*(8 + 5*{c}*rate/{w})/(8 - {c}*tanh(rate/{w}))",
+    "{a}*depth/{l}/(1 + {c}*abs(rate/{w}))",
+    "{a}*log(1 + depth/{l})",
+    "{a}*sqrt(depth/{l} + (depth/{l})**{n})",
 )
 NOISES = ("1 + {c}*(x/{l})**2", "{c} + abs(v/{w})", "sqrt(1 + {c}*(x/{l})**2)")
 
@@ -82,6 +98,16 @@ class {name}(vk.Excitation):
     def period(self):
         return 2 * math.pi / self.{q}
 """,
+    "transient": """
+class {name}(vk.Excitation):
+    {p}: float = vk.parameter({sp!r}, "")
+    {q}: float = vk.parameter({sq!r}, "", above=0)
+    def force(self, t):
+        return self.{p} * exp(-self.{q} * t)
+    @property
+    def period(self):
+        return math.inf
+""",
     "noise": """
 class {name}(vk.NoiseModel):
     extra_states = ({sp!r}, {sq!r})
@@ -91,7 +117,7 @@ class {name}(vk.NoiseModel):
     def force(self, one, two):
         return one - two
     def drift(self, x, v, one, two):
-        return (two - self.{p} * one, -2 * self.{p} * two)
+        return (self.{p} * (two - one), -2 * self.{p} * two)
 """,
 }
 
@@ -111,15 +137,17 @@ class Drawn:
         return (self.length, self.length / self.time) + (self.length / self.time**2,) * extra
 
 
-def draw_scene(seed: int, number: Number) -> Drawn:
-    """Draw a scene of the structure of a seed."""
-    length, time = 10 ** number(-6, 3), 10 ** number(-3, 3)
+def draw_scene(seed: int, number: Number, length: float, time: float) -> Drawn:
+    """Draw a scene of the structure of a seed, whose numbers are of order 1 in the units given."""
     return _Drawing(random.Random(seed), number, length, time).scene()
 
 
+@dataclasses.dataclass(frozen=True)
 class _Drawing:
-    def __init__(self, choose: random.Random, number: Number, length: float, time: float) -> None:
-        self.choose, self.number, self.length, self.time = choose, number, length, time
+    choose: random.Random
+    number: Number
+    length: float
+    time: float
 
     def scene(self) -> Drawn:
         parts: dict[str, Any] = {
@@ -134,7 +162,7 @@ class _Drawing:
 
     def spring(self) -> Any:
         rate = 1 / self.time**2
-        match self.choose.randrange(6):
+        match self.choose.randrange(7):
             case 0:
                 return None
             case 1:
@@ -143,8 +171,11 @@ class _Drawing:
                 return vk.CubicSpring(self.number(-1, 2) * rate, self.number(-0.3, 2) * rate / self.length**2)
             case 3:
                 return self.made("spring", (self.number(0.1, 2) * rate, self.number(0, 2) * rate / self.length**2))
+            case 4:
+                text, constants = self.formula(self.choose.choice(WHOLE_SPRINGS))
+                return vk.CustomSpring(text, **constants)
         terms = [*self.choose.sample(SPRINGS, self.choose.randint(1, 3)), SPRINGS[0]]
-        text, constants = self.formula(" + ".join(terms), signed=True)
+        text, constants = self.formula(" + ".join(terms))
         return vk.CustomSpring(text, **constants)
 
     def barriers(self) -> list[vk.Barrier]:
@@ -152,11 +183,16 @@ class _Drawing:
         law, shared = self.law(), self.choose.random() < 0.5
         stops = []
         for side in sides:
-            place = self.number(0, 1) * self.length * (-1 if side == "left" else 1)
-            stops.append(vk.Barrier(law if shared else self.law(), place, side, adhesive=self.choose.random() < 0.2))
+            gap = self.number(0, 1) if self.choose.random() < 0.8 else 0.0
+            place = gap * self.length * (-1 if side == "left" else 1)
+            towards = side if self.length > 0 else {"left": "right", "right": "left"}[side]
+            stops.append(vk.Barrier(law if shared else self.law(), place, towards, adhesive=self.choose.random() < 0.2))
         return stops
 
     def law(self) -> Any:
+        return dataclasses.replace(self, length=abs(self.length)).law_of_depth()
+
+    def law_of_depth(self) -> Any:
         stiffness = self.number(1, 300) / self.time**2
         match self.choose.randrange(6):
             case 0:
@@ -167,7 +203,7 @@ class _Drawing:
                 power = self.choose.choice(EXPONENTS)
                 scaled = stiffness * self.length ** (1 - power)
                 return self.made("law", (scaled, power, self.number(0.01, 0.5) * self.time / self.length))
-        text, constants = self.formula(self.choose.choice(LAWS), signed=False)
+        text, constants = self.formula(self.choose.choice(LAWS), (1, 100))
         return vk.CustomLaw(text, **constants)
 
     def excitations(self) -> list[Any]:
@@ -175,7 +211,7 @@ class _Drawing:
             return vk.Harmonic(self.number(-1, 1) * acceleration, ratio * frequency, self.number(-4, 4))
 
         acceleration, frequency = self.length / self.time**2, self.number(0.2, 3) / self.time
-        match self.choose.randrange(7):
+        match self.choose.randrange(9):
             case 0:
                 return []
             case 1:
@@ -186,6 +222,10 @@ class _Drawing:
                 return [harmonic(), harmonic(2**0.5)]
             case 4:
                 return [self.made("excitation", (self.number(-1, 1) * acceleration, frequency))]
+            case 5:
+                return [harmonic(), harmonic(7 / 3), self.made("excitation", (acceleration, 2 * frequency))]
+            case 6:
+                return [self.made("transient", (self.number(-1, 1) * acceleration, frequency))]
         return [harmonic(), vk.Constant(self.number(-0.3, 0.3) * acceleration)]
 
     def noise(self) -> Any:
@@ -196,11 +236,11 @@ class _Drawing:
             case 1:
                 return self.made("noise", (intensity, self.number(0.3, 3) / self.time))
             case 2:
-                text, constants = self.formula(self.choose.choice(NOISES), signed=False)
+                text, constants = self.formula(self.choose.choice(NOISES))
                 return vk.StateDependentNoise(intensity, text, **constants)
         return vk.WhiteNoise(intensity)
 
-    def formula(self, text: str, signed: bool) -> tuple[str, dict[str, float]]:
+    def formula(self, text: str, strength: tuple[float, float] = (-0.5, 1)) -> tuple[str, dict[str, float]]:
         """Put names into a formula, and draw their values; some exponents are numbers."""
         scales = {"a": self.length / self.time**2, "b": self.length / self.time**2, "l": self.length}
         scales |= {"w": self.length / self.time, "c": 1.0}
@@ -213,7 +253,7 @@ class _Drawing:
                     words[letter] = repr(value)
                     continue
             else:
-                low, high = {"a": (-0.5 if signed else 1, 1 if signed else 100), "b": (0.1, 3)}.get(letter, (0.3, 2))
+                low, high = {"a": strength, "b": (0.1, 3)}.get(letter, (0.3, 2))
                 value = self.number(low, high) * scales[letter]
             constants[words[letter]] = value
         return text.format(**words), constants
@@ -227,5 +267,5 @@ class _Drawing:
         words = dict(zip(("name", "p", "q", "r"), names, strict=True))
         words |= {"sp": symbols[0], "sq": first, "sr": other}
         space: dict[str, Any] = {"vk": vk}
-        exec(f"import math\nfrom sympy import cos\n{CLASSES[kind].format(**words)}", space)
+        exec(f"import math\nfrom sympy import cos, exp\n{CLASSES[kind].format(**words)}", space)
         return space[words["name"]](*values)

@@ -158,3 +158,20 @@ def test_noise_has_no_covariance_and_no_action_where_it_is_not_real(stepper, amp
     moved = hamiltonian_map(osc, np.array([[*q, 0.1, 0.1] for q in (inside, beyond, out)]), stepper, interval=0.3)
     assert moved.actions[0] > 0
     assert np.isnan(moved.actions[1:]).all()
+
+
+@pytest.mark.parametrize(
+    ("formula", "start", "border"),
+    [
+        ("log(1 + x)", (-1.0, 0.0), "x = -1"), ("log(1 + x)", (-2.0, 0.5), "x = -2"),
+        ("x/sqrt(9 - x**2)", (3.5, 0.0), "x = 3.5"), ("x - 0.1/(1 - x)**2", (1.0, 0.3), "x = 1,"),
+        ("x*sqrt(abs(v) - 1)", (1.0, 0.5), "v = 0.5"),
+    ],
+)  # fmt: skip
+def test_a_start_where_the_forces_have_no_value_is_refused(formula, start, border):
+    osc = scene(spring=vk.CustomSpring(formula))
+    for moved in (lambda: osc.trajectory(start, duration=1.0), lambda: osc.section_map([start])):
+        with pytest.raises(IntegrationError, match="the forces") as caught:
+            moved()
+        assert caught.value.time == 0.0
+        assert border in str(caught.value)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import vibrokit as vk
 from vibrokit.kernels.ensemble import run_ensemble
@@ -59,3 +60,28 @@ def test_structure_has_one_attractor_and_loses_no_start():
     assert rest.kind == "equilibrium"
     assert rest.basin_fraction == 1.0
     np.testing.assert_allclose(rest.points, [[-GRAVITY / 1e6, 0.0]], rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+@pytest.mark.parametrize("left", ["dash", "hertz"])
+@pytest.mark.parametrize("right", ["dash", "hertz"])
+def test_motion_that_starts_at_rest_at_a_stop_goes_on_to_another(left, right, gap):
+    """The first touch is at no speed, so that its first steps are short; those of later touches must not be."""
+    laws = {"dash": vk.CustomLaw("k*depth + c*rate", k=30.0, c=1.0), "hertz": vk.Hertz(200.0)}
+    osc = vk.Oscillator(
+        natural_frequency=0.544, damping_ratio=0.3, spring=vk.LinearSpring(0.0),
+        barriers=(vk.Barrier(laws[left], -gap, "left"), vk.Barrier(laws[right], 0.0, "right")),
+        excitations=(vk.Harmonic(-0.55, 4.36, 2.764),),
+    )  # fmt: skip
+
+    def slope(t, y):
+        x, v = y
+        name, depth, rate, side = (right, x, v, 1.0) if x > 0 else (left, -gap - x, -v, -1.0)
+        depth = max(depth, 0.0)
+        push = 200.0 * depth**1.5 if name == "hertz" else max(30.0 * depth + rate, 0.0) if depth > 0 else 0.0
+        return v, -2 * 0.3 * 0.544 * v - side * push - 0.55 * math.cos(4.36 * t + 2.764)
+
+    known = solve_ivp(slope, (0.0, 6.0), (0.0, 0.0), method="DOP853", rtol=1e-10, atol=1e-13, max_step=2e-3)
+    for tolerance in (1e-6, 1e-9, 1e-11):
+        path = osc.trajectory((0.0, 0.0), duration=6.0, stepper=vk.Order8(tolerance))
+        np.testing.assert_allclose([path.x[-1], path.v[-1]], known.y[:, -1], atol=1e-4)

@@ -1,7 +1,8 @@
 """Scenes drawn from the whole grammar of parts hold what every scene promises.
 
-Two steppers of different kinds agree within what halving their steps says of their errors; a kernel from the cache
-gives the bits of the compiled one; a time limit holds; and nothing but errors and warnings of the toolkit leaves it.
+Steppers of different kinds agree within what halving their steps says of their errors; other units and the mirror image
+of a scene change nothing; many trajectories at once end where single ones do; a kernel from the cache gives the bits of
+the compiled one; a time limit holds; and nothing but errors and warnings of the toolkit leaves it.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, note, settings
 from hypothesis import strategies as st
 
 import vibrokit as vk
 from tests.random_scenes import draw_scene
-from vibrokit.errors import IntegrationError, VibrokitError
+from vibrokit.errors import IntegrationError, NoSectionError, StepperError, VibrokitError
 from vibrokit.kernels import kernel, store
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
@@ -27,6 +28,7 @@ _STARTS = 6
 _DURATION = 6.0  # in which one oscillation or so is done, and errors grow little
 _REACH = 1e6  # in units of length; motion that goes farther is on its way to infinity
 _ROUNDING = 1e-9  # of some thousand steps
+_SAME, _SAME_LOCATED = 1e-8, 1e-6  # rounding, after what divides motions; other steps at the tolerance of a step
 
 _FEW = 10  # structures of the quick test: each is compiled
 _LIMIT, _SLACK = 1.0, 3.0  # s; kernels return to Python each tenth of a second, and what was found is put together
@@ -40,9 +42,21 @@ common = settings(
 )
 
 
-def numbers(data):
-    """Draw numbers from intervals."""
-    return lambda low, high: round(data.draw(st.floats(low, high)), 9)  # not so small that products underflow
+class Numbers:
+    """Draws numbers, and remembers them, so that the same scene can be made in other units."""
+
+    def __init__(self, data):
+        self.data, self.drawn = data, []
+
+    def __call__(self, low, high):
+        number = round(self.data.draw(st.floats(low, high)), 9)  # not so small that products underflow
+        self.drawn.append(number)
+        return number
+
+    def again(self):
+        """The same numbers, one by one."""
+        known = iter(self.drawn)
+        return lambda _low, _high: next(known)
 
 
 def ends(drawn, stepper, starts):
@@ -61,14 +75,15 @@ def ends(drawn, stepper, starts):
     return np.array(found)
 
 
-def check_agreement(drawn, starts):
-    """The finest results of both steppers differ by no more than their last refinements say.
+def check_agreement(drawn, starts, *, more):
+    """The finest results of all steppers differ by no more than their last refinements say.
 
     Steps across contacts have an order of 1 or more: a doubling changes a result by at least the error that is left,
     and the doubling before by at least twice that. The error depends on where a step meets a contact, so that the
-    larger of both counts, from any start. A start from which only some of the results diverge is left out.
+    larger of both counts, from any start. A start from which only some of the results diverge is left out. Return what
+    is allowed.
     """
-    steps = math.ceil(drawn.scene.time_unit / (_STEP * drawn.time))
+    steps = steps_of(drawn)
     coarse, fine, finest = (ends(drawn, vk.RK4(steps * times), starts) for times in (2, 4, 8))
     loose, tight = (ends(drawn, vk.Order8(tolerance), starts) for tolerance in (1e-7, 1e-9))
     results = np.array([coarse, fine, finest, loose, tight])
@@ -76,11 +91,55 @@ def check_agreement(drawn, starts):
     settled = np.isfinite(results[:3]).all(axis=(0, 2))  # at all steps
     assert np.isfinite(tight[settled]).all(), (settled, tight)
     if not finite.any():
-        return
+        return _ROUNDING
+    true, size = tight[finite], 1 + np.abs(tight[finite])
     coarse, fine, finest, loose, tight = results[:, finite] / (1 + np.abs(tight[finite]))
     fixed = max(np.abs(finest - fine).max(), np.abs(fine - coarse).max() / 2)
     allowed = 2 * (fixed + np.abs(tight - loose).max()) + _ROUNDING
     assert np.abs(finest - tight).max() <= allowed, (finest - tight, allowed)
+    for stepper in (vk.RK8(8 * steps), vk.RKN12(8 * steps), vk.FreeFlight(1e-9)) if more else ():
+        try:
+            other = ends(drawn, stepper, starts[finite])
+        except StepperError:  # not for this scene
+            continue
+        assert np.abs((other - true) / size).max() <= allowed, (stepper, other, true, allowed)
+    return allowed
+
+
+def steps_of(drawn):
+    """Steps of RK4 from section to section."""
+    return math.ceil(drawn.scene.time_unit / (_STEP * drawn.time))
+
+
+def check_same(one, other, starts, error):
+    """The same scene in other units, or its mirror image, moves in the same way.
+
+    Where rounding decides whether a step is taken, results differ by the error of the located steps, or of both kinds.
+    """
+    for stepper, allowed in ((vk.RK4(4 * steps_of(one)), _SAME), (vk.Order8(1e-9), max(_SAME_LOCATED, error))):
+        first, second = (ends(drawn, stepper, starts) for drawn in (one, other))
+        both = np.isfinite(first).all(axis=1)
+        assert (both == np.isfinite(second).all(axis=1)).all(), (stepper, first, second)
+        far = np.abs(first[both] - second[both]) / (1 + np.abs(first[both]))
+        assert far.max(initial=0.0) <= allowed, (stepper, first, second)
+
+
+def check_lanes(drawn, starts, error):
+    """Trajectories that are integrated side by side end where single ones do, after one period."""
+    units, stepper = np.array(drawn.units), vk.Order8(1e-9)
+    single, kept = [], []
+    for start in starts * units:
+        try:
+            path = drawn.scene.trajectory(start, periods=1, stepper=stepper)
+            single.append([path.x[-1], path.v[-1]] / units[:2])
+            kept.append(start)
+        except NoSectionError:
+            return
+        except IntegrationError:
+            continue
+    if kept:
+        many = (drawn.scene.section_map(kept, stepper=stepper) / units)[:, :2]
+        assert np.abs(many - single).max() <= max(_SAME_LOCATED, error) * (1 + np.abs(single).max()), (many, single)
 
 
 def check_cache(drawn, starts):
@@ -106,16 +165,24 @@ def check_limit(drawn):
     assert time.perf_counter() - began - compiled < _LIMIT + _SLACK
 
 
-def checked(seed, data, *, limit):
+def checked(seed, data, *, limit=False, more=False):
     """Check a scene, and that all warnings on the way are ours."""
-    number = numbers(data)
-    drawn = draw_scene(seed, number)
+    number = Numbers(data)
+    length, duration = (10 ** Numbers(data)(*powers) for powers in ((-9, 3), (-7, 3)))
+    drawn = draw_scene(seed, number, length, duration)
+    in_other_units = draw_scene(seed, number.again(), 1e-6 * length, 1e3 * duration)
+    mirrored = draw_scene(seed, number.again(), -length, duration)
     extra = len(drawn.units) - 2
     starts = np.array([[number(-2, 2), number(-2, 2), *(number(-1, 1) for _ in range(extra))] for _ in range(_STARTS)])
+    note(f"{drawn}\nstarts {starts.tolist()}")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        check_agreement(drawn, starts)
+        error = check_agreement(drawn, starts, more=more)
         check_cache(drawn, starts)
+        check_same(drawn, in_other_units, starts, error)
+        if more:
+            check_same(drawn, mirrored, starts, error)
+            check_lanes(drawn, starts, error)
         if limit:
             check_limit(drawn)
     strangers = [each for each in caught if not each.category.__module__.startswith("vibrokit")]
@@ -125,7 +192,7 @@ def checked(seed, data, *, limit):
 @settings(common, max_examples=30)
 @given(seed=st.integers(0, _FEW - 1), data=st.data())
 def test_few_structures_with_many_numbers(seed, data):
-    checked(seed, data, limit=False)
+    checked(seed, data)
 
 
 def check_block(seeds, examples, *, limit):
@@ -134,7 +201,7 @@ def check_block(seeds, examples, *, limit):
     @settings(common, max_examples=examples)
     @given(seed=st.sampled_from(seeds), data=st.data())
     def test(seed, data):
-        checked(seed, data, limit=limit)
+        checked(seed, data, limit=limit, more=not limit)
 
     test()
 

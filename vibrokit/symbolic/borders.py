@@ -51,6 +51,11 @@ class Border:
         """Return the border with values in place of symbols."""
         return dataclasses.replace(self, gauge=self.gauge.subs(values, simultaneous=True))
 
+    def excludes(self, values: dict[sympy.Symbol, float]) -> bool:
+        """Return whether the formula has no value at a place, so far as this border tells."""
+        gauge = self.gauge.subs(values, simultaneous=True)
+        return bool(gauge.is_zero) if self.pole else not gauge.is_positive
+
     @property
     def exists(self) -> bool:
         """Whether the gauge may change its sign, as far as SymPy can tell."""

@@ -137,15 +137,17 @@ class Model:
     def border_ahead(self, state: Sequence[float], time: float, lapse: float) -> str:
         """Return in words the border that the motion from a state (x, v, …) meets within a time (s); "" for none.
 
-        For so short a time the motion is a straight line.
+        For so short a time the motion is a straight line. A state where the forces have no value is at the border.
         """
-        values = self._numbers | dict(zip(self.state, state, strict=True)) | {self.time: time}
-        change = [lapse * float(rate) for rate in self.drift.subs(values).evalf()]
-        met = border_ahead([border.at(self._numbers) for border in self.borders], self.state, state, change)
+        place, borders = dict(zip(self.state, state, strict=True)), [one.at(self._numbers) for one in self.borders]
+        met = next(((index, list(state)) for index, one in enumerate(borders) if one.excludes(place)), None)
+        if met is None:
+            rates = self.drift.subs(self._numbers | place | {self.time: time}).evalf()
+            met = border_ahead(borders, self.state, state, [lapse * float(rate) for rate in rates])
         if met is None:
             return ""
-        border, place = self.borders[met[0]], zip(self.state, met[1], strict=True)
-        where = ", ".join(f"{q} = {at:.6g}" for q, at in place if q in border.gauge.free_symbols)
+        border, end = self.borders[met[0]], zip(self.state, met[1], strict=True)
+        where = ", ".join(f"{q} = {at:.6g}" for q, at in end if q in border.gauge.free_symbols)
         return f"{where}, {border.in_words(as_text(border.gauge))}"
 
     def _present(self, more: Sequence[Border] = ()) -> list[Border]:

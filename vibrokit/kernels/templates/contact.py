@@ -238,7 +238,8 @@ def meet(i, lane, memory, pushing, theta, settings, lanes, room):
 def plan_contact(course, sigma, length, lapse, factor, memory):
     """Choose how long the next step in contact shall last, after one that may still be shortened to end on an event.
 
-    How early the event is must not matter: no time may pass before it, and the next step would last as long.
+    How early the event is must not matter: no time may pass before it, and the next step would last as long. Nor may
+    the rounding of time: a step that is too short to be seen in it has its length all the same.
     """
     if course == ROOT_TIME:
         if sigma == 0.0:
@@ -246,7 +247,7 @@ def plan_contact(course, sigma, length, lapse, factor, memory):
         longer = factor * length * (AFTER_TOUCH if sigma == 0.0 else 1.0)
         lapse = longer * (2.0 * (sigma + length) + longer)
     else:
-        lapse *= factor
+        lapse = factor * (length if course == TIME else lapse)
     if lapse > 0.0 and not (memory[LAST] > 0.0 and lapse < memory[CONTACT_STEP]):
         memory[CONTACT_STEP] = lapse
     if memory[TIMED] == 1.0:

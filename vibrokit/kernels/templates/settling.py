@@ -46,10 +46,20 @@ def settle(y, memory, pushing, theta, slope):
                 memory[SINCE] = y[CLOCK]
         if touched:
             memory[TOUCHED] = i
-            memory[CONTACT_STEP] = memory[FIRST_STEP]
+            memory[CONTACT_STEP] = max(memory[FIRST_STEP], shortest(y[CLOCK], wall, rate, memory))
             memory[PULLED] = 1.0 if is_clamped(i, theta) and push_at(i, y, theta) < 0.0 else 0.0
             pushing[i] = memory[PULLED] == 0.0
             return
+
+
+@njit(**INNER)
+def shortest(now, wall, rate, memory):
+    """Shortest first step in a contact in which time and depth change visibly. The one before may have been shorter.
+
+    Steps that change nothing are all the same, and the motion would end there.
+    """
+    span = memory[SPAN]
+    return min(span, 4.0 * EPSILON * (abs(now) + span + (abs(wall) / rate if rate > 0.0 else 0.0)))
 
 
 @njit(**INNER)
