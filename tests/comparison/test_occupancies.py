@@ -98,15 +98,49 @@ def test_a_core_that_lies_in_other_basins_is_no_state():
 
 
 def test_what_lies_between_two_states_is_in_the_bounds_of_both():
-    """b is left at once, for a and for c alike: it counts with one of them, and the other may have it too."""
+    """b is left at once, for a and for c alike: it is divided between them, and either may have all of it."""
     rates = np.array([[0.0, 0.02, 0.0], [1.0, 0.0, 0.9], [0.0, 0.02, 0.0]])
     found = balance(rates, relaxations=1.0)
     assert found.hosts.tolist() == [0, 0, 2]
     value, lower, upper = found.shares
     shares = exact(rates)
-    np.testing.assert_allclose(value, [shares[0] + shares[1], shares[2]])
+    np.testing.assert_allclose(value, [shares[0] + shares[1] / 1.9, shares[2] + shares[1] * 0.9 / 1.9])
     np.testing.assert_allclose(lower, [shares[0], shares[2]])
     np.testing.assert_allclose(upper, [shares[0] + shares[1], shares[2] + shares[1]])
+    assert found.states == ("a", "a and c", "c")
+
+
+@pytest.mark.parametrize("quick", [1.0, 0.06])
+def test_what_lies_between_mirror_images_gives_each_a_half(quick):
+    """Also if rates differ by their errors, and if only both exits together are too quick for a state."""
+    rates = np.array([[0.0, 1e-3, 0.0], [quick, 0.0, quick * (1 + 1e-6)], [0.0, 1e-3, 0.0]])
+    found = balance(rates, relaxations=1.0)
+    np.testing.assert_allclose(found.shares[0], 0.5, rtol=1e-5)
+    assert found.states[1] == "a and c"
+
+
+def test_several_that_pass_are_divided_by_where_they_lead_at_last():
+    """From b to c in half of the cases; from there back to b or on to d, each in half."""
+    rates = np.array([[0.0, 1e-3, 0.0, 0.0], [1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1e-3, 0.0]])
+    found = balance(rates, relaxations=[1e-3, 1.0, 1e-9, 1.0])  # c lasts long, b does not
+    shares = exact(rates)
+    np.testing.assert_allclose(found.shares[0], [shares[0] + shares[1] / 2, shares[2] + shares[1] / 2, shares[3]])
+    ladder = balance(rates, relaxations=[1e-3, 1e9, 10.0, 1e-3], held=np.eye(4))
+    assert ladder.states == ("a", "a and d", "a and d", "d")
+    np.testing.assert_allclose(
+        ladder.shares[0], [shares[0] + shares[1:3] @ [2 / 3, 1 / 3], shares[3] + shares[1:3] @ [1 / 3, 2 / 3]]
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_order_of_the_attractors_does_not_matter(seed):
+    rng = np.random.default_rng(seed)
+    rates = np.exp(rng.uniform(-8, 0, (4, 4))) * (1 - np.eye(4))
+    relaxations = np.exp(rng.uniform(-3, 3, 4))
+    found, mirrored = balance(rates, 0.2, relaxations), balance(rates[::-1, ::-1], 0.2, relaxations[::-1])
+    heads = [np.unique(each.hosts) for each in (found, mirrored)]
+    np.testing.assert_array_equal(heads[0], 3 - heads[1][::-1])
+    np.testing.assert_allclose(found.shares, np.array(mirrored.shares)[:, ::-1], rtol=1e-9)
 
 
 # --- whole scenes

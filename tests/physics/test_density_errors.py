@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
@@ -77,6 +78,20 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
     (energy,) = found.energies
     assert energy.lower <= barrier <= energy.upper
     assert energy.value == pytest.approx(barrier, rel=0.01)
+
+
+@pytest.mark.parametrize("damping", [0.2, 1.0])
+def test_rates_of_states_that_do_not_last_are_those_of_simulations_all_the_same(damping):
+    """Wells as deep as ΔU/D = 1 and 2, core to core: what counts as an exit decides the rate, and is no error of it."""
+    osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))
+    structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
+    given = {"source": 0, "intensities": (damping, damping / 2)}
+    simulated = vk.MFET(target_error=0.01, splitting=False, **given).run(osc, structure)
+    found = vk.SGCM(nodes=(120, 120), **given).run(osc, structure)
+    assert found.found(Code.NOT_METASTABLE)
+    for rate, other in zip(found.rates, simulated.rates, strict=True):
+        assert abs(rate.log_value - other.log_value) <= rate.log_error + 3 * other.log_error
+        assert rate.log_error < 0.1
 
 
 TUBE = vk.Oscillator(

@@ -1,4 +1,4 @@
-"""Mean exit times against Kramers' formula, against each other, against densities and against exact first passages."""
+"""Mean exit times against exact rates, against each other, against densities and against exact first passages."""
 
 import dataclasses
 import math
@@ -8,7 +8,7 @@ import pytest
 from scipy import integrate, stats
 
 import vibrokit as vk
-from tests.physics.test_densities import kramers_rate
+from tests.klein_kramers import double_well_rate
 from tests.scenes import Coloured, scene
 from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.mfet.estimates import rate_around
@@ -44,21 +44,20 @@ def scene_and_structure(request):
     return osc, vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
 
 
-def test_direct_rates_are_those_of_kramers(scene_and_structure):
+def test_direct_rates_are_exact(scene_and_structure):
     osc, structure = scene_and_structure
     rate = rate_at(osc, structure, 6.0, splitting=False, target_error=0.02)
-    expected, formula_error = kramers_rate(osc.damping_ratio, rate.intensity)
-    # The formula has no time to settle in the other well, which is two or three relaxations here.
+    expected = double_well_rate(osc.damping_ratio, rate.intensity)
+    # The eigenvalue has no time to settle in the other well, which is two or three relaxations here.
     settling = 3.0 * osc.section_interval * math.exp(rate.log_value)
-    assert abs(rate.log_value - expected) <= 3 * rate.log_error + formula_error + settling
+    assert abs(rate.log_value - expected) <= 3 * rate.log_error + settling
 
 
-def test_rates_by_splitting_are_those_of_kramers(scene_and_structure):
+def test_rates_by_splitting_are_exact(scene_and_structure):
     osc, structure = scene_and_structure
-    rate = rate_at(osc, structure, 30.0, splitting=True, target_error=0.2)
-    expected, formula_error = kramers_rate(osc.damping_ratio, rate.intensity)
+    rate = rate_at(osc, structure, 25.0, splitting=True, target_error=0.2)
     assert rate.log_error < 0.25
-    assert abs(rate.log_value - expected) <= 3 * rate.log_error + formula_error + 0.01
+    assert abs(rate.log_value - double_well_rate(osc.damping_ratio, rate.intensity)) <= 3 * rate.log_error
 
 
 def test_direct_and_splitting_agree(scene_and_structure):

@@ -52,7 +52,7 @@ class SGCM(Analyzer):
     intensities : tuple of float, optional
         Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
     nodes : (int, int), optional
-        Nodes in x and in v; by default so many that the narrowest density around the attractor is 4 node spacings
+        Nodes in x and in v; by default so many that the narrowest density around the attractor is 5 node spacings
         wide, from 120 to 400, or 2 spacings with up to 640 nodes.
     steps : int, optional
         How often noise acts in a section interval; even. By default 2 per radian of the fastest oscillation or decay.
@@ -70,16 +70,17 @@ class SGCM(Analyzer):
 
     Notes
     -----
-    A rate follows from the density, as what is lost in a section interval, and from the committor, the probability to
-    reach an exit before the attractor's own core, which the backward equation gives. Its logarithm is the mean of both.
-    Both are extrapolated from two grids, whose spacings differ by a factor of 1.5, by as much as brings them together.
-    The error estimate is the difference of density and committor, plus all that the coarser grid changes, plus all that
-    steps 1.5 times as long and cores 1.5 times as large (or a new sample) change, plus the iteration error. So a target
-    that is not metastable, whose rate depends on its core, has a large error.
+    A rate is the probability in the attractor's own core times the committor: the probability to reach an exit before
+    that core, which the backward equation gives. What the density loses in a section interval is the same, but less
+    exact where it leaves in thin arms. The error estimate is all that a grid changes whose nodes are √2 times as far
+    apart, plus all that steps 1.5 times as long change, plus the iteration error, plus what basins of twice as large
+    cells change if they decide. A rate depends on the cores if the attractors are not metastable; that is no error,
+    since cores are defined, and there is a finding.
 
-    An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more;
-    its interval allows for a prefactor that is proportional to D or 1/D, and more if three or more intensities show
-    that. Intensities that the nodes cannot resolve are left out, with a finding.
+    An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more.
+    Its interval allows for a prefactor that is proportional to D or 1/D, for more if three or more intensities show
+    that, and for what cores 1.5 times as large change. Intensities that the nodes cannot resolve are left out, with a
+    finding.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
     1990), without its matrix of sampled transitions, which cannot contain a probability of 1e-9.
@@ -156,14 +157,14 @@ def _energies(
     """The limits of the exits whose rates are known at two intensities at least."""
     found, findings = list[ActivationEnergy](), list[Finding]()
     for target in sorted({target for one in solved for target in one.errors}):
-        known = [one for one in solved if math.isfinite(one.errors.get(target, math.inf))]
+        known = [one for one in solved if target in one.errors and np.isfinite(one.changes(target)).all()]
         if len(known) < 2:
             findings.append(Finding.of(Code.ENERGY_NEEDS_RATES, problem.source, target, known=len(known)))
             continue
         value, error = limit_of(
             [one.intensity for one in known],
             [-one.log_rates[target] for one in known],
-            [one.iteration_error(target) for one in known],
+            [one.committors[target].change for one in known],
             np.transpose([one.changes(target) for one in known]).tolist(),
         )
         error += max(-value, 0.0)  # no energy is negative: a negative limit misses by that much at least

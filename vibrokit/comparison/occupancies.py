@@ -20,6 +20,8 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.rated import RatedResult
 from vibrokit.text_table import text_table
 
+_NAMED = 0.1  # of the exits of an attractor that is divided: states that fewer lead to are not named with it
+_ROUNDING = 1e-9  # of parts of an attractor
 _FARTHEST = 1e4  # of ln of rates, in place of infinity: no rate of any unit is as small or as large
 
 Array = NDArray[np.float64]
@@ -32,15 +34,17 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
 
     The rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from 1
     to 2. An attractor is no state of its own if less than half of its core, one standard deviation of the motion that
-    noise makes around it, lies in its basin, or if it is left within ten of its relaxation times on average. It counts
-    with the state that most of its core or most of its exits lead to, and its own probability is NaN.
+    noise makes around it, lies in its basin, or if it is left within ten of its relaxation times on average. Those that
+    exchange within that time are one state. What is left so soon for other states counts with these, in parts, as its
+    exits or its core lead there, and its own probability is NaN.
 
     Returns
     -------
     xarray.DataArray
         Its coordinate ``state`` over (intensity, attractor) names the attractor that each one counts with, itself if
-        it is a state of its own. Its coordinates ``lower`` and ``upper`` are bounds that include the errors of all
-        rates, rates that were not resolved, and attractors that exchange with more than one state.
+        it is a state of its own; several, joined by "and", if it is divided between them. Its coordinates ``lower`` and
+        ``upper`` are bounds that include the errors of all rates, rates that were not resolved, and all of the
+        attractors that are divided.
 
     Raises
     ------
@@ -54,15 +58,15 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
     names = np.array(result.names)
     shape = len(result.intensities), len(names)
     values, lower, upper = (np.full(shape, np.nan) for _ in range(3))
-    hosts = np.empty(shape, dtype=np.int64)
+    states = []
     for number, balance in enumerate(balances(result)):
-        hosts[number] = balance.hosts
+        states.append(balance.states)
         heads = np.unique(balance.hosts)
         values[number, heads], lower[number, heads], upper[number, heads] = balance.shares
     both = ("intensity", "attractor")
     coordinates = {
         "intensity": result.intensities, "attractor": names,
-        "state": (both, names[hosts]), "lower": (both, lower), "upper": (both, upper),
+        "state": (both, np.array(states)), "lower": (both, lower), "upper": (both, upper),
     }  # fmt: skip
     return xarray.DataArray(values, coordinates, both, "occupancy")
 
@@ -118,24 +122,50 @@ class Balance:
 
     @cached_property
     def hosts(self) -> NDArray[np.int64]:
-        """Label of the attractor that each one counts with."""
-        count, alone = len(self.names), self.held & ~self._quick.any(axis=1)
-        leads = np.arange(count)
-        for label in np.flatnonzero(~alone).tolist():
-            exits = self.log_rates[label] if self.held[label] else self.core_shares[label]
-            leads[label] = np.argmax(np.where(self.held & (np.arange(count) != label), exits, -np.inf))
-        groups = connected_components(np.eye(count, dtype=int)[leads], directed=False)[1]
-        likely = self.log_probabilities + np.where(alone, 0.0, -_FARTHEST)
-        heads = [max(np.flatnonzero(groups == group), key=likely.__getitem__) for group in range(groups.max() + 1)]
-        return np.array(heads)[groups]
+        """Label of the attractor that each one counts with, or counts with most."""
+        found: NDArray[np.int64] = self._heads[self._parts.argmax(axis=1)]
+        return found
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """The name of the state that each attractor counts with; of all that it is divided between."""
+        named = self._parts >= np.minimum(_NAMED, self._parts.max(axis=1, keepdims=True))
+        return tuple(" and ".join(self.names[label] for label in self._heads[each]) for each in named)
+
+    @cached_property
+    def _links(self) -> Array:
+        """Where each attractor that is no state of its own leads to, by rates or by its core; 0 for all others."""
+        to_others = self.held & ~np.eye(len(self.names), dtype=bool)
+        by_core = np.where(to_others, np.nan_to_num(self.core_shares), 0.0)
+        by_core = np.where(by_core.any(axis=1, keepdims=True), by_core, to_others)  # nothing is known of it
+        return np.where(self.held[:, None], np.where(self._quick, np.exp(self.log_rates), 0.0), by_core)
+
+    @cached_property
+    def _states(self) -> Array:
+        """Which attractors are one state, array (states, count): they exchange, and are left for no other one soon."""
+        groups = connected_components(self._links > 0, connection="strong")[1]
+        members = groups == np.unique(groups)[:, None]
+        return members[~np.array([(self._links[np.ix_(each, ~each)] > 0).any() for each in members])]
+
+    @cached_property
+    def _heads(self) -> NDArray[np.int64]:
+        """The likeliest attractor of each state, in the order of their labels."""
+        return np.sort(np.where(self._states, np.nan_to_num(self.log_probabilities), -np.inf).argmax(axis=1))
+
+    @cached_property
+    def _parts(self) -> Array:
+        """How much of each attractor counts with each state, array (count, states): by where its exits lead at last."""
+        own = self._states[np.argmax(self._states[:, self._heads], axis=0)]
+        passing, parts = ~own.any(axis=0), own.T.astype(float)
+        leads = self._links[passing] / self._links[passing].sum(axis=1, keepdims=True)
+        parts[passing] = np.linalg.solve(np.eye(passing.sum()) - leads[:, passing], leads @ parts)
+        return parts
 
     @cached_property
     def shares(self) -> tuple[Array, Array, Array]:
         """Probabilities of the states, in the order of the labels of their hosts, and lower and upper bounds."""
-        own = self.hosts == np.unique(self.hosts)[:, None]
-        reached = (self._quick @ own.T).T & ~own  # by attractors that count with another state and exchange with this
-        foreign = own & reached.any(axis=0)
-        for members in own if len(own) > 1 else ():
+        parts = self._parts.T
+        for members in parts > 0 if len(parts) > 1 else ():
             if not np.isfinite(self.log_rates[np.ix_(members, ~members)]).any():
                 listed = ", ".join(self.names[label] for label in np.flatnonzero(members))
                 raise StructureError(
@@ -143,39 +173,39 @@ class Balance:
                     "so that their probability is not known; raise the noise intensity, or wait for one of the others "
                     "with exit=LeaveBasin(to=…)."
                 )
-        exact = self._log_odds(own, self.log_rates)
-        low = self._log_odds(own & ~foreign, self.log_rates)
-        high = self._log_odds(own | reached, self.log_rates)
-        down, up = np.zeros(len(own)), np.zeros(len(own))
+        exact = self._log_odds(parts, self.log_rates)
+        low = self._log_odds(np.floor(parts + _ROUNDING), self.log_rates)
+        high = self._log_odds(np.ceil(parts - _ROUNDING), self.log_rates)
+        down, up = np.zeros(len(parts)), np.zeros(len(parts))
         for place in zip(*np.nonzero(self.lower < self.upper), strict=True):
             moved = []
             for bounds in (self.lower, self.upper):
                 rates = self.log_rates.copy()
                 rates[place] = bounds[place]
-                moved.append(self._log_odds(own, rates) - exact)
+                moved.append(self._log_odds(parts, rates) - exact)
             down = np.hypot(down, np.minimum(np.min(moved, axis=0), 0.0))
             up = np.hypot(up, np.maximum(np.max(moved, axis=0), 0.0))
         return expit(exact), expit(low - down), expit(high + up)
 
     @cached_property
     def _quick(self) -> Mask:
-        """Whether row is left, by any exit, before it is metastable, and for column within its relaxation."""
+        """Whether row is left, by any exit, before it is metastable, and column has its part in that."""
         limit = -math.log(METASTABLE) - np.log(self.relaxations)[:, None]
         left = logsumexp(self.log_rates, axis=1, keepdims=True) > limit
-        likeliest = self.log_rates == self.log_rates.max(axis=1, keepdims=True)
-        quick: Mask = left & ((self.log_rates > limit) | likeliest)
+        quick: Mask = left & (self.log_rates > limit - math.log(len(self.names)))
         return quick
 
     def _balanced(self, log_rates: Array) -> Array:
         held = np.flatnonzero(self.held)
         return log_stationary(log_rates[np.ix_(held, held)], [self.names[label] for label in held])
 
-    def _log_odds(self, members: Mask, log_rates: Array) -> Array:
-        """ln of the odds of each state, given its members, shape (states, count)."""
+    def _log_odds(self, parts: Array, log_rates: Array) -> Array:
+        """ln of the odds of each state, given how much of each attractor counts with it, shape (states, count)."""
         likely = self._balanced(np.clip(log_rates, -_FARTHEST, _FARTHEST))
-        inside, outside = (
-            logsumexp(np.where(mask[:, self.held], likely, -np.inf), axis=1) for mask in (members, ~members)
-        )
+        with np.errstate(divide="ignore"):
+            inside, outside = (
+                logsumexp(likely + np.log(np.clip(each[:, self.held], 0.0, 1.0)), axis=1) for each in (parts, 1 - parts)
+            )
         odds: Array = np.clip(inside - outside, -_FARTHEST, _FARTHEST)
         return odds
 

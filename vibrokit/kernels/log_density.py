@@ -6,8 +6,11 @@ densities of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no 
 
 Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) polynomials
 would oscillate. There p, not ln p, is interpolated linearly at jumps, curvatures of ridges are limited as in
-essentially non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and the diffusion is a sum over
-nodes, which has no overshoot. Where the diffusion is wider than a node spacing it is that sum everywhere.
+essentially non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and diffusion is a quadrature of
+that interpolation. At jumps it is a sum over nodes, which has no overshoot. Such a sum is wrong on steep slopes if the
+spread is below a node spacing: on hertz-0.570 at D = 2e-5, 200² nodes, it made ln of the mean exit time from hammering
+too small by 0.5, where the quadrature leaves 0.03. Where the diffusion is wider than a node spacing it is a sum
+everywhere.
 
 Most nodes hold no probability that matters at a time: φ has a floor there, and nothing is computed.
 """
@@ -256,6 +259,34 @@ def _sum_row(
             out[j] = _summed(row, j, of[1], reach)
 
 
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _added(a: float, b: float) -> float:
+    """The logarithm of e^a + e^b."""
+    top = max(a, b)
+    return top if top == -math.inf else top + math.log1p(math.exp(min(a, b) - top))
+
+
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def _jumps(row: Array, j: int) -> bool:
+    """Whether φ changes far more than beside it, as at a layer's edge, within two nodes of one."""
+    for b in range(j - 2, j + 2):
+        if abs(row[b + 1] - row[b]) > 4.0 * min(abs(row[b] - row[b - 1]), abs(row[b + 2] - row[b + 1])) + 1.0:
+            return True
+    return False
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _averaged(row: Array, j: int, spread: float) -> float:
+    """Diffusion at one node by Gauss-Hermite quadrature of what `_between` gives, which is exact on any slope."""
+    far, farther = 1.3556261799742659 * spread, 2.8569700138728056 * spread
+    found = row[j] + math.log(8.0 / 15.0)
+    for shift, weight in ((far, 0.2220759220056126), (farther, 0.011257411327720689)):
+        for place in (j - shift, j + shift):
+            b = int(place)
+            found = _added(found, _row_value(row, b, place - b) + math.log(weight))
+    return found
+
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def _closed_row(
     row: Array, spreads: Array, first: int, last: int, out: Array, rough: Flags, summed: Flags, curvatures: Array
@@ -291,6 +322,9 @@ def _closed_row(
             if abs(curvatures[j]) > _SERIES and not summed[j]:
                 slope = (8.0 * (row[j + 1] - row[j - 1]) - (row[j + 2] - row[j - 2])) / 12.0
                 out[j] = row[j] + 0.5 * ((spread * slope) ** 2 / narrowing - math.log(narrowing))
+        elif low < j < high and spread <= WIDEST and not _jumps(row, j):
+            out[j] = _averaged(row, j, spread)
+            summed[j] = False
         some |= summed[j]
     return some
 
@@ -316,13 +350,6 @@ def _absorb_row(row: Array, share: Array, value: float, floor: float) -> float:
             left = row[j] + math.log1p(-share[j])
             row[j] = max(_added(left, value + math.log(share[j])), floor)
     return taken
-
-
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _added(a: float, b: float) -> float:
-    """The logarithm of e^a + e^b."""
-    top = max(a, b)
-    return top if top == -math.inf else top + math.log1p(math.exp(min(a, b) - top))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

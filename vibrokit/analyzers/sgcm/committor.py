@@ -1,8 +1,9 @@
 """Committors: the probability to reach one exit before the own core, by the backward equation, and the rate it gives.
 
 On its way up to the edge of the basin a density is smooth; beyond, it falls into thin arms, in which interpolation
-loses or adds some of it. A committor is 1 beyond the edge. So the rate that follows from it and the one that follows
-from the density have different errors, and their difference tells how large these are.
+loses or adds some of it. A committor is 1 beyond the edge. So a rate follows from the density only inside the core, and
+from the committor. On a tube between stiff stops (ω_n 250.7 s⁻¹, ζ 0.008, D = 4e-4, 280² nodes) what arrives in the
+other cores is too little by 0.35 in ln, and the rate by the committor by 0.02.
 """
 
 from __future__ import annotations
@@ -55,7 +56,6 @@ def committor(
     earlier: Backward,
     density: QuasiStationary,
     cores: CoreSets,
-    areas: Array,
     target: int,
     relaxation: float,
     converged: float,
@@ -73,8 +73,6 @@ def committor(
     density : QuasiStationary
     cores : CoreSets
         Those of others absorb on the section, and at the outlet motion ends at any time.
-    areas : array (nx, 1)
-        Area that belongs to each node.
     target : int
     relaxation : float
         Section intervals in which deviations of the density fall by a factor e.
@@ -89,14 +87,13 @@ def committor(
     elsewhere = sum((covered for label, covered in cores.others.items() if label != target), own)
     with np.errstate(divide="ignore"):
         reached_log, stays = np.log(reached), np.log(1 - ABSORBED * np.minimum(elsewhere + reached, 1.0))
-    in_core = density.phi + np.log(areas) + np.log(np.where(own > 0, own, 1.0))
     found = np.maximum(reached_log if start is None else start, floor)
     rates, change = list[float](), np.inf
     most = most_intervals(relaxation)
     with stage("committor", unit="section intervals"):
         while len(rates) < most and change > converged:
             later = np.minimum(earlier(found, floor, at_exit), 0.0)
-            rate = float(np.logaddexp.reduce((in_core + later)[own > 0]))
+            rate = float(np.logaddexp.reduce((density.in_core + later)[own > 0]))
             rates.append(rate if rate > floor + 0.5 * _BELOW else -math.inf)
             found = np.clip(np.logaddexp(reached_log, later + stays), floor, 0.0)
             change = remaining(rates, relaxation)

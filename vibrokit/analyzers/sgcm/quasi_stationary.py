@@ -66,6 +66,8 @@ class QuasiStationary:
         Largest ln p at each node over the last section interval.
     log_rates : mapping of int to float
         By target: ln of the probability that leaves in one section interval.
+    in_core : array (nx, nv)
+        ln of the probability at each node that is in the own core, or has been put back there; −∞ elsewhere.
     level : float
         ln p where most of it leaves.
     change : float
@@ -80,6 +82,7 @@ class QuasiStationary:
     phi: Array
     highest: Array
     log_rates: Mapping[int, float]
+    in_core: Array
     level: float
     change: float
     converged: bool
@@ -119,7 +122,9 @@ def quasi_stationary(
         areas[cores.outlet] = float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
-    highest = np.empty_like(phi)
+    highest = in_core = np.empty_like(phi)
+    with np.errstate(divide="ignore"):
+        own = np.log(cores.own * grid.areas)
     entry = cores.entry - grid.mass(cores.entry)
     with stage("density", unit="section intervals"):
         while intervals < most and change > converged:
@@ -145,14 +150,17 @@ def quasi_stationary(
                 floor = max(least, level - _RAREST) - _BELOW
             phi = np.where(empty, floor, np.maximum(phi, floor))
             left = min(math.exp(np.logaddexp.reduce(list(log_rates.values()))), 1.0) if log_rates else 0.0
+            in_core = phi + own
             if left > 0:
-                phi = np.logaddexp(phi + math.log1p(-left * ABSORBED), entry + math.log(left))
+                remains = math.log1p(-left * ABSORBED)
+                in_core = np.logaddexp(in_core + remains, entry + np.log(grid.areas) + math.log(left))
+                phi = np.logaddexp(phi + remains, entry + math.log(left))
             intervals += 1
             change = remaining(rates, relaxation, crossed)
             advance()
     resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
     error = spread_of(rates, change)
-    return QuasiStationary(phi, highest, resolved, level, error, change <= converged, drift, intervals)
+    return QuasiStationary(phi, highest, resolved, in_core, level, error, change <= converged, drift, intervals)
 
 
 def most_intervals(relaxation: float) -> int:

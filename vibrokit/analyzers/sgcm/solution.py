@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.at_intensity import COARSER, AtIntensity, Unresolved
+from vibrokit.analyzers.sgcm.at_intensity import COARSER, FEWER, LARGER, AtIntensity, Unresolved
 from vibrokit.analyzers.sgcm.committor import Committor, committor
 from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
@@ -38,13 +38,13 @@ _SLACK = 3.0  # more than that, in units of the stronger noise with which it is 
 _EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
 _NARROWEST = 2.0  # the same on the finest grid, at least
 _ENOUGH = 1.05 * _NARROWEST  # and a little to spare
-_WANTED = 4.0  # the same on the finest grid, by default
+_WANTED = 5.0  # the same on the finest grid, by default
 _FEWEST, _MOST = 120, 400  # nodes along each side, by default
 _LARGEST = 640  # the same if more than the most are needed for the least width
 _EXPLORING = 140  # nodes along each side for exploration, at most
 _ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
 _MARGIN = 3  # nodes around it
-_ALL_FLOWS = 3.2  # memory of all flows together, in units of the one with all steps on the finest grid
+_ALL_FLOWS = 3.7  # memory of all flows together, in units of the one with all steps on the finest grid
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,8 @@ class DensitySolver:
         """Yield what is found at some intensities, which must descend; first those that cannot be resolved.
 
         One cannot if the nodes are too far apart for its density, or need too much memory. Each of the others is solved
-        three times: roughly, on a coarser grid, and on the finest grid, each beginning from the one before.
+        on a coarser grid and from there on the finest one. What fewer steps and other sets change of the committors is
+        found on the coarser grid.
         """
         with ExitStack() as stack:
             executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
@@ -97,30 +98,41 @@ class DensitySolver:
             rough = dataclasses.replace(coarse, steps=self._fewer)
             before = explored
             for intensity in left:
-                rougher = self._rougher(rough, before, intensity, executor)
-                coarser = self._solved(coarse, before, intensity, executor, start=rougher.phi)
+                coarser = self._solved(coarse, before, intensity, executor)
                 before = dataclasses.replace(
-                    self._solved(flow, coarser, intensity, executor), coarser=coarser, rougher=rougher
+                    self._solved(flow, coarser, intensity, executor),
+                    coarser=coarser,
+                    fewer_steps=self._with(coarser, self._transition(rough, intensity, executor), coarser.cores),
+                    other_sets=self._with(coarser, coarser.transition, self._other_sets(coarser))
+                    if coarser.cores.others
+                    else {},
                 )
                 yield before
 
-    def _rougher(self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor) -> QuasiStationary:
-        """The density with fewer steps and larger cores, or coarser basins."""
-        cores = self._cores.on(flow.grid, intensity, _EVERY, COARSER)
-        transition, (start, _) = self._transition(flow, intensity, executor), before.begun(flow.grid, intensity)
-        return quasi_stationary(transition, start, cores, self._cores.relaxation, _CONVERGED)
+    def _with(self, known: AtIntensity, transition: Transition, cores: CoreSets) -> dict[int, Committor]:
+        """The committors of a density as it is, with another transition or other cores."""
+        density = known.found
+        if cores.own is not known.cores.own:
+            with np.errstate(divide="ignore"):
+                density = dataclasses.replace(density, in_core=density.phi + np.log(cores.own * known.grid.areas))
+        starts = {target: each.log_values for target, each in known.committors.items()}
+        return self._committors(transition, density, cores, starts, _CONVERGED)
 
-    def _solved(
-        self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor, start: Array | None = None
-    ) -> AtIntensity:
+    def _other_sets(self, known: AtIntensity) -> CoreSets:
+        """Larger cores, or coarser basins."""
+        if not self.problem.exit.at_boundary:
+            return self._cores.on(known.grid, known.intensity, larger=LARGER)
+        coarser = self._cores.on(known.grid, known.intensity, _EVERY)
+        return dataclasses.replace(coarser, own=known.cores.own)
+
+    def _solved(self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor) -> AtIntensity:
         """The density and the committors on the grid of a flow, begun from those of another one."""
         transition, cores = self._transition(flow, intensity, executor), self._cores.on(flow.grid, intensity)
         begun, committors = before.begun(flow.grid, intensity)
-        begun = begun if start is None else start
         found = quasi_stationary(transition, begun, cores, self._cores.relaxation, _CONVERGED, _ARRIVED)
         known = self._committors(transition, found, cores, committors, _CONVERGED)
-        sharp = self.problem.exit.at_boundary or self.problem.exit.by_position
-        return AtIntensity(intensity, flow.grid, found, transition, cores, known, sharp=sharp)
+        resolved = not self.problem.exit.at_boundary
+        return AtIntensity(intensity, flow.grid, found, transition, cores, known, sets_resolved=resolved)
 
     def guide(self, intensity: float, executor: Executor) -> AtIntensity:
         """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
@@ -208,7 +220,7 @@ class DensitySolver:
     @property
     def _fewer(self) -> int:
         """Two thirds of the steps, or a little less, to an even number."""
-        return max(2 * math.floor(self.steps / (2 * COARSER)), 2)
+        return max(2 * math.floor(self.steps / (2 * FEWER)), 2)
 
     def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
         stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
@@ -233,8 +245,8 @@ class DensitySolver:
         """The committor of each target whose rate is known."""
         if not found.log_rates:
             return {}
-        earlier, areas, relaxation = transition.backward(found, cores), transition.grid.areas, self._cores.relaxation
+        earlier, relaxation = transition.backward(found, cores), self._cores.relaxation
         return {
-            target: committor(earlier, found, cores, areas, target, relaxation, converged, starts.get(target))
+            target: committor(earlier, found, cores, target, relaxation, converged, starts.get(target))
             for target in found.log_rates
         }
