@@ -19,13 +19,13 @@ from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new
 from vibrokit.progress import Stats
 from vibrokit.registry import Group
-from vibrokit.results import data
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.bifurcation import Bifurcation
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
+from vibrokit.results.data import joined as joined_data
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
 from vibrokit.results.finding import Finding
 from vibrokit.results.least_action import LeastActionResult
@@ -227,7 +227,7 @@ def full_result() -> LeastActionResult:
     )  # fmt: skip
     branches = (*energies, energy(0, 1, 1.1e-4, path=spiral(5), saddle=1, certificate=CERTIFICATE))
     made = LeastActionResult(energies=energies, branches=branches, section=section(), **PROVENANCE)
-    joined = data.joined({2: potential()}, made.names)
+    joined = joined_data({2: potential()}, made.names)
     return dataclasses.replace(made, data=joined, findings=(Finding.of(Code.NO_EXIT_FOUND, 1),))
 
 
@@ -237,6 +237,40 @@ def empty_result() -> LeastActionResult:
     return dataclasses.replace(
         full_result(), energies=(), branches=(), section=bare, data=xarray.Dataset(), findings=()
     )  # fmt: skip
+
+
+def rated_result(kind, times, intensities, error=0.05, **changes):
+    """A result with rates: `times` has ln τ at each intensity by (source, target); NaN where no rate is known.
+
+    `error` is the standard error of ln τ; intervals are 1.96 of it on each side. `relaxation` is the relaxation time of
+    all attractors, `held` the share of each core in its own basin, `event` what counts; the rest goes to the result.
+    """
+    own = changes.pop("section", section())
+    relaxation, held = changes.pop("relaxation", 1.0), changes.pop("held", 1.0)
+    event, count = changes.pop("event", "commitment"), len(own.names)
+    data = {}
+    for source in sorted({source for source, _ in times}):
+        targets = [target for start, target in times if start == source]
+        logs = -np.array([times[source, target] for target in targets], dtype=float).T
+        errors = np.broadcast_to(error, logs.shape)
+        shares = np.broadcast_to(np.where(np.eye(count), held, 0.0), (len(intensities), count, count))
+        both = ("intensity_index", "exit_index")
+        data[source] = xarray.Dataset(
+            {
+                "log_rate": (both, logs),
+                "log_rate_error": (both, np.where(np.isnan(logs), np.nan, errors)),
+                "log_rate_lower": (both, logs - 1.96 * errors),
+                "log_rate_upper": (both, logs + 1.96 * errors),
+                "rate_target": ("exit_index", np.array(targets)),
+                "rate_intensity": ("intensity_index", np.array(intensities, dtype=float)),
+                "rate_method": ("intensity_index", np.array(["made"] * len(intensities))),
+                "rate_event": ((), event),
+                "relaxation_time": ("core_source", np.full(count, relaxation)),
+                "core_share": (("intensity_index", "core_source", "core_label"), shares),
+            }
+        )
+    common = {"energies": (), "scene": SCENE, "settings": {"analyzer": kind.kind}, **changes}
+    return kind(section=own, data=joined_data(data, own.names), **common)
 
 
 # Continuations

@@ -30,7 +30,9 @@ def test_help_loads_nothing_heavy():
 
 
 def test_results_and_plots_open_without_numba():
-    assert "numba" not in loaded_heavy("import vibrokit\nvibrokit.load_result, vibrokit.Transitions")
+    names = "load_result", "Transitions", "occupancies", "StationaryDensity", "reconcile", "Reconciliation"
+    heavy = loaded_heavy("\n".join(["import vibrokit", *(f"vibrokit.{name}" for name in names)]))
+    assert not {"numba", "sympy", "matplotlib"} & heavy
 
 
 @pytest.mark.parametrize("name", vibrokit.__all__)

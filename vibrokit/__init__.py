@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
     from vibrokit.comparison.occupancies import occupancies as occupancies
+    from vibrokit.comparison.reconcile import reconcile as reconcile
+    from vibrokit.comparison.reconciliation import Reconciliation as Reconciliation
     from vibrokit.comparison.stationary import StationaryDensity as StationaryDensity
     from vibrokit.comparison.transitions import Transitions as Transitions
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
@@ -90,6 +92,8 @@ _MODULES = {
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
     "occupancies": "vibrokit.comparison.occupancies",
+    "reconcile": "vibrokit.comparison.reconcile",
+    "Reconciliation": "vibrokit.comparison.reconciliation",
     "StationaryDensity": "vibrokit.comparison.stationary",
     "Transitions": "vibrokit.comparison.transitions",
     "FreeFlight": "vibrokit.kernels.free_flight",

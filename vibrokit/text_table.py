@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+_LARGEST = 690.0  # logarithm of numbers that a float holds, at most
+
 
 def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return one line for each row, with columns of equal width; the first row has the headings."""
@@ -15,3 +17,10 @@ def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
 def number_text(value: float, form: str = ".3g") -> str:
     """Return a number in a format; a dash for NaN."""
     return "–" if math.isnan(value) else format(value, form)
+
+
+def power_text(logarithm: float) -> str:
+    """Return a number of any size, given its natural logarithm."""
+    if abs(logarithm) < _LARGEST:
+        return f"{math.exp(logarithm):.4g}"
+    return f"10^{logarithm / math.log(10):.2f}"

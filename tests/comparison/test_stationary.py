@@ -7,6 +7,8 @@ import pytest
 
 import vibrokit as vk
 from tests.scenes import double_well
+from vibrokit.comparison.quantities import Kind
+from vibrokit.comparison.verdicts import Agreement
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,18 @@ def test_density_of_the_double_well_is_the_one_of_boltzmann(wells):
 def test_barrier_at_the_saddle(wells):
     barrier = float(wells.barrier("left-rest")[0])
     assert barrier == pytest.approx(4 * 0.2 * 0.25, abs=0.02)  # within D: half of the density of the saddle has left
+
+
+def test_all_shares_and_barriers_of_a_density_are_reconciled(wells):
+    """Half of the time at each side, by rates and by the density; two runs of one method agree in all."""
+    found = vk.reconcile(wells, wells)
+    assert {verdict.code for verdict in found.verdicts} == {Agreement.AGREE}
+    for kind in (Kind.OCCUPANCY, Kind.DENSITY_SHARE):
+        shares = [q.value for q in found.quantities if q.kind is kind]
+        np.testing.assert_allclose(shares, [0.5] * 4, rtol=0.01)
+    barriers = [q for q in found.table("left-rest") if q.kind is Kind.BARRIER]
+    assert len(barriers) == 2
+    assert all(q.lower < 4 * 0.2 * 0.25 < q.upper for q in barriers)
 
 
 def test_picture_shows_the_saddle(wells):

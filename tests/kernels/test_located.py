@@ -78,7 +78,7 @@ def outputs(
     kernel.advance(
         states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, cycle, 1.0, span]),
         np.zeros((count, 0), dtype=np.uint64), np.zeros((0, 2)),
-        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points,
+        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, 0.0,
         out, done, status, label, kept,
     )  # fmt: skip
     return out, done, status, kept

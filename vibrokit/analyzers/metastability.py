@@ -18,11 +18,7 @@ from vibrokit.errors import StructureError
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
-
-METASTABLE = 10.0
-"""Relaxations in a mean exit time: with fewer the state is left before it has formed."""
-HELD = 0.5
-"""Share of an attractor's core that lies in its own basin, at least: most of it."""
+from vibrokit.results.rated import HELD, METASTABLE
 
 _SAMPLES = 400  # of a core, at equal areas: its share in a basin is known to a few per cent
 _CENTRES = 64  # points of an attractor whose ellipses are sampled

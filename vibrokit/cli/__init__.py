@@ -1,4 +1,4 @@
-"""The command line: vibrokit run, report, plot, equations, list, check, trade."""
+"""The command line: vibrokit run, reconcile, report, plot, equations, list, check, trade."""
 
 from __future__ import annotations
 
@@ -101,6 +101,18 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--figure", type=Path, metavar="FILE", help="where to save the figure (default: SCENE-NAME.png)")
     run.set_defaults(command=_run)
 
+    reconcile = commands.add_parser(
+        "reconcile", help="compare saved results of one scene, exit by exit",
+        epilog="The exit status is 1 if two results disagree, or one is incomplete.",
+    )  # fmt: skip
+    reconcile.add_argument("file", type=Path, nargs="+", help="what run or save wrote, two files at least")
+    reconcile.add_argument(
+        "--level", type=float, default=0.01, help="probability of a false alarm in each verdict (default 0.01)"
+    )
+    reconcile.add_argument("--json", action="store_true", help="print one JSON object")
+    reconcile.add_argument("-o", "--output", type=Path, metavar="FILE", help="save the reconciliation (netCDF)")
+    reconcile.set_defaults(command=_reconcile)
+
     report = commands.add_parser("report", help="print what a saved result says")
     report.add_argument("file", type=Path)
     report.set_defaults(command=_report)
@@ -166,6 +178,12 @@ def _plot(options: argparse.Namespace) -> None:
     picture = options.output or options.file.with_suffix(".png")
     save_figure(load_result(options.file).plot(), picture)
     print(picture)
+
+
+def _reconcile(options: argparse.Namespace) -> int:
+    from vibrokit.cli.reconcile import reconcile_files
+
+    return reconcile_files(options)
 
 
 def _report(options: argparse.Namespace) -> None:

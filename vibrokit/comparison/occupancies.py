@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit, logsumexp
 
-from vibrokit.analyzers.metastability import HELD, METASTABLE
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.rated import RatedResult
+from vibrokit.results.rated import HELD, METASTABLE, RatedResult
 from vibrokit.text_table import text_table
 
 _NAMED = 0.1  # of the exits of an attractor that is divided: states that fewer lead to are not named with it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -89,6 +90,25 @@ class SlopeArtists(Artists):
     legend: Legend | None
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class ReconciliationArtists(Artists):
+    """Mean exit times by several methods.
+
+    Attributes
+    ----------
+    ax : Axes
+    points : tuple of ErrorbarContainer
+        One for each exit and method.
+    lines : tuple of Line2D
+        Of slope ΔU, one for each exit with an energy.
+    legend : Legend or None
+    """
+
+    points: tuple[ErrorbarContainer, ...]
+    lines: tuple[Line2D, ...]
+    legend: Legend | None
+
+
 def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTimeArtists:
     """Draw ln τ against 1/D, with error bars. The slope tends to the activation energy as D → 0.
 
@@ -102,10 +122,55 @@ def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTim
     for one in exits:
         inverse, log_times, errors = one.in_order()
         points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **_POINTS))
+    _label_times(axes)
+    return ExitTimeArtists(axes, tuple(points), _legend(axes, points))
+
+
+def reconciled_times(
+    exits: Sequence[ExitTimes],
+    methods: Sequence[str],
+    lines: Sequence[tuple[int, str, float, float]] = (),
+    *,
+    ax: Axes | None = None,
+) -> ReconciliationArtists:
+    """Draw ln τ against 1/D by several methods, each with its marker, and lines of slope ΔU.
+
+    Parameters
+    ----------
+    exits : sequence of ExitTimes
+    methods : sequence of str
+        The method of each, which chooses its marker.
+    lines : sequence of (label, title, energy, logarithm)
+        ln τ = logarithm + energy/D, drawn over all 1/D.
+    ax : matplotlib Axes, optional
+    """
+    axes = axes_or_new(ax, width=7.0, height=4.8)
+    markers = dict(zip(dict.fromkeys(methods), itertools.cycle("osD^vP*X")))
+    points, drawn, places = list[ErrorbarContainer](), list[Line2D](), list[float]()
+    for one, method in zip(exits, methods, strict=True):
+        inverse, log_times, errors = one.in_order()
+        style = {
+            **_POINTS,
+            "marker": markers[method],
+            "linestyle": "none",
+            "markerfacecolor": "none",
+            "markersize": 6.5,
+        }
+        points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **style))
+        places += inverse.tolist()
+    if places:
+        across = np.linspace(min(places), max(places), 2)
+        for label, title, energy, logarithm in lines:
+            (line,) = axes.plot(across, logarithm + energy * across, "--", color=colour(label), lw=1.1, label=title)
+            drawn.append(line)
+    _label_times(axes)
+    return ReconciliationArtists(axes, tuple(points), tuple(drawn), _legend(axes, [*points, *drawn]))
+
+
+def _label_times(axes: Axes) -> None:
     axes.set_xlabel(r"inverse noise intensity $1/D$ (m$^{-2}$ s$^{3}$)")
     axes.set_ylabel(r"mean exit time $\ln(\tau / 1\,\mathrm{s})$")
     axes.ticklabel_format(axis="x", style="sci", scilimits=(-2, 4), useMathText=True)
-    return ExitTimeArtists(axes, tuple(points), _legend(axes, points))
 
 
 def exit_slopes(

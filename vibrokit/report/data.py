@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.transitions import Transitions
+from vibrokit.comparison.verdicts import exit_name
 from vibrokit.report.text import noise_intensity
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
@@ -48,6 +50,28 @@ def run_data(structure: Structure | None, results: Mapping[str, Result]) -> dict
             ],
             "settings": {name: record.settings for name, record in records.items()},
             "stats": {name: dataclasses.asdict(record.stats) for name, record in records.items()},
+        }
+    )
+
+
+def reconciliation_data(one: Reconciliation) -> dict[str, Any]:
+    """Return quantities and verdicts, each verdict with its sentence."""
+    verdicts = [{**dataclasses.asdict(v), "about": v.about(one.names), "text": v.sentence()} for v in one.verdicts]
+    exits = [
+        {"source": source, "target": target, "exit": exit_name(one.names, source, target)}
+        for source, target in one.exits
+    ]
+    return plain(
+        {
+            "attractors": one.names,
+            "methods": one.methods,
+            "level": one.level,
+            "agreed": one.agreed,
+            "complete": one.complete,
+            "exits": exits,
+            "verdicts": verdicts,
+            "quantities": [dataclasses.asdict(q) for q in one.quantities],
+            "findings": findings_data("reconciliation", one.findings, one.names),
         }
     )
 

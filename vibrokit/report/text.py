@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from functools import singledispatch
 from typing import Any
 
+from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.progress import Stats
 from vibrokit.results.basins import ESCAPED
@@ -18,9 +19,8 @@ from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
-from vibrokit.text_table import number_text, text_table
+from vibrokit.text_table import number_text, power_text, text_table
 
-_LARGEST = 690.0  # logarithm of numbers that a float holds, at most
 _LEAST_SHARE = 0.01  # of the time: shorter stages are not listed
 
 
@@ -40,6 +40,11 @@ def _tables(record: Record) -> list[str]:
 @_tables.register
 def _plain_tables(record: PlainRecord) -> list[str]:
     return [energy_table(record, record.energies)] if record.energies else []
+
+
+@_tables.register
+def _reconciliation_tables(reconciliation: Reconciliation) -> list[str]:
+    return [str(reconciliation)]
 
 
 @_tables.register
@@ -117,16 +122,9 @@ def rate_table(result: Result) -> str:
     """Return exit rates at finite noise, a line each, with the mean times that are their inverses."""
     rows = [("exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method")]
     for rate in result.rates:
-        times = _power(-rate.log_value), _power(rate.log_value), f"{rate.log_error:.2g}"
+        times = power_text(-rate.log_value), power_text(rate.log_value), f"{rate.log_error:.2g}"
         rows.append((result.exit_of(rate), f"{rate.intensity:g}", *times, rate.event, rate.method))
     return "\n".join(text_table(rows))
-
-
-def _power(logarithm: float) -> str:
-    """A number of any size, given its natural logarithm."""
-    if abs(logarithm) < _LARGEST:
-        return f"{math.exp(logarithm):.4g}"
-    return f"10^{logarithm / math.log(10):.2f}"
 
 
 def transitions_text(transitions: Transitions, intensity: float) -> str:

@@ -23,6 +23,7 @@ class ActionGraphResult(Result):
     """
 
     kind: ClassVar[str] = "action_graph"
+    refined_by: ClassVar[str] = "raise nodes"
 
     @called
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:

@@ -34,6 +34,7 @@ class ActionPlotResult(Result):
     """
 
     kind: ClassVar[str] = "action_plot"
+    refined_by: ClassVar[str] = "raise points"
 
     @called
     def plot(self, ax: Any = None) -> ActionPlotArtists:

@@ -36,6 +36,9 @@ class ArrheniusFit:
     systematic : float
         How far the slope may be from ΔU because the prefactor depends on D (m² s⁻³): what a prefactor proportional to D
         or 1/D changes, or, if the slope drifts and that is more, the power of D that fits the rates.
+    limit, limit_error : float
+        The slope at D = 0 if the prefactor is a power of D, fitted too, and its standard error; NaN with fewer than
+        three intensities.
     """
 
     slope: float
@@ -48,6 +51,8 @@ class ArrheniusFit:
     curvature: float
     curvature_error: float
     systematic: float
+    limit: float = math.nan
+    limit_error: float = math.nan
 
     @classmethod
     def of(cls, rates: Sequence[ExitRate]) -> ArrheniusFit:
@@ -65,15 +70,18 @@ class ArrheniusFit:
         line, spread = _fitted([places**0, places], log_times, errors)
         curvature, curvature_error = math.nan, math.nan
         systematic = abs(float(_fitted([places**0, places], powers, errors)[0][1]))
+        limit, limit_error = math.nan, math.nan
         if len(known) > 2:
             parabola, around = _fitted([places**0, places, places**2], log_times, errors)
             curvature, curvature_error = 2 * float(parabola[2]), 2 * float(around[2])
+            of_power, power_errors = _fitted([places**0, places, powers], log_times, errors)
+            limit, limit_error = float(of_power[1]), float(power_errors[1])
             if abs(curvature) > _DEVIATIONS * curvature_error:
-                of_power = float(_fitted([places**0, places, powers], log_times, errors)[0][1])
-                systematic = max(systematic, abs(of_power - float(line[1])))
+                systematic = max(systematic, abs(limit - float(line[1])))
         return cls(
             float(line[1]), float(spread[1]), float(line[0]), float(spread[0]),
             intensities, log_times, errors, curvature, curvature_error, systematic,
+            limit, limit_error,
         )  # fmt: skip
 
     @property

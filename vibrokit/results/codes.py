@@ -316,6 +316,12 @@ class Code(StrEnum):
         "intensities: it is not yet the activation energy.", "Lower the noise intensities.",
     )  # fmt: skip
 
+    # Reconciliation
+    USED_INCOMPLETE = (
+        "used-incomplete", INFO, "The result of {method} is incomplete; it was used as far as it goes.",
+        "Run the analyzer to its end.",
+    )  # fmt: skip
+
     # Density
     DENSITY_NOT_CONVERGED = (
         "density-not-converged", WARNING,

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from vibrokit.construction import Constructed
 from vibrokit.results.labels import exit_between
 
+_DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
+
 
 @dataclasses.dataclass(frozen=True)
 class ExitRate(metaclass=Constructed):
@@ -25,6 +27,8 @@ class ExitRate(metaclass=Constructed):
         ln of the rate in s⁻¹, which may be too small for a floating-point number.
     log_error : float
         Error estimate of it.
+    log_lower, log_upper : float
+        Interval of ``log_value``: the method's 95 % interval if it has one, otherwise two error estimates on each side.
     event : str
         What counts: ``"commitment"``, the first state on the section in the core of another attractor, or escape for
         good; ``"basin"``, the first one in another basin; or ``"contact"``, the first time at which position and
@@ -39,6 +43,13 @@ class ExitRate(metaclass=Constructed):
     log_error: float
     event: str
     method: str
+    log_lower: float = math.nan
+    log_upper: float = math.nan
+
+    def __post_init__(self) -> None:
+        for name, side in (("log_lower", -_DEVIATIONS), ("log_upper", _DEVIATIONS)):
+            if math.isnan(getattr(self, name)):
+                object.__setattr__(self, name, self.log_value + side * self.log_error)
 
     def exit_between(self, names: Sequence[str]) -> str:
         """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""

@@ -15,3 +15,4 @@ class LeastActionResult(Result):
     """
 
     kind: ClassVar[str] = "least_action"
+    refined_by: ClassVar[str] = "raise graph.nodes"

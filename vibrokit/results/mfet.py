@@ -35,6 +35,7 @@ class MFETResult(RatedResult):
     """
 
     kind: ClassVar[str] = "mfet"
+    refined_by: ClassVar[str] = "lower target_error"
 
     def exit_times(self, source: int | str, intensity: float | None = None) -> xarray.DataArray:
         """Return the times of the exits that were simulated directly (s), with their targets as a coordinate.

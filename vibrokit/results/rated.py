@@ -21,6 +21,11 @@ from vibrokit.results.result import Result
 if TYPE_CHECKING:
     from vibrokit.plots.exit_times import ExitTimeArtists, ExitTimes, SlopeArtists
 
+METASTABLE = 10.0
+"""Relaxations in a mean exit time: with fewer the state is left before it has formed."""
+HELD = 0.5
+"""Share of an attractor's core that lies in its own basin, at least: most of it."""
+
 _DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
 
 
@@ -60,11 +65,15 @@ class RatedResult(Result):
         methods = np.reshape(arrays.words("rate_method", values.shape[:2]), values.shape[:2])
         targets = arrays.wholes("rate_target", (values.shape[0], values.shape[2]), ESCAPED, len(self.names) - 1)
         events = arrays.words("rate_event", (len(labels),))
+        bounds = [
+            arrays.numbers(name, values.shape, finite=False) if name in arrays else np.full(values.shape, np.nan)
+            for name in ("log_rate_lower", "log_rate_upper")
+        ]
         known = np.argwhere(np.isfinite(values) & np.isfinite(errors)).tolist()
         return tuple(
             ExitRate(
                 labels[s], int(targets[s, k]), float(intensities[s, i]), float(values[s, i, k]),
-                float(errors[s, i, k]), events[s], str(methods[s, i]),
+                float(errors[s, i, k]), events[s], str(methods[s, i]), *(float(ends[s, i, k]) for ends in bounds),
             )
             for s, i, k in known
         )  # fmt: skip

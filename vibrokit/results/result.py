@@ -52,6 +52,8 @@ class Result(Record):
     """
 
     kind: ClassVar[str] = "energies"
+    refined_by: ClassVar[str] = "run it again with finer settings"
+    """What makes its numbers more certain."""
 
     energies: tuple[ActivationEnergy, ...]
     section: Section

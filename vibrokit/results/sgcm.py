@@ -34,6 +34,7 @@ class SGCMResult(RatedResult):
     """
 
     kind: ClassVar[str] = "sgcm"
+    refined_by: ClassVar[str] = "raise nodes"
 
     def barrier(self, source: int | str) -> xarray.DataArray:
         """Return −D ln p at the lowest point of the saddles, above the minimum, over intensity (m² s⁻³).

@@ -70,13 +70,14 @@ def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_f
     law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
     refuse_friction(barrier.law, law, RATE, symbols, natural_frequency)
     law = law.xreplace({symbol: sympy.Integer(0) for symbol in values if symbol.is_zero})
+    jumps = _jumps(law, values)
     _refuse_steep_touch(law, values)
     analytic = _analytic(law, DEPTH)
     root = sympy.Symbol("root", positive=True)
     smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)
     return DerivedContact(
         law=law,
-        jumps=_jumps(law, values),
+        jumps=jumps,
         clamped=not barrier.adhesive and not law.is_nonnegative,
         exponent=_leading_power(law),
         rooted=smooth and not analytic,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.checkpoint import Slot
 from vibrokit.analyzers.exits import LeaveBasin
-from vibrokit.analyzers.metastability import METASTABLE, targets_at
+from vibrokit.analyzers.metastability import targets_at
 from vibrokit.analyzers.mfet.direct import DirectRun, Escapes, Exits
 from vibrokit.analyzers.mfet.estimates import (
     RateEstimate,
@@ -32,6 +32,7 @@ from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
+from vibrokit.results.rated import METASTABLE
 
 # Direct simulation costs e^Λ relaxations for each exit, splitting about 2 Λ² (Λ is ln of the mean exit time in
 # relaxations), times what its importance function and its density cost: they break even near Λ = 7.

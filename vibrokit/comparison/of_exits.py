@@ -1,0 +1,188 @@
+"""What one result says of its exits: energies, mean times, slopes, barriers."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+
+from vibrokit.comparison.quantities import Kind, Quantity
+from vibrokit.errors import StructureError
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.rated import RatedResult
+from vibrokit.results.result import Result
+from vibrokit.results.sgcm import SGCMResult
+
+
+def exit_quantities(result: Result, method: str) -> list[Quantity]:
+    """Return what one result says of its exits, each by target and, where there are several, at all."""
+    found = list(_energies(result, method))
+    if isinstance(result, RatedResult) and result.rates:
+        for one in _exits(result):
+            times = _log_times(result, *one, method)
+            found += [*times, *_slopes(times), *_fit(times)]
+    if isinstance(result, SGCMResult):
+        found += _barriers(result, method)
+    return found
+
+
+def with_prefactors(quantities: Sequence[Quantity]) -> list[Quantity]:
+    """Return the prefactors τ exp(−ΔU/D) of all mean times, with the energy of the narrowest interval of each exit."""
+    best: dict[tuple[int, int | None], Quantity] = {}
+    for one in quantities:
+        key = one.source, one.target
+        if one.kind is Kind.ENERGY and one.resolved and (key not in best or one.error < best[key].error):
+            best[key] = one
+    found = []
+    for one in quantities:
+        energy = best.get((one.source, one.target))
+        if one.kind is Kind.LOG_TIME and energy is not None:
+            value = one.value - energy.value / one.intensity
+            below = math.hypot(one.below, energy.above / one.intensity)
+            above = math.hypot(one.above, energy.below / one.intensity)
+            changes: dict[str, Any] = {"value": value, "lower": value - below, "upper": value + above}
+            found.append(dataclasses.replace(one, kind=Kind.LOG_PREFACTOR, **changes))
+    return found
+
+
+def _energies(result: Result, method: str) -> Iterator[Quantity]:
+    """The energy of each exit, and of leaving at all: the least of all exits."""
+    for source in dict.fromkeys(energy.source for energy in result.energies):
+        own = [energy for energy in result.energies if energy.source == source]
+        for target in dict.fromkeys(energy.target for energy in own):
+            yield _energy([energy for energy in own if energy.target == target], target, method)
+        if len({energy.target for energy in own}) > 1:
+            yield _energy(own, None, method)
+
+
+def _energy(energies: Sequence[ActivationEnergy], target: int | None, method: str) -> Quantity:
+    value, lower, upper = np.min([(one.value, one.lower, one.upper) for one in energies], axis=0).tolist()
+    return Quantity(Kind.ENERGY, energies[0].source, target, method, math.nan, value, lower, upper)
+
+
+def _exits(result: RatedResult) -> list[tuple[int, int | None]]:
+    """Source and target of each exit with rates; target None for all exits together, where there are several."""
+    pairs = dict.fromkeys((rate.source, rate.target) for rate in result.rates)
+    found: list[tuple[int, int | None]] = []
+    for source, same in itertools.groupby(sorted(pairs), key=lambda pair: pair[0]):
+        own = list(same)
+        found += own if len(own) == 1 else [*own, (source, None)]
+    return found
+
+
+def _log_times(result: RatedResult, source: int, target: int | None, method: str) -> list[Quantity]:
+    """ln τ of one exit at each intensity, descending."""
+    own = [rate for rate in result.rates if rate.source == source]
+    standing = _Standing(result)
+    found = []
+    for intensity in sorted({rate.intensity for rate in own}, reverse=True):
+        here = [rate for rate in own if rate.intensity == intensity]
+        chosen = [rate for rate in here if target in (None, rate.target)]
+        if chosen:
+            log_rate, lower, upper = _sum(chosen)
+            left = logsumexp([rate.log_value for rate in here])
+            found.append(
+                Quantity(
+                    Kind.LOG_TIME, source, target, method, intensity, -log_rate, -upper, -lower, chosen[0].event,
+                    standing.relaxations(source, float(left)), standing.core_share(source, target, intensity),
+                )
+            )  # fmt: skip
+    return found
+
+
+def _sum(rates: Sequence[ExitRate]) -> tuple[float, float, float]:
+    """ln of the sum of rates with independent errors, and its interval."""
+    logs = np.array([rate.log_value for rate in rates])
+    total = float(logsumexp(logs))
+    widths = np.array([[rate.log_value - rate.log_lower, rate.log_upper - rate.log_value] for rate in rates])
+    halves = widths.mean(axis=1, keepdims=True)  # for an interval that does not hold its value
+    widths = np.where(widths.min(axis=1, keepdims=True) < 0, halves, widths)
+    below, above = np.linalg.norm(np.exp(logs - total)[:, None] * widths, axis=0).tolist()
+    return total, total - below, total + above
+
+
+class _Standing:
+    """What a result says of whether its attractors are states of their own."""
+
+    def __init__(self, result: RatedResult) -> None:
+        self.known = "relaxation_time" in result.data
+        if not self.known:
+            return
+        data = result.data.transpose("source", "intensity_index", "core_source", "core_label", ...)
+        arrays = Arrays(data)
+        self.labels = data["source"].values.tolist()
+        count = len(result.names)
+        self.intensities = arrays.numbers("rate_intensity", (len(self.labels), None), finite=False)
+        self.times = arrays.numbers("relaxation_time", (len(self.labels), count), finite=False)
+        shape = (*self.intensities.shape, count, count)
+        self.shares = arrays.numbers("core_share", shape, finite=False)
+
+    def relaxations(self, source: int, log_rate: float) -> float:
+        """Mean time until the source is left, in its relaxation times."""
+        if not self.known:
+            return math.nan
+        return math.exp(min(700.0, -log_rate)) / float(self.times[self.labels.index(source), source])
+
+    def core_share(self, source: int, target: int | None, intensity: float) -> float:
+        """Smaller share of the cores of source and target in their own basins; NaN where neither is known."""
+        if not self.known:
+            return math.nan
+        row = self.labels.index(source)
+        places = np.flatnonzero(self.intensities[row] == intensity)
+        own = np.diagonal(self.shares[row, places[0]])
+        both = [own[label] for label in (source, target) if label is not None and label >= 0]
+        return float(np.nanmin(both)) if np.isfinite(both).any() else math.nan
+
+
+def _slopes(times: Sequence[Quantity]) -> list[Quantity]:
+    found = []
+    for strong, weak in itertools.pairwise(times):
+        step = 1.0 / weak.intensity - 1.0 / strong.intensity
+        slope = (weak.value - strong.value) / step
+        below = math.hypot(weak.below, strong.above) / step
+        above = math.hypot(weak.above, strong.below) / step
+        middle = 2.0 / (1.0 / weak.intensity + 1.0 / strong.intensity)
+        changes: dict[str, Any] = {"intensity": middle, "value": slope, "lower": slope - below, "upper": slope + above}
+        found.append(dataclasses.replace(weak, kind=Kind.SLOPE, **changes))
+    return found
+
+
+def fit_of(times: Sequence[Quantity]) -> ArrheniusFit | None:
+    """Return the Arrhenius law through mean times of one exit; None with fewer than two intensities."""
+    if len(times) < 2:
+        return None
+    return ArrheniusFit.of(
+        [ExitRate(one.source, -1, one.intensity, -one.value, one.error, one.event, one.method) for one in times]
+    )
+
+
+def _fit(times: Sequence[Quantity]) -> list[Quantity]:
+    fit = fit_of(times)
+    if fit is None:
+        return []
+    lower, upper = fit.interval
+    changes: dict[str, Any] = {"intensity": math.nan, "value": fit.slope, "lower": lower, "upper": upper}
+    return [dataclasses.replace(times[-1], kind=Kind.ARRHENIUS, **changes)]
+
+
+def _barriers(result: SGCMResult, method: str) -> Iterator[Quantity]:
+    """The barrier of each state at each intensity; it is that of the lowest saddle, wherever that leads."""
+    for source in dict.fromkeys(rate.source for rate in result.rates):
+        targets = {rate.target for rate in result.rates if rate.source == source}
+        try:
+            barrier = result.barrier(source)
+        except StructureError:  # no saddle: nothing to say
+            continue
+        for intensity, value in zip(barrier["intensity"].values.tolist(), barrier.values.tolist(), strict=True):
+            if math.isfinite(value):
+                target = min(targets) if len(targets) == 1 else None
+                ends = value, value - intensity, value + intensity
+                yield Quantity(Kind.BARRIER, source, target, method, intensity, *ends)

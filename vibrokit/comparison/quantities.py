@@ -1,0 +1,108 @@
+"""Quantity: one number of one exit, or of one state, by one method, with its interval."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from enum import StrEnum
+
+from vibrokit.results.rated import HELD, METASTABLE
+
+DEVIATIONS = 1.96
+"""Standard errors on each side of a value in an interval of 95 %."""
+
+
+class Kind(StrEnum):
+    """What a quantity is."""
+
+    ENERGY = "energy"
+    """ΔU for D → 0 (m² s⁻³): the least action with its bounds, or the limit of rates."""
+    BARRIER = "barrier"
+    """−D ln p at the lowest saddle above its minimum at noise D (m² s⁻³); it differs from ΔU by the order of D."""
+    SLOPE = "slope"
+    """d ln τ/d(1/D) between two neighbouring intensities (m² s⁻³), at the middle of their 1/D."""
+    ARRHENIUS = "arrhenius"
+    """The slope of a straight line through all ln τ against 1/D (m² s⁻³); its interval is one for ΔU."""
+    LOG_TIME = "log-time"
+    """ln τ at noise D, τ in s."""
+    LOG_PREFACTOR = "log-prefactor"
+    """ln of τ exp(−ΔU/D) in s at noise D, with the energy of the narrowest interval that any result has."""
+    OCCUPANCY = "occupancy"
+    """Share of time in a state in the long run at noise D, by the balance of rates."""
+    DENSITY_SHARE = "density-share"
+    """Share of the stationary density at noise D in the cells of a state's basin; the method gives no interval."""
+    WEIGHT_EXPONENT = "weight-exponent"
+    """ln of the share of time without its prefactor, −w/D, at noise D, by energies alone; 0 for the most stable."""
+
+
+OF_EXITS = (Kind.ENERGY, Kind.LOG_TIME)
+"""What makes an exit known."""
+OF_STATES = (Kind.OCCUPANCY, Kind.DENSITY_SHARE, Kind.WEIGHT_EXPONENT)
+"""What is of a state and not of an exit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """One number by one method.
+
+    Attributes
+    ----------
+    kind : Kind
+    source : int
+        Label of the attractor that is left, or whose share it is.
+    target : int or None
+        Label of what is reached, as in `ExitRate`; None for leaving at all, and for shares.
+    method : str
+        The result that it is from, by the name of its analyzer.
+    intensity : float
+        D (m² s⁻³); NaN where it does not depend on D.
+    value, lower, upper : float
+        The number and its 95 % interval, or bounds; NaN where none is known.
+    event : str
+        What counts as an exit, as in `ExitRate`; empty for what does not depend on it.
+    relaxations : float
+        Mean time until the source is left, in its relaxation times; NaN where that is not known.
+    core_share : float
+        Share of the core of the source that lies in its own basin, or of the target, the smaller; NaN where not known.
+    """
+
+    kind: Kind
+    source: int
+    target: int | None
+    method: str
+    intensity: float
+    value: float
+    lower: float
+    upper: float
+    event: str = ""
+    relaxations: float = math.nan
+    core_share: float = math.nan
+
+    @property
+    def metastable(self) -> bool:
+        """Whether source and target are states of their own at this noise, as far as that is known."""
+        return not (self.relaxations < METASTABLE or self.core_share < HELD)
+
+    @property
+    def error(self) -> float:
+        """Half of the interval in standard errors: one standard error if the interval is symmetric."""
+        return (self.upper - self.lower) / (2.0 * DEVIATIONS)
+
+    @property
+    def below(self) -> float:
+        """How far the lower end is from the value; half of the interval if that does not hold the value."""
+        return self.value - self.lower if self._held else (self.upper - self.lower) / 2.0
+
+    @property
+    def above(self) -> float:
+        """How far the upper end is from the value; half of the interval if that does not hold the value."""
+        return self.upper - self.value if self._held else (self.upper - self.lower) / 2.0
+
+    @property
+    def _held(self) -> bool:
+        return self.lower <= self.value <= self.upper
+
+    @property
+    def resolved(self) -> bool:
+        """Whether value and interval are known."""
+        return all(map(math.isfinite, (self.value, self.lower, self.upper)))

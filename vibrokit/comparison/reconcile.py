@@ -1,0 +1,210 @@
+"""reconcile: compares several results of one scene."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import time
+from collections import Counter
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from vibrokit.comparison.of_exits import exit_quantities, with_prefactors
+from vibrokit.comparison.of_states import state_quantities
+from vibrokit.comparison.pairs import Side, verdict_of, verdict_of_shares
+from vibrokit.comparison.quantities import OF_EXITS, Kind, Quantity
+from vibrokit.comparison.reconciliation import Reconciliation
+from vibrokit.comparison.verdicts import Verdict
+from vibrokit.errors import ParameterError, StructureError, shown
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
+from vibrokit.results.record import Record
+from vibrokit.results.result import Result
+
+_SAME_POINT = 0.01  # of the extent of the region: two searches find one orbit to far better than that
+_LARGEST_PERIOD = 64  # points: an orbit has fewer, a sample of chaotic motion more, which no two searches share
+
+
+def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
+    """Compare what several results say of one scene.
+
+    Each pair of results is compared exit by exit: mean times at common noise intensities, which a χ² test takes
+    together, or energies where there are none. A result that is incomplete is used as far as it goes.
+
+    Parameters
+    ----------
+    *results : Result
+        Two at least, such as those of `LeastAction`, `SGCM` and `MFET`, also saved ones.
+    level : float
+        Probability of a false alarm in each verdict, above 0 and below 1.
+
+    Returns
+    -------
+    Reconciliation
+
+    Raises
+    ------
+    ParameterError
+        The level is not between 0 and 1.
+    StructureError
+        There are fewer than two results, one is of a kind without energies or rates, they are of different scenes or
+        structures, or have no exit in common.
+    """
+    begun = time.monotonic()
+    if isinstance(level, bool) or not isinstance(level, Real) or not 0.0 < level < 1.0:
+        raise ParameterError(f"level must be a probability above 0 and below 1, got {shown(level)}.")
+    _check(results)
+    methods = _method_names(results)
+    named = list(zip(results, methods, strict=True))
+    found = _with_totals([q for result, method in named for q in exit_quantities(result, method)], methods)
+    found += with_prefactors(found)
+    found += [q for result, method in named for q in state_quantities(result, method)]
+    known = [{(q.source, q.target) for q in found if q.method == method and q.kind in OF_EXITS} for method in methods]
+    if not any(one & other for one, other in itertools.combinations(known, 2)):
+        raise StructureError(
+            "the results have no exit in common, so there is nothing to compare; analyze the same attractors with the "
+            "same exit."
+        )
+    incomplete = [
+        Finding.of(Code.USED_INCOMPLETE, method=method)
+        for result, method in zip(results, methods, strict=True)
+        if not result.complete
+    ]
+    return Reconciliation(
+        scene=results[0].scene,
+        settings={"level": float(level), "methods": list(methods)},
+        findings=tuple(incomplete),
+        complete=all(result.complete for result in results),
+        seconds=time.monotonic() - begun,
+        attractors=results[0].names,
+        methods=methods,
+        quantities=tuple(found),
+        verdicts=tuple(_verdicts(found, results, methods, level)),
+        level=float(level),
+    )
+
+
+def _check(results: Sequence[Any]) -> None:
+    """Raise StructureError unless these are two results or more on one structure."""
+    for result in results:
+        if not isinstance(result, Result):
+            raise StructureError(
+                "reconcile takes results with energies or rates, as of LeastAction, SGCM or MFET, got "
+                f"{f'a {type(result).__name__}' if isinstance(result, Record) else shown(result)}."
+            )
+    if len(results) < 2:
+        raise StructureError(f"reconcile needs two results or more to compare, got {len(results)}.")
+    first = results[0]
+    for number, other in enumerate(results[1:], start=2):
+        changed = _differences(_noiseless(first.scene), _noiseless(other.scene))
+        if changed:
+            raise StructureError(
+                f"result {number} is of another scene than the first: {changed}. Reconcile results of one scene."
+            )
+        if first.names != other.names or len(first.section.points) != len(other.section.points):
+            raise StructureError(
+                f"result {number} has the attractors {', '.join(other.names) or 'none'}, and the first "
+                f"{', '.join(first.names) or 'none'}. Run all analyzers on one structure."
+            )
+        _check_points(first, other, number)
+
+
+def _check_points(first: Result, other: Result, number: int) -> None:
+    extent = np.ptp(first.section.bounds, axis=1)
+    for name, own, its in zip(first.names, first.section.points, other.section.points, strict=True):
+        if len(own) != len(its):
+            same = len(own) > _LARGEST_PERIOD and len(its) > _LARGEST_PERIOD
+            distance = 0.0 if same else math.inf
+        else:
+            distance = max(np.min(np.abs((its[:, :2] - point[:2]) / extent).max(axis=1)) for point in own)
+            distance = distance if len(own) <= _LARGEST_PERIOD else 0.0
+        if distance > _SAME_POINT:
+            raise StructureError(
+                f"{name} of result {number} lies elsewhere on the section than that of the first. Run all analyzers on "
+                "one structure."
+            )
+
+
+def _noiseless(scene: Any) -> dict[str, Any]:
+    """A scene without its noise intensity, which results may have in common or not: each rate has its own D."""
+    noise = {key: value for key, value in (scene.get("noise") or {}).items() if key != "intensity"}
+    return {**scene, "noise": noise}
+
+
+def _differences(one: Any, other: Any, path: str = "") -> str:
+    """The first place where plain data differ, with both values; empty if they are equal."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in {**one, **other}:
+            found = _differences(one.get(key), other.get(key), f"{path}.{key}" if path else str(key))
+            if found:
+                return found
+        return ""
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
+        pairs = zip(one, other, strict=True)
+        return next(filter(None, (_differences(a, b, f"{path}.{n}") for n, (a, b) in enumerate(pairs))), "")
+    return "" if one == other else f"{path} is {shown(other)} instead of {shown(one)}"
+
+
+def _method_names(results: Sequence[Result]) -> tuple[str, ...]:
+    """Names of the results: those of their analyzers, numbered where one occurs twice."""
+    names = [str(result.settings.get("analyzer") or result.kind) for result in results]
+    many = {name for name, count in Counter(names).items() if count > 1}
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(f"{name} {seen[name]}" if name in many else name)
+    return tuple(found)
+
+
+def _with_totals(quantities: list[Quantity], methods: Sequence[str]) -> list[Quantity]:
+    """Add leaving at all for methods that know a single target where others know several."""
+    several = {q.source for q in quantities if q.target is None}
+    added = []
+    for method, source, kind in itertools.product(methods, sorted(several), Kind):
+        own = [q for q in quantities if (q.method, q.source, q.kind) == (method, source, kind)]
+        if all(q.target is not None for q in own):
+            added += [dataclasses.replace(q, target=None) for q in own]
+    return quantities + added
+
+
+def _verdicts(
+    quantities: Sequence[Quantity], results: Sequence[Result], methods: Sequence[str], level: float
+) -> list[Verdict]:
+    """Verdicts on each pair of results: on exits of attractors that both analyzed, then on shares of time."""
+    exits = dict.fromkeys((q.source, q.target) for q in quantities if q.kind in OF_EXITS)
+    analyzed = {(q.method, q.source) for q in quantities if q.kind in OF_EXITS}
+    found: list[Verdict | None] = []
+    for pair in itertools.combinations(zip(results, methods, strict=True), 2):
+        for source, target in exits:
+            if all((method, source) in analyzed for _, method in pair):
+                one, other = (_side(quantities, *each, source, target) for each in pair)
+                found.append(verdict_of((one, other), source, target, level))
+        for label in range(len(results[0].names)):
+            one, other = (_side_of_state(quantities, *each, label) for each in pair)
+            found.append(verdict_of_shares((one, other), label, level))
+    return [verdict for verdict in found if verdict is not None]
+
+
+def _side_of_state(quantities: Sequence[Quantity], result: Result, method: str, label: int) -> Side:
+    own = tuple(q for q in quantities if (q.kind, q.method, q.source) == (Kind.OCCUPANCY, method, label))
+    return Side(method, None, own, ("", ""), result.refined_by)
+
+
+def _side(quantities: Sequence[Quantity], result: Result, method: str, source: int, target: int | None) -> Side:
+    own = [q for q in quantities if (q.method, q.source, q.target) == (method, source, target)]
+    energies = [q for q in own if q.kind is Kind.ENERGY] or [q for q in own if q.kind is Kind.ARRHENIUS]
+    times = tuple(q for q in own if q.kind is Kind.LOG_TIME)
+    settings = result.settings.get("exit")
+    leaving = {k: v for k, v in settings.items() if k != "for_good"} if isinstance(settings, dict) else {}
+    event = times[0].event if times else ""
+    return Side(method, energies[0] if energies else None, times, (_text(leaving), event), result.refined_by)
+
+
+def _text(settings: dict[str, Any]) -> str:
+    rest = [f"{key} = {value}" for key, value in sorted(settings.items()) if key != "name" and value is not None]
+    return ", ".join([str(settings.get("name", "")), *rest]) if settings else ""

@@ -1,0 +1,231 @@
+"""Reconciliation: what several results say of each exit of one scene, side by side, and whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import xarray
+
+from vibrokit.comparison.quantities import OF_EXITS, OF_STATES, Kind, Quantity
+from vibrokit.comparison.verdicts import Agreement, Verdict, exit_name
+from vibrokit.errors import ResultFileError, StructureError, counted
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.fields import Number, Whole, Word
+from vibrokit.results.labels import goal_of, label_of
+from vibrokit.results.record import Record
+from vibrokit.results.summary import Summary
+from vibrokit.results.table import Table
+
+if TYPE_CHECKING:
+    from vibrokit.plots.exit_times import ReconciliationArtists
+
+_ANY = -3  # in files: the label of leaving at all
+
+
+class Reconciliation(Record):
+    """The numbers of several results for each exit, and verdicts on each pair of them.
+
+    Attributes
+    ----------
+    attractors : tuple of str
+        Names of the attractors, in the order of their labels.
+    methods : tuple of str
+        Names of the results that were compared, in their order.
+    quantities : tuple of Quantity
+    verdicts : tuple of Verdict
+        For each pair of results and each exit that one of them knows; for each pair and state with occupancies.
+    level : float
+        Probability of a false alarm in each verdict, if all errors are normal and as stated.
+    """
+
+    kind: ClassVar[str] = "reconciliation"
+
+    attractors: tuple[str, ...]
+    methods: tuple[str, ...]
+    quantities: tuple[Quantity, ...]
+    verdicts: tuple[Verdict, ...]
+    level: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, in the order of their labels."""
+        return self.attractors
+
+    @property
+    def exits(self) -> tuple[tuple[int, int | None], ...]:
+        """Source and target of each exit; the target is None for leaving at all, where there are several targets."""
+        found = {(q.source, q.target) for q in self.quantities if q.kind in OF_EXITS}
+        return tuple(sorted(found, key=lambda pair: (pair[0], pair[1] is None, pair[1] or 0)))
+
+    @property
+    def agreed(self) -> bool:
+        """Whether no verdict is "disagree"."""
+        return all(verdict.code is not Agreement.DISAGREE for verdict in self.verdicts)
+
+    def leaving(self, source: int) -> int | None:
+        """Return the target that stands for leaving a state at all, by label: None, or the only one that is known."""
+        targets = [target for start, target in self.exits if start == source]
+        return targets[0] if len(targets) == 1 else None
+
+    def table(self, source: int | str, target: int | str | None = None) -> tuple[Quantity, ...]:
+        """Return all numbers of one exit, by labels or names.
+
+        Parameters
+        ----------
+        source : int or str
+        target : int or str, optional
+            By default leaving at all.
+
+        Raises
+        ------
+        StructureError
+            There is no such attractor, or nothing is known of this exit.
+        """
+        wanted = self._exit(source, target)
+        return tuple(q for q in self.quantities if (q.source, q.target) == wanted and q.kind not in OF_STATES)
+
+    def shares(self, source: int | str) -> tuple[Quantity, ...]:
+        """Return all numbers on the share of time in one state, by label or name."""
+        label = label_of(source, self.names)
+        return tuple(q for q in self.quantities if q.source == label and q.kind in OF_STATES)
+
+    def verdicts_of(self, source: int | str, target: int | str | None = None) -> tuple[Verdict, ...]:
+        """Return the verdicts on one exit; arguments and errors as of `table`."""
+        wanted = self._exit(source, target)
+        return tuple(v for v in self.verdicts if (v.source, v.target) == wanted and v.kind is not Kind.OCCUPANCY)
+
+    def _exit(self, source: int | str, target: int | str | None) -> tuple[int, int | None]:
+        label = label_of(source, self.names)
+        own = [pair for pair in self.exits if pair[0] == label]
+        goal = None if target is None else goal_of(target, self.names)
+        goal = self.leaving(label) if goal is None else goal
+        if (label, goal) not in own:
+            known = ", ".join(exit_name(self.names, *pair) for pair in own) or "none"
+            raise StructureError(
+                f"nothing is known of {exit_name(self.names, label, goal)}; exits that are known: {known}."
+            )
+        return label, goal
+
+    @property
+    def summary(self) -> Summary:
+        """The verdicts."""
+        title = f"Reconciliation of {', '.join(self.methods)}: {counted(len(self.verdicts), 'verdict')}"
+        ranked = sorted(self.verdicts, key=lambda verdict: verdict.code is not Agreement.DISAGREE)
+        return Summary(title, tuple((v.about(self.names), f"{v.code}", v.sentence()) for v in ranked))
+
+    def __str__(self) -> str:
+        from vibrokit.comparison.tables import reconciliation_text
+
+        return reconciliation_text(self)
+
+    def plot(self, ax: Any = None) -> ReconciliationArtists:
+        """Draw ln τ against 1/D by all methods with a line of slope ΔU; see `vibrokit.plots.exit_times`.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+        """
+        from vibrokit.plots.exit_times import ExitTimes, reconciled_times
+
+        series, methods, lines = list[ExitTimes](), list[str](), []
+        for source, target in self.exits:
+            own = [q for q in self.quantities if (q.source, q.target) == (source, target)]
+            title = exit_name(self.names, source, target)
+            for method in self.methods:
+                times = [q for q in own if q.kind is Kind.LOG_TIME and q.method == method]
+                if times:
+                    numbers = [[getattr(q, name) for q in times] for name in ("intensity", "value", "error")]
+                    series.append(ExitTimes(numbers[0], numbers[1], numbers[2], source, f"{title}, {method}"))
+                    methods.append(method)
+            known = [q for q in own if q.kind is Kind.ENERGY and q.resolved]
+            prefactors = [q for q in own if q.kind is Kind.LOG_PREFACTOR and q.resolved]
+            if known and prefactors:
+                weakest = min(prefactors, key=lambda q: (q.intensity, q.error))
+                energy = min(known, key=lambda q: q.error)
+                lines.append((source, f"{title}, slope ΔU of {energy.method}", energy.value, weakest.value))
+        return reconciled_times(series, methods, lines, ax=ax)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays with dimensions, coordinates, units and long names."""
+        found = _NAMES.variables(self.attractors, label=range(len(self.attractors)), name=self.attractors)
+        for table, records in ((_QUANTITIES, self.quantities), (_VERDICTS, self.verdicts)):
+            found |= table.variables(records, target=[_ANY if r.target is None else r.target for r in records])
+        return xarray.Dataset(found)
+
+    @classmethod
+    def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
+        """Make a reconciliation of its arrays; raises ResultFileError."""
+        arrays, settings = Arrays(dataset), provenance["settings"]
+        methods, level = settings.get("methods"), settings.get("level")
+        if (
+            not isinstance(level, float)
+            or not isinstance(methods, list)
+            or not all(isinstance(m, str) for m in methods)
+        ):
+            raise ResultFileError("its settings have no level, or no methods by name")
+        names = tuple(values["name"] for values in _NAMES.read(arrays))
+        quantities = tuple(Quantity(**_typed(v, names, kind=Kind)) for v in _QUANTITIES.read(arrays))
+        verdicts = tuple(Verdict(**_typed(v, names, kind=Kind, code=Agreement)) for v in _VERDICTS.read(arrays))
+        return cls(
+            attractors=names,
+            methods=tuple(methods),
+            level=level,
+            quantities=quantities,
+            verdicts=verdicts,
+            **provenance,
+        )
+
+
+def _typed(values: dict[str, Any], names: Sequence[str], **types: Any) -> dict[str, Any]:
+    """Values of a table with their words as codes and the label of leaving at all as None."""
+    if max(values["source"], values["target"]) >= len(names):
+        raise ResultFileError(f"a number is of attractor {values['source']}, and there are {len(names)}")
+    words = {name: kind(values[name]) for name, kind in types.items()}
+    return {**values, **words, "target": None if values["target"] == _ANY else values["target"]}
+
+
+_NAMES = Table("attractor", {"label": Whole("label"), "name": Word("name of the attractor")}, index="label")
+_SHARED = {
+    "kind": Word("what the number is", known=tuple(Kind)),
+    "source": Whole("label of the attractor that is left, or whose share it is"),
+    "target": Whole("label of what is reached; -1 for another exit, -2 for escape, -3 for leaving at all", low=_ANY),
+}
+_QUANTITIES = Table(
+    "quantity",
+    {
+        **_SHARED,
+        "method": Word("method"),
+        "intensity": Number("noise intensity; NaN where it does not matter", "m2 s-3"),
+        "value": Number("value, in the unit that its kind has", ""),
+        "lower": Number("lower end of its interval", ""),
+        "upper": Number("upper end of its interval", ""),
+        "event": Word("what counts as an exit"),
+        "relaxations": Number("mean time until the source is left in its relaxation times"),
+        "core_share": Number("smaller share of the cores of source and target in their own basins"),
+    },
+)
+_VERDICTS = Table(
+    "verdict",
+    {
+        **_SHARED,
+        "code": Word("verdict", known=tuple(Agreement)),
+        "one": Word("one method"),
+        "other": Word("other method"),
+        "statistic": Number("sum of squared differences over combined errors"),
+        "terms": Whole("number of its terms"),
+        "p_value": Number("probability of a larger sum"),
+        "deviation": Number("largest difference in combined errors"),
+        "intensity": Number("noise intensity of the largest difference", "m2 s-3"),
+        "error": Number("least combined standard error", ""),
+        "less_certain": Word("method with the larger error"),
+        "remedy": Word("what refines it"),
+        "first": Number("first slope", "m2 s-3"),
+        "last": Number("last slope", "m2 s-3"),
+        "energy": Number("energy that the slopes tend to", "m2 s-3"),
+        "relaxations": Number("mean time until the source is left in its relaxation times"),
+        "core_share": Number("smaller share of the cores of source and target in their own basins"),
+        "event_one": Word("what counts as an exit for one method"),
+        "event_other": Word("what counts as an exit for the other method"),
+    },
+)

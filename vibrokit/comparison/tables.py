@@ -1,0 +1,97 @@
+"""A reconciliation as text: each exit's numbers by method, and the verdicts as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from vibrokit.comparison.quantities import OF_STATES, Kind, Quantity
+from vibrokit.comparison.verdicts import Agreement, exit_name
+from vibrokit.text_table import number_text, power_text, text_table
+
+if TYPE_CHECKING:
+    from vibrokit.comparison.reconciliation import Reconciliation
+
+_LABELS = {
+    Kind.ENERGY: "ΔU (m² s⁻³)",
+    Kind.ARRHENIUS: "ΔU by Arrhenius fit",
+    Kind.BARRIER: "barrier at the saddle",
+    Kind.LOG_TIME: "ln τ (τ in s)",
+    Kind.SLOPE: "slope d ln τ/d(1/D)",
+    Kind.LOG_PREFACTOR: "ln of prefactor (s)",
+    Kind.OCCUPANCY: "share of time, by rates",
+    Kind.DENSITY_SHARE: "share, by the density",
+    Kind.WEIGHT_EXPONENT: "ln of share, exponent only",
+}
+
+
+def reconciliation_text(one: Reconciliation) -> str:
+    """Return how long each state lasts and whether the methods agree, the verdicts, and a table of each exit."""
+    sections = [overview_text(one), verdicts_text(one)]
+    of_exits = [kind for kind in _LABELS if kind not in OF_STATES]
+    for source, target in one.exits:
+        own = (q for q in one.quantities if (q.source, q.target) == (source, target) and q.kind in of_exits)
+        sections.append("\n".join([exit_name(one.names, source, target), *_rows(own, one.methods)]))
+    for label, name in enumerate(one.names):
+        shares = one.shares(label)
+        if shares:
+            sections.append("\n".join([f"share of time in {name}", *_rows(shares, one.methods)]))
+    return "\n\n".join(section for section in sections if section)
+
+
+def overview_text(one: Reconciliation) -> str:
+    """Return whether the methods agree, and the mean time until each state is left, the longest first."""
+    wrong = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is Agreement.DISAGREE)
+    open_ = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is not Agreement.AGREE)
+    if wrong:
+        lines = [f"Methods disagree on {', '.join(wrong)}."]
+    elif open_:
+        lines = [f"No methods disagree. What is not settled: {', '.join(open_)}."]
+    else:
+        lines = ["All methods agree."]
+    return "\n".join([*lines, *_lasting(one)])
+
+
+def _lasting(one: Reconciliation) -> list[str]:
+    """The mean time until each state is left, at the least intensity at which all of them are known."""
+    times = [q for q in one.quantities if q.kind is Kind.LOG_TIME and q.resolved and q.metastable]
+    leaving = [q for q in times if q.target == one.leaving(q.source)]
+    known = [{q.intensity for q in leaving if q.source == source} for source in {q.source for q in leaving}]
+    if not known or not set.intersection(*known):
+        return []
+    intensity = min(set.intersection(*known))
+    best: dict[int, Quantity] = {}
+    for q in leaving:
+        if q.intensity == intensity and (q.source not in best or q.error < best[q.source].error):
+            best[q.source] = q
+    lines = [f"Mean time until a state is left at D = {intensity:g}, the longest first:"]
+    for q in sorted(best.values(), key=lambda q: -q.value):
+        value, lower, upper = map(power_text, (q.value, q.lower, q.upper))
+        lines.append(f"  {one.names[q.source]}: {value} s ({lower} to {upper} s), by {q.method}")
+    return lines
+
+
+def verdicts_text(one: Reconciliation) -> str:
+    """Return the verdicts, the serious ones first."""
+    order = list(Agreement)
+    ranked = sorted(one.verdicts, key=lambda verdict: -order.index(verdict.code))
+    lines = [f"{verdict.about(one.names)} [{verdict.code}]: {verdict.sentence()}" for verdict in ranked]
+    return "\n".join(lines)
+
+
+def _rows(quantities: Iterable[Quantity], methods: tuple[str, ...]) -> list[str]:
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    for q in sorted(quantities, key=lambda q: (list(_LABELS).index(q.kind), -q.intensity if q.resolved else 0.0)):
+        at = number_text(q.intensity, ".4g")
+        cells.setdefault((_LABELS[q.kind], at), {})[q.method] = _cell(q)
+    table = [("", "D", *methods)]
+    table += [(*key, *(row.get(method, "") for method in methods)) for key, row in cells.items()]
+    return text_table(table)
+
+
+def _cell(q: Quantity) -> str:
+    if not q.resolved:
+        return number_text(q.value, ".5g")
+    if q.upper - q.lower <= 1e-4 * abs(q.value):
+        return f"{q.value:.5g}"
+    return f"{q.value:.4g} ({q.lower:.4g} to {q.upper:.4g})"

@@ -1,0 +1,151 @@
+"""Verdicts: what two methods say of one exit, or of one state's share of time, as a code with numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from enum import StrEnum
+
+from vibrokit.comparison.quantities import Kind
+from vibrokit.results.labels import exit_between
+from vibrokit.results.rated import HELD, METASTABLE
+
+
+class Agreement(StrEnum):
+    """What a verdict says; each code has a template of its sentence."""
+
+    AGREE = "agree"
+    """The differences are as large as the stated errors let expect."""
+    ARRHENIUS_NOT_REACHED = "arrhenius-not-reached"
+    """The limit of rates misses the energy, and the slopes drift towards it as D falls, far enough to explain that."""
+    NOT_METASTABLE = "not-metastable"
+    """At no common noise intensity are both source and target states of their own."""
+    EVENTS_DIFFER = "events-differ"
+    """The methods count different events, so that their numbers are not those of one quantity."""
+    UNDER_RESOLVED = "under-resolved"
+    """A method does not know the number, or the errors are as large as the number itself."""
+    DISAGREE = "disagree"
+    """The differences are larger than the stated errors let expect."""
+
+
+_SENTENCES = {
+    Agreement.AGREE: "{one} and {other} agree in {what}: {tested}. The least combined error is {error:.2g}{unit}.",
+    Agreement.ARRHENIUS_NOT_REACHED: "The slopes of {other} still drift, from {first:.4g} to {last:.4g} m² s⁻³ as D "
+    "falls, towards the ΔU = {energy:.5g} of {one}. Its limit for D → 0 misses that by {deviation:.1f} errors and is "
+    "not ΔU yet: {remedy}. Its mean times are not affected.",
+    Agreement.NOT_METASTABLE: "Source or target is no state of its own at these noise intensities: {reason}. No rate "
+    "describes such an exit: lower the noise intensity.",
+    Agreement.EVENTS_DIFFER: "{one} and {other} count different events ({event_one}; {event_other}), so that their "
+    "numbers differ by definition: give both the same exit.",
+    Agreement.UNDER_RESOLVED: "{reason}, so that {one} and {other} cannot be compared in {what}: {remedy} of "
+    "{less_certain}.",
+    Agreement.DISAGREE: "{one} and {other} disagree in {what}: {tested}. {less_certain} has the larger error: "
+    "{remedy} there first.",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What the numbers of two methods say of one exit, or of the share of one state.
+
+    Attributes
+    ----------
+    code : Agreement
+    kind : Kind
+        What was compared: mean times at common intensities, energies, or occupancies.
+    source : int
+    target : int or None
+        As in `Quantity`.
+    one, other : str
+        The methods.
+    statistic : float
+        Sum of the squares of (difference over combined error); NaN where nothing was compared.
+    terms : int
+        How many there are: common intensities, or 1.
+    p_value : float
+        Probability of a larger sum if all errors are normal and independent.
+    deviation, intensity : float
+        The largest single difference, one less other, in combined errors, and its D (m² s⁻³; NaN for an energy).
+    error : float
+        Least combined standard error: of ΔU (m² s⁻³), of ln τ, or of ln of the odds of a share.
+    less_certain, remedy : str
+        The method with the larger error, or without a number, and what to change of it first.
+    first, last, energy : float
+        Where slopes drift: the first and the last one, D descending, and the energy they tend to (m² s⁻³).
+    relaxations, core_share : float
+        Where a state is not metastable: the largest ones, as in `Quantity`.
+    event_one, event_other : str
+        Where they differ: what counts as an exit.
+    """
+
+    code: Agreement
+    kind: Kind
+    source: int
+    target: int | None
+    one: str
+    other: str
+    statistic: float = math.nan
+    terms: int = 0
+    p_value: float = math.nan
+    deviation: float = math.nan
+    intensity: float = math.nan
+    error: float = math.nan
+    less_certain: str = ""
+    remedy: str = ""
+    first: float = math.nan
+    last: float = math.nan
+    energy: float = math.nan
+    relaxations: float = math.nan
+    core_share: float = math.nan
+    event_one: str = ""
+    event_other: str = ""
+
+    def about(self, names: Sequence[str]) -> str:
+        """Return what the verdict is about: an exit, or the share of a state."""
+        if self.kind is Kind.OCCUPANCY:
+            return f"share of {names[self.source]}"
+        return exit_name(names, self.source, self.target)
+
+    def sentence(self) -> str:
+        """Return the verdict as a sentence."""
+        words = {
+            **dataclasses.asdict(self),
+            "what": _NOUNS[self.kind],
+            "tested": self._tested,
+            "unit": _UNITS[self.kind],
+            "reason": self._reason,
+        }
+        return _SENTENCES[self.code].format(**{**words, "deviation": abs(self.deviation)})
+
+    @property
+    def _tested(self) -> str:
+        if self.terms == 1:
+            at = "" if math.isnan(self.intensity) else f" at D = {self.intensity:g}"
+            return f"they differ by {abs(self.deviation):.1f} combined errors{at} (p = {self.p_value:.2g})"
+        return (
+            f"at {self.terms} noise intensities they differ by at most {abs(self.deviation):.1f} combined errors, at "
+            f"D = {self.intensity:g} (χ² = {self.statistic:.3g}, p = {self.p_value:.2g})"
+        )
+
+    @property
+    def _reason(self) -> str:
+        if self.code is Agreement.UNDER_RESOLVED and self.terms:
+            return "The errors are as large as the number"
+        if self.code is Agreement.UNDER_RESOLVED:
+            return f"{self.less_certain} has no number with bounds"
+        parts = []
+        if self.relaxations < METASTABLE:
+            parts.append(f"it is left after {self.relaxations:.2g} relaxation times, below {METASTABLE:g}")
+        if self.core_share < HELD:
+            parts.append(f"{self.core_share:.0%} of a core lies in its own basin, below {HELD:.0%}")
+        return " and ".join(parts) or "too few intensities are left"
+
+
+_UNITS = {Kind.ENERGY: " m² s⁻³", Kind.LOG_TIME: " in ln τ", Kind.OCCUPANCY: " in ln of the odds"}
+_NOUNS = {Kind.ENERGY: "ΔU", Kind.LOG_TIME: "mean times", Kind.OCCUPANCY: "the share of time"}
+
+
+def exit_name(names: Sequence[str], source: int, target: int | None) -> str:
+    """Return the name of an exit; of leaving at all if the target is None."""
+    return f"{names[source]} → any" if target is None else exit_between(names, source, target)
