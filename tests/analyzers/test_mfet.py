@@ -21,7 +21,7 @@ from vibrokit.analyzers.mfet.direct import Exits
 from vibrokit.analyzers.mfet.estimates import exponential_p_value, mean_tests, rate_of
 from vibrokit.analyzers.mfet.excursions import NOT_OUT
 from vibrokit.analyzers.mfet.splitting import Estimates
-from vibrokit.errors import CheckpointError, SceneError, StructureError
+from vibrokit.errors import CheckpointError, FileError, SceneError, StructureError
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.codes import Code
 from vibrokit.results.exit_rate import ExitRate
@@ -303,7 +303,7 @@ def test_checkpoints_that_are_refused(structure, tmp_path):
             vk.MFET(intensities=(0.05,), **QUICK).run(WELL, structure, checkpoint=place)
     with pytest.raises(StructureError, match="checkpoint"):
         vk.ActionGraph().run(WELL, structure, checkpoint=tmp_path / "other.ckpt")
-    with pytest.raises(StructureError, match="folder"):
+    with pytest.raises(FileError, match="folder"):
         vk.MFET(**QUICK).run(WELL, structure, checkpoint=tmp_path / "none" / "work.ckpt")
 
 

@@ -372,7 +372,7 @@ def test_results_without_transitions_are_refused(results):
     ("change", "words"),
     [
         ({"names": ("a", "a")}, "must differ"),
-        ({"lower": np.zeros((2, 3))}, "need lower of shape"),
+        ({"lower": np.zeros((2, 3))}, "need lower, an array of numbers of shape"),
         ({"energies": np.array([[0, np.nan], [1, 0]])}, "no NaN"),
         ({"lower": np.array([[0, 2.0], [1, 0]])}, "lower ≤ energies"),
         ({"upper": np.zeros((2, 2))}, "energies ≤ upper"),

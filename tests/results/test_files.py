@@ -272,7 +272,7 @@ def test_what_is_no_finding_is_refused(findings):
 @pytest.mark.parametrize("content", [b"", b"not a result", b"CDF\x01" + bytes(200), b"\x80\x04\x95pickle"])
 def test_strange_files_are_refused_in_a_sentence(content, tmp_path):
     (tmp_path / "bad.nc").write_bytes(content)
-    with pytest.raises(ResultFileError, match="not a result"):
+    with pytest.raises(ResultFileError, match="no result"):
         vk.load_result(tmp_path / "bad.nc")
 
 

@@ -139,10 +139,10 @@ class Model:
 
         For so short a time the motion is a straight line. A state where the forces have no value is at the border.
         """
-        place, borders = dict(zip(self.state, state, strict=True)), [one.at(self._numbers) for one in self.borders]
+        place, borders = dict(zip(self.state, state, strict=True)), [one.at(self.numbers) for one in self.borders]
         met = next(((index, list(state)) for index, one in enumerate(borders) if one.excludes(place)), None)
         if met is None:
-            rates = self.drift.subs(self._numbers | place | {self.time: time}).evalf()
+            rates = self.drift.subs(self.numbers | place | {self.time: time}).evalf()
             met = border_ahead(borders, self.state, state, [lapse * float(rate) for rate in rates])
         if met is None:
             return ""
@@ -152,7 +152,7 @@ class Model:
 
     def _present(self, more: Sequence[Border] = ()) -> list[Border]:
         """The borders that are somewhere, at the parameters of the scene."""
-        return [border for border in (*self.borders, *more) if border.at(self._numbers).exists]
+        return [border for border in (*self.borders, *more) if border.at(self.numbers).exists]
 
     @property
     def conditions(self) -> str:
@@ -162,7 +162,7 @@ class Model:
     @cached_property
     def domain(self) -> Domain:
         """The intervals of x in which a mass at rest has a force, at the parameters of the scene."""
-        at_rest = dict.fromkeys(self.state[1:], sympy.Integer(0)) | self._numbers
+        at_rest = dict.fromkeys(self.state[1:], sympy.Integer(0)) | self.numbers
         return Domain([border.at(at_rest) for border in self.borders], self.state[0])
 
     @cached_property
@@ -247,7 +247,7 @@ class Model:
         """
         if not self._from_potential:
             return None
-        noise = self.diffusion[1, 1].subs(self._numbers)
+        noise = self.diffusion[1, 1].subs(self.numbers)
         return None if noise == 0 or noise.free_symbols & {*self.state} else 2 * self._friction / noise
 
     @cached_property
@@ -263,7 +263,7 @@ class Model:
         return not self._friction.free_symbols & {*self.state}
 
     @cached_property
-    def _numbers(self) -> dict[sympy.Symbol, float]:
+    def numbers(self) -> dict[sympy.Symbol, float]:
         """The values of the parameters of the scene."""
         values = self.scene.parameters
         return {symbol: values[path] for path, symbol in self.symbols.items()}
@@ -271,12 +271,12 @@ class Model:
     @cached_property
     def _friction(self) -> sympy.Expr:
         """γ = −∂v′/∂v without stops, at the parameters of the scene."""
-        return -sympy.diff(self.smooth_force.subs(self._numbers), self.state[1])
+        return -sympy.diff(self.smooth_force.subs(self.numbers), self.state[1])
 
     @cached_property
     def _conservative_stops(self) -> bool:
         """Whether no force of a stop depends on the rate, at the parameters of the scene."""
-        return not any(sympy.expand(contact.law.subs(self._numbers)).has(RATE) for contact in self.contacts)
+        return not any(sympy.expand(contact.law.subs(self.numbers)).has(RATE) for contact in self.contacts)
 
     @property
     def latex(self) -> str:

@@ -1,0 +1,61 @@
+import dataclasses
+import math
+
+import pytest
+
+import vibrokit as vk
+from vibrokit.comparison.sensitivities import sensitivities, sensitivities_text
+from vibrokit.errors import StructureError
+from vibrokit.results.energy import ActivationEnergy, Bound
+
+PARAMETERS = {"a": 2.0, "b": -0.5, "c": 0.0, "noise.intensity": 0.1}
+
+
+def power_law():
+    """ΔU = a³ b⁴, whose powers are its sensitivities in per cent."""
+    value = 2.0**3 * 0.5**4
+    slopes = {"a": 3 * value / 2.0, "b": 4 * value / -0.5, "c": 1.0, "noise.intensity": 0.0}
+    return ActivationEnergy(
+        0, 1, value, value, value, "exact", Bound.EXACT, sensitivity=slopes,
+        sensitivity_error={"a": 0.02 * value / 2.0, "b": 0.01 * value / 0.5, "c": 0.0, "noise.intensity": 0.0},
+    )  # fmt: skip
+
+
+def test_powers_are_per_cents_and_the_mean_time_follows():
+    energy = power_law()
+    found = {one.parameter: one for one in sensitivities(energy, PARAMETERS, 0.1, tied={"both": ("a", "b")})}
+    assert [*found] == ["both", "b", "a", "noise.intensity"]  # no effect of c, which is 0
+    assert [found[name].energy for name in ("both", "b", "a")] == pytest.approx([7, 4, 3])
+    assert [found[name].energy_error for name in ("both", "b", "a")] == pytest.approx([0.03, 0.01, 0.02])
+    depth = energy.value / 0.1
+    assert found["a"].time == pytest.approx(100 * math.expm1(0.03 * depth))
+    assert found["noise.intensity"].time == pytest.approx(100 * math.expm1(depth / 1.01 - depth))
+    assert "nan" not in sensitivities_text(tuple(found.values()))
+    assert all(math.isnan(one.time) for one in sensitivities(energy, PARAMETERS))
+
+
+def test_what_has_no_sensitivities_is_refused():
+    with pytest.raises(StructureError):
+        sensitivities(dataclasses.replace(power_law(), sensitivity={}), PARAMETERS)
+    with pytest.raises(StructureError, match="nearest is 'a'"):
+        sensitivities(power_law(), PARAMETERS, tied={"x": ("aa",)})
+
+
+@pytest.mark.slow
+def test_both_gaps_of_the_paper():
+    """The stops moved by 0.1 % to either side, and the energies solved for anew: at 1 % the power is 0.6 % off."""
+    osc = vk.load_scene("hertz-0.570")
+    pair = ("barriers.0.position", "barriers.1.position")
+
+    def least(scene):
+        structure = vk.find_structure(scene, cells=(60, 60), starts=(8, 8), manifolds=False)
+        quick = vk.LeastAction(source="clear", graph=None, shooting=vk.Shooting(points=2000, rounds=6))
+        return min(quick.run(scene, structure).energies, key=lambda energy: energy.value)
+
+    def moved(factor):
+        return least(osc.replace({name: factor * osc.parameters[name] for name in pair})).value
+
+    energy = least(osc)
+    found = {one.parameter: one for one in sensitivities(energy, osc.parameters, tied={"gaps": pair})}
+    exponent = math.log(moved(1.001) / moved(0.999)) / math.log(1.001 / 0.999)
+    assert found["gaps"].energy == pytest.approx(exponent, rel=5e-4)

@@ -1,0 +1,161 @@
+"""The contact-free linear response of a scene about its position of rest, in closed form."""
+
+from __future__ import annotations
+
+import cmath
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_continuous_lyapunov
+
+from vibrokit.errors import NoSectionError
+from vibrokit.oscillator import Oscillator
+from vibrokit.structure.roots import bracketed_roots
+from vibrokit.symbolic.numeric import amplitude_at, drift_at, excitation_of, jacobian_of
+
+_PLACES = np.geomspace(1e-12, 1e12, 24 * 32 + 1)  # distances from x = 0 (m) at which forces at rest are compared with 0
+_SAMPLES = 128  # of a period of an excitation
+_PER_WAVE = 512  # of the shortest wave: the parabola through the highest sample has an error of 5e-10
+_LEAST_TONE = 1e-9  # of the largest: smaller ones are rounding
+_UNDAMPED = 1e-12  # of a rate: damping of that size is rounding
+_MOST_WAVES = 1024  # in a common period: above it the tones are taken to meet in phase
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearResponse:
+    """Free and forced motion of the linearized scene without stops.
+
+    Attributes
+    ----------
+    rest : float
+        Stable position of rest nearest to x = 0 under the constant forces (m).
+    stiffness, damping : float
+        κ (s⁻²) and c (s⁻¹) of x″ + c x′ + κ x there.
+    left, right : float
+        Largest forced displacements from the rest to the left and to the right (m), not negative.
+    speed : float
+        Largest speed of the forced motion (m s⁻¹).
+    noise : float
+        Standard deviation of the displacement by noise (m); NaN without noise or where it is not bounded.
+    """
+
+    rest: float
+    stiffness: float
+    damping: float
+    left: float
+    right: float
+    speed: float
+    noise: float
+
+
+def linear_response(osc: Oscillator) -> LinearResponse | None:
+    """Return the linear response about the rest nearest to x = 0; None if there is no stable rest without contact.
+
+    Rests that are clear of the stops come first.
+    """
+    tones, mean = _tones(osc)
+    drift, extra = drift_at(osc.model), len(osc.model.state) - 2
+
+    def force(x: float) -> float:
+        return drift([x, 0.0, *[0.0] * extra])[1] + mean
+
+    places = np.concatenate([-_PLACES[::-1], [0.0], _PLACES])
+    values = np.array([force(float(place)) for place in places])
+    if not values.any():  # no spring: it rests anywhere
+        return None
+    jacobian = jacobian_of(osc.model)
+
+    def preferred(x: float) -> tuple[int, float]:  # a rest inside a stop only where there is no other
+        return sum(barrier.sign * (x - barrier.position) > 0 for barrier in osc.barriers), abs(x)
+
+    for rest in sorted(bracketed_roots(force, places, values), key=preferred):
+        state = [rest, 0.0, *[0.0] * extra]
+        matrix = np.array(jacobian(state))
+        if not np.isfinite(matrix).all() or matrix[1, 0] >= 0:
+            continue
+        rates = np.linalg.eigvals(matrix)
+        if rates.real.max() <= _UNDAMPED * np.abs(rates).max():
+            left, right, speed = _forced(osc, tones, float(-matrix[1, 0]), float(-matrix[1, 1]))
+            noise = _noise(osc, matrix, state)
+            return LinearResponse(rest, float(-matrix[1, 0]), float(-matrix[1, 1]), left, right, speed, noise)
+    return None
+
+
+def _tones(osc: Oscillator) -> tuple[list[tuple[float, complex]], float]:
+    """Angular frequencies and complex amplitudes of the excitations, and the sum of their means without constants."""
+    tones, mean = list[tuple[float, complex]](), 0.0
+    for index, part in enumerate(osc.excitations):
+        if part.period is None or not math.isfinite(part.period):
+            continue
+        force = excitation_of(osc.model, index)
+        series = np.fft.rfft([force(part.period * k / _SAMPLES) for k in range(_SAMPLES)]) * (2 / _SAMPLES)
+        least = _LEAST_TONE * np.abs(series).max()
+        mean += float(series[0].real) / 2 if abs(series[0]) > least else 0.0
+        tones += [
+            (2 * math.pi * order / part.period, complex(series[order]))
+            for order in range(1, _SAMPLES // 2)
+            if abs(series[order]) > least
+        ]
+    return tones, mean
+
+
+def _forced(
+    osc: Oscillator, tones: list[tuple[float, complex]], stiffness: float, damping: float
+) -> tuple[float, float, float]:
+    """Largest displacements to the left and the right, and largest speed, of the response to all tones."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        waves = [(w, np.complex128(f) / (stiffness - w * w + 1j * w * damping)) for w, f in tones]
+    if not waves:
+        return 0.0, 0.0, 0.0
+    try:
+        period = osc.period or math.inf
+    except NoSectionError:
+        period = math.inf
+    if not period * max(tones)[0] <= 2 * math.pi * _MOST_WAVES or not all(cmath.isfinite(a) for _, a in waves):
+        reach = float(sum(abs(a) for _, a in waves))
+        return reach, reach, float(sum(w * abs(a) for w, a in waves))
+    count = math.ceil(period * max(tones)[0] / (2 * math.pi) * _PER_WAVE)
+    phases = 2j * np.pi * np.arange(count) / count
+    turns = [np.exp(phases * round(w * period / (2 * math.pi))) for w, _ in waves]
+    x = sum((a * turn).real for (_, a), turn in zip(waves, turns, strict=True))
+    v = sum((1j * w * a * turn).real for (w, a), turn in zip(waves, turns, strict=True))
+    return _peak(-x), _peak(x), max(_peak(v), _peak(-v))
+
+
+def _peak(values: Array) -> float:
+    """Largest value of a periodic series, by a parabola through its largest sample and the two beside it."""
+    at = int(np.argmax(values))
+    before, top, after = values[at - 1], values[at], values[(at + 1) % len(values)]
+    bend = before - 2 * top + after
+    return max(0.0, float(top - (after - before) ** 2 / (8 * bend) if bend < 0 else top))
+
+
+def _noise(osc: Oscillator, matrix: Array, state: list[float]) -> float:
+    """Standard deviation of x in the linear scene."""
+    rates = np.linalg.eigvals(matrix)
+    if osc.noise is None or rates.real.max() >= -_UNDAMPED * np.abs(rates).max():
+        return math.nan
+    natural = math.sqrt(-matrix[1, 0])
+    units = np.array([natural, *[1.0] * (len(matrix) - 1)])  # in ω_n x and ω_n t, for matrices of any unit
+    scaled = matrix * units[:, None] / units / natural
+    column = np.array(amplitude_at(osc.model, state))[:, None]
+    variance = solve_continuous_lyapunov(scaled, -column @ column.T)[0, 0] * osc.noise.intensity / natural**3
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def departure(osc: Oscillator, response: LinearResponse, reach: float, speed: float) -> float:
+    """Return how far forces depart from the linear ones at a distance (m) and a speed (m s⁻¹), as a part of these."""
+    drift, extra = drift_at(osc.model), [0.0] * (len(osc.model.state) - 2)
+    at_rest, largest = drift([response.rest, 0.0, *extra])[1], 0.0
+    for x, v in ((reach, 0.0), (-reach, 0.0), (0.0, speed), (0.0, -speed)):
+        linear = -response.stiffness * x - response.damping * v
+        force = drift([response.rest + x, v, *extra])[1] - at_rest
+        if abs(force - linear) > 1e-12 * (abs(at_rest) + abs(linear)):  # more than rounding
+            largest = max(largest, abs(force - linear) / abs(linear) if linear else math.inf)
+        if math.isnan(force):
+            return math.inf
+    return largest

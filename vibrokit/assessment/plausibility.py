@@ -1,0 +1,201 @@
+"""Plausibility: closed forms of a scene before any work, where wrong units show."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from enum import StrEnum
+
+from vibrokit.assessment.contact_times import contact_time
+from vibrokit.assessment.linear_response import LinearResponse, departure, linear_response
+from vibrokit.assessment.oddities import Oddity, OddityCode
+from vibrokit.oscillator import Oscillator
+from vibrokit.parts.barrier import Barrier
+from vibrokit.symbolic.numeric import amplitude_at
+from vibrokit.text_table import text_table
+
+# The scenes of tests/assessment/test_plausibility.py that are right lie inside these, but for those counted there.
+_FAR = (
+    100.0  # of a ratio of forcing to natural frequency, or of amplitude to gap: two decades from resonance, or contact
+)
+_NEAR = 2.0  # of f/f_n: where systems with stops are forced; 2π away from it, Hz was given for rad/s
+_HEAVY = 0.5  # of the damping ratio: above it there is no resonance, and 0.5 % is 0.005
+_NEVER = 1e3  # of ΔU/D: exp(1000) periods is longer than anything
+_BRIEF = 1e-4  # of a period: fixed steps that resolve a contact are beyond 10⁵ in a period
+_LINEAR = 0.1  # departure of the forces from linear ones, as a part of these, up to which linear responses are given
+_GRAVITY = 9.80665  # m s⁻²
+
+
+class Measure(StrEnum):
+    """What a row is about, with its heading and its unit."""
+
+    heading: str
+    unit: str
+
+    def __new__(cls, value: str, heading: str, unit: str = "") -> Measure:
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.heading, member.unit = heading, unit
+        return member
+
+    NATURAL_HZ = "natural-hz", "natural frequency", "Hz"
+    NATURAL_RAD = "natural-rad", "natural frequency", "rad/s"
+    QUALITY = "quality", "quality factor 1/2ζ"
+    DECAY_TIME = "decay-time", "time of decay", "s"
+    FREQUENCY_RATIO = "frequency-ratio", "forcing over natural frequency"
+    REST = "rest", "position of rest, where springs are linearized", "m"
+    AMPLITUDE = "amplitude", "forced displacement from rest, without contact", "m"
+    AMPLITUDE_OVER_GAP = "amplitude-over-gap", "forced displacement over the gap"
+    NOISE_RMS = "noise-rms", "rms displacement by noise, without contact", "m"
+    NOISE_OVER_GAP = "noise-over-gap", "rms displacement by noise over the gap"
+    CONTACT_TIME = "contact-time", "time of a contact", "s"
+    CONTACT_OVER_PERIOD = "contact-over-period", "time of a contact over the period"
+    FIRST_CONTACT = "first-contact", "ΔU of the first contact", "m² s⁻³"
+    FIRST_CONTACT_OVER_D = "first-contact-over-d", "ΔU of the first contact over D"
+    PSD = "psd", "noise as one-sided spectral density", "(m/s²)²/Hz"
+    PSD_G = "psd-g", "noise as one-sided spectral density", "g²/Hz"
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One number: what it is, its value, and the stop (its side) or the excitation (its path) that it is about."""
+
+    measure: Measure
+    value: float
+    subject: str = ""
+
+    def __str__(self) -> str:
+        of = f" ({self.subject})" if self.subject else ""
+        return f"{self.measure.heading}{of}: {self.value:.4g} {self.measure.unit}".rstrip()
+
+
+@dataclasses.dataclass(frozen=True)
+class Plausibility:
+    """Closed forms of a scene, and what is odd about them; ``str`` of it is the text.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        Rows without meaning in the scene are left out.
+    oddities : tuple of Oddity
+    """
+
+    rows: tuple[Row, ...]
+    oddities: tuple[Oddity, ...]
+
+    def value(self, measure: Measure, subject: str = "") -> float:
+        """Return the value of a row; NaN if there is no such row."""
+        return next((row.value for row in self.rows if (row.measure, row.subject) == (measure, subject)), math.nan)
+
+    def __str__(self) -> str:
+        cells = [
+            (row.measure.heading + (f" ({row.subject})" if row.subject else ""), f"{row.value:.4g} {row.measure.unit}")
+            for row in self.rows
+        ]
+        return "\n".join([*(text_table(cells) if cells else []), *map(str, self.oddities)])
+
+
+def plausibility(osc: Oscillator) -> Plausibility:
+    """Return closed forms of a scene: frequencies, linear response, contact times, noise. Nothing is compiled.
+
+    The response is that of the scene without stops, linearized about its position of rest nearest to x = 0. It is left
+    out for a stop as far as which the forces depart from linear ones by more than a tenth.
+    """
+    response = linear_response(osc)
+    found: list[Row | Oddity] = [*_frequencies(osc, response), *_noise(osc, response)]
+    if response is not None:
+        for index, barrier in enumerate(osc.barriers):
+            found += _stop(osc, response, index, barrier)
+    if osc.damping_ratio >= _HEAVY:
+        found.append(Oddity(OddityCode.HEAVY_DAMPING, {"ratio": osc.damping_ratio}))
+    return Plausibility(
+        tuple(one for one in found if isinstance(one, Row) and math.isfinite(one.value)),
+        tuple(one for one in found if isinstance(one, Oddity)),
+    )
+
+
+def _frequencies(osc: Oscillator, response: LinearResponse | None) -> Iterator[Row | Oddity]:
+    if response is None:
+        return
+    natural = math.sqrt(response.stiffness)
+    yield Row(Measure.NATURAL_HZ, natural / (2 * math.pi))
+    yield Row(Measure.NATURAL_RAD, natural)
+    if response.damping > 0:
+        yield Row(Measure.QUALITY, natural / response.damping)
+        yield Row(Measure.DECAY_TIME, 2 / response.damping)
+    yield Row(Measure.REST, response.rest)
+    ratios = {
+        f"excitations.{index}": 2 * math.pi / part.period / natural
+        for index, part in enumerate(osc.excitations)
+        if part.period is not None and math.isfinite(part.period)
+    }
+    yield from (Row(Measure.FREQUENCY_RATIO, ratio, path) for path, ratio in ratios.items())
+    if ratios:
+        yield Row(Measure.AMPLITUDE, max(response.left, response.right))
+        yield from _odd_frequency(min(ratios.values(), key=lambda ratio: abs(math.log(ratio))))
+
+
+def _odd_frequency(ratio: float) -> Iterator[Oddity]:
+    """What is odd about the forcing nearest to resonance."""
+    for code, other in (
+        (OddityCode.NATURAL_FREQUENCY_IN_HZ, ratio / (2 * math.pi)),
+        (OddityCode.FORCING_IN_HZ, ratio * 2 * math.pi),
+    ):
+        if 1 / _NEAR <= other <= _NEAR and not 1 / _NEAR <= ratio <= _NEAR:
+            yield Oddity(code, {"ratio": ratio, "other": other})
+    if not 1 / _FAR <= ratio <= _FAR:
+        yield Oddity(OddityCode.FREQUENCY_FAR, {"ratio": ratio})
+
+
+def _noise(osc: Oscillator, response: LinearResponse | None) -> Iterator[Row]:
+    if osc.noise is None or not osc.noise.intensity:
+        return
+    if response is not None:
+        yield Row(Measure.NOISE_RMS, response.noise)
+    if not osc.noise.extra_states:  # otherwise the force is not white
+        factor = amplitude_at(osc.model, (response.rest if response else 0.0, 0.0))[1]
+        density = 2 * osc.noise.intensity * factor**2
+        yield Row(Measure.PSD, density)
+        yield Row(Measure.PSD_G, density / _GRAVITY**2)
+
+
+def _stop(osc: Oscillator, response: LinearResponse, index: int, barrier: Barrier) -> Iterator[Row | Oddity]:
+    side, gap = barrier.side, barrier.sign * (barrier.position - response.rest)
+    natural = math.sqrt(response.stiffness)
+    if gap < 0:
+        clear = barrier.sign * (-barrier.position - response.rest) > 0
+        values = {"side": side, "depth": -gap, "position": barrier.position, "mirrored": -barrier.position}
+        yield Oddity(OddityCode.MISSING_SIGN if clear else OddityCode.PRELOADED, values)
+    elif gap > 0 and departure(osc, response, gap, min(response.speed, gap * natural)) <= _LINEAR:
+        yield from _reach(osc, response, side, gap)
+    speed = next((v for v in (response.speed, response.noise * natural, abs(gap) * natural) if 0 < v < math.inf), 0.0)
+    duration = contact_time(osc, index, speed) if speed else math.nan
+    yield Row(Measure.CONTACT_TIME, duration, side)
+    yield Row(Measure.CONTACT_OVER_PERIOD, duration / osc.time_unit, side)
+    if duration * natural > math.pi:
+        yield Oddity(OddityCode.STOP_SOFT, {"side": side, "ratio": duration * natural / math.pi})
+    if duration < _BRIEF * osc.time_unit:
+        yield Oddity(OddityCode.CONTACT_BRIEF, {"side": side, "ratio": duration / osc.time_unit})
+
+
+def _reach(osc: Oscillator, response: LinearResponse, side: str, gap: float) -> Iterator[Row | Oddity]:
+    """How far excitations and noise move the mass towards a stop."""
+    reach = response.right if side == "right" else response.left
+    if response.speed > 0:
+        yield Row(Measure.AMPLITUDE_OVER_GAP, reach / gap, side)
+        if reach > _FAR * gap:
+            yield Oddity(OddityCode.AMPLITUDE_LARGE, {"side": side, "ratio": reach / gap})
+        if reach * _FAR < gap:
+            yield Oddity(OddityCode.AMPLITUDE_SMALL, {"side": side, "ratio": reach / gap})
+    if osc.noise is None or not response.noise > 0:
+        return
+    yield Row(Measure.NOISE_OVER_GAP, response.noise / gap, side)
+    if response.noise > gap:
+        yield Oddity(OddityCode.NOISE_STRONG, {"side": side, "ratio": response.noise / gap})
+    if reach < gap:  # 2ζω_n³ (b − max x)² for white noise
+        ratio = 0.5 * ((gap - reach) / response.noise) ** 2
+        yield Row(Measure.FIRST_CONTACT, ratio * osc.noise.intensity, side)
+        yield Row(Measure.FIRST_CONTACT_OVER_D, ratio, side)
+        if ratio > _NEVER:
+            yield Oddity(OddityCode.NOISE_WEAK, {"side": side, "ratio": ratio})

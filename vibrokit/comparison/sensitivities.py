@@ -1,0 +1,99 @@
+"""What a change of each parameter by 1 % does to an activation energy and to the mean time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+from vibrokit.errors import StructureError, nearest
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.text_table import number_text, text_table
+
+_INTENSITY = "noise.intensity"
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensitivity:
+    """The effect of 1 % more of one parameter, or of several parameters together.
+
+    Attributes
+    ----------
+    parameter : str
+    energy, energy_error : float
+        Change of ΔU (%), to first order: the exponent of the power with which ΔU grows.
+    time, time_error : float
+        Change of the mean time (%) at the intensity D, by exp(ΔU/D) alone: a change of the prefactor is neglected. NaN
+        without an intensity.
+    """
+
+    parameter: str
+    energy: float
+    energy_error: float
+    time: float
+    time_error: float
+
+
+def sensitivities(
+    energy: ActivationEnergy,
+    parameters: Mapping[str, object],
+    intensity: float | None = None,
+    tied: Mapping[str, Sequence[str]] | None = None,
+) -> tuple[Sensitivity, ...]:
+    """Return the effect of 1 % more of each parameter, the largest first.
+
+    Parameters
+    ----------
+    energy : ActivationEnergy
+        Of a polished path.
+    parameters : mapping of str to value
+        As ``osc.parameters``.
+    intensity : float, optional
+        D (m² s⁻³), at which mean times are compared.
+    tied : mapping of str to sequence of str, optional
+        Parameters that change together, by a name for them: ``{"gaps": ("barriers.0.position",
+        "barriers.1.position")}``.
+
+    Raises
+    ------
+    StructureError
+        The energy has no sensitivities or is 0, or a name in `tied` is not one of its parameters.
+    """
+    if not energy.sensitivity or not energy.value > 0:
+        raise StructureError("the energy has no sensitivities; those of LeastAction with a polished path have them.")
+    groups = {name: (name,) for name in energy.sensitivity} | {name: tuple(each) for name, each in (tied or {}).items()}
+    for name in {one for each in groups.values() for one in each}:
+        if name not in energy.sensitivity or name not in parameters:
+            raise StructureError(f"the energy has no sensitivity in {name!r}{nearest(name, energy.sensitivity)}")
+    depth = energy.value / intensity if intensity else math.nan
+    found = []
+    for name, members in groups.items():
+        power = sum(_scaled(energy.sensitivity, parameters, one) for one in members) / energy.value
+        error = sum(abs(_scaled(energy.sensitivity_error, parameters, one)) for one in members) / energy.value
+        per_cent = 0.01 * power - (1 - 1 / 1.01 if _INTENSITY in members else 0.0)
+        time = _growth(depth * per_cent)
+        time_error = (100 + time) * abs(depth) * 0.01 * error
+        if power or _INTENSITY in members:
+            found.append(Sensitivity(name, power, error, time, time_error))
+    return tuple(sorted(found, key=lambda one: -abs(one.energy)))
+
+
+def sensitivities_text(found: Sequence[Sensitivity]) -> str:
+    """Return a table, a line for each parameter."""
+    rows = [("1 % more of", "changes ΔU by (%)", "error", "the mean time by (%)", "error")]
+    rows += [
+        (one.parameter, f"{one.energy:+.3g}", f"{one.energy_error:.1g}", number_text(one.time, "+.3g"),
+         number_text(one.time_error, ".1g"))
+        for one in found
+    ]  # fmt: skip
+    return "\n".join(text_table(rows))
+
+
+def _scaled(derivatives: Mapping[str, float], parameters: Mapping[str, object], name: str) -> float:
+    value = parameters[name]
+    return derivatives.get(name, math.nan) * value if isinstance(value, int | float) else 0.0
+
+
+def _growth(exponent: float) -> float:
+    """exp − 1 in per cent; infinite beyond the largest float."""
+    return math.inf if exponent > 700 else 100 * math.expm1(exponent)
