@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.problem import ExitProblem as ExitProblem
     from vibrokit.analyzers.sgcm_wkb import SGCM as SGCM
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
+    from vibrokit.assessment.assess import assess as assess
+    from vibrokit.assessment.assessment import Assessment as Assessment
     from vibrokit.comparison.occupancies import occupancies as occupancies
     from vibrokit.comparison.reconcile import reconcile as reconcile
     from vibrokit.comparison.reconciliation import Reconciliation as Reconciliation
@@ -91,6 +93,8 @@ _MODULES = {
     "MFET": "vibrokit.analyzers.mean_exit_times",
     "SGCM": "vibrokit.analyzers.sgcm_wkb",
     "Shooting": "vibrokit.analyzers.shooting.shooting",
+    "assess": "vibrokit.assessment.assess",
+    "Assessment": "vibrokit.assessment.assessment",
     "occupancies": "vibrokit.comparison.occupancies",
     "reconcile": "vibrokit.comparison.reconcile",
     "Reconciliation": "vibrokit.comparison.reconciliation",

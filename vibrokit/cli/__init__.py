@@ -1,4 +1,4 @@
-"""The command line: vibrokit run, reconcile, report, plot, equations, list, check, trade."""
+"""The command line: vibrokit assess, run, reconcile, report, plot, equations, list, check, trade."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from vibrokit import __version__
+from vibrokit.cli import assess
 from vibrokit.errors import VibrokitError
 
 
@@ -61,6 +62,8 @@ def _parser() -> argparse.ArgumentParser:
     which = "a bundled scene, such as hertz-0.570, or a TOML file"
     scene = argparse.ArgumentParser(add_help=False)
     scene.add_argument("scene", help=which)
+
+    assess.add_parser(commands, scene)
 
     run = commands.add_parser(
         "run",

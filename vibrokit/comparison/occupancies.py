@@ -54,17 +54,22 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
         raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
     if not result.rates:
         raise StructureError("the result has no rates; see its findings.")
-    names = np.array(result.names)
-    shape = len(result.intensities), len(names)
+    return shares_over(result.intensities, balances(result))
+
+
+def shares_over(intensities: Sequence[float], known: Sequence[Balance]) -> xarray.DataArray:
+    """Return the shares that balances give at several noise intensities, as `occupancies` returns them."""
+    names = np.array(known[0].names)
+    shape = len(intensities), len(names)
     values, lower, upper = (np.full(shape, np.nan) for _ in range(3))
     states = []
-    for number, balance in enumerate(balances(result)):
+    for number, balance in enumerate(known):
         states.append(balance.states)
         heads = np.unique(balance.hosts)
         values[number, heads], lower[number, heads], upper[number, heads] = balance.shares
     both = ("intensity", "attractor")
     coordinates = {
-        "intensity": result.intensities, "attractor": names,
+        "intensity": intensities, "attractor": names,
         "state": (both, np.array(states)), "lower": (both, lower), "upper": (both, upper),
     }  # fmt: skip
     return xarray.DataArray(values, coordinates, both, "occupancy")

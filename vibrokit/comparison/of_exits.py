@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
+from vibrokit.comparison.mean_times import log_sum
 from vibrokit.comparison.quantities import Kind, Quantity
 from vibrokit.errors import StructureError
 from vibrokit.results.arrays import Arrays
@@ -87,7 +88,7 @@ def _log_times(result: RatedResult, source: int, target: int | None, method: str
         here = [rate for rate in own if rate.intensity == intensity]
         chosen = [rate for rate in here if target in (None, rate.target)]
         if chosen:
-            log_rate, lower, upper = _sum(chosen)
+            log_rate, lower, upper = log_sum(chosen)
             left = logsumexp([rate.log_value for rate in here])
             found.append(
                 Quantity(
@@ -96,17 +97,6 @@ def _log_times(result: RatedResult, source: int, target: int | None, method: str
                 )
             )  # fmt: skip
     return found
-
-
-def _sum(rates: Sequence[ExitRate]) -> tuple[float, float, float]:
-    """ln of the sum of rates with independent errors, and its interval."""
-    logs = np.array([rate.log_value for rate in rates])
-    total = float(logsumexp(logs))
-    widths = np.array([[rate.log_value - rate.log_lower, rate.log_upper - rate.log_value] for rate in rates])
-    halves = widths.mean(axis=1, keepdims=True)  # for an interval that does not hold its value
-    widths = np.where(widths.min(axis=1, keepdims=True) < 0, halves, widths)
-    below, above = np.linalg.norm(np.exp(logs - total)[:, None] * widths, axis=0).tolist()
-    return total, total - below, total + above
 
 
 class _Standing:

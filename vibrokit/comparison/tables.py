@@ -41,15 +41,18 @@ def reconciliation_text(one: Reconciliation) -> str:
 
 def overview_text(one: Reconciliation) -> str:
     """Return whether the methods agree, and the mean time until each state is left, the longest first."""
+    return "\n".join([agreement_text(one), *_lasting(one)])
+
+
+def agreement_text(one: Reconciliation) -> str:
+    """Return in a sentence whether the methods agree."""
     wrong = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is Agreement.DISAGREE)
     open_ = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is not Agreement.AGREE)
     if wrong:
-        lines = [f"Methods disagree on {', '.join(wrong)}."]
-    elif open_:
-        lines = [f"No methods disagree. What is not settled: {', '.join(open_)}."]
-    else:
-        lines = ["All methods agree."]
-    return "\n".join([*lines, *_lasting(one)])
+        return f"Methods disagree on {', '.join(wrong)}."
+    if open_:
+        return f"No methods disagree. What is not settled: {', '.join(open_)}."
+    return "All methods agree."
 
 
 def _lasting(one: Reconciliation) -> list[str]:

@@ -1,0 +1,99 @@
+"""Answers: numbers in a user's terms, each with its 95 % interval and the methods that support it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from vibrokit.assessment.durations import interval_text
+
+_READABLE = math.log(1e6)  # ln of numbers of periods up to which they are written
+_LARGEST = 709.0  # exponent of the largest floating-point number
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Answer:
+    """A number with its interval.
+
+    Attributes
+    ----------
+    question : str
+        What was asked, such as ``"mean time until clear is left"``.
+    value, lower, upper : float
+        The number and its 95 % interval, in SI units.
+    unit : str
+    intensity : float
+        Noise intensity D that it is for (m² s⁻³).
+    methods : tuple of str
+        The methods that support it. Several where one of them contradicts the interval of another: then the interval
+        contains both.
+    extrapolated : bool
+        Whether D lies outside the intensities at which rates were computed.
+    """
+
+    question: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+    intensity: float
+    methods: tuple[str, ...]
+    extrapolated: bool
+
+    @property
+    def number(self) -> str:
+        """The number with its interval and unit, as text."""
+        return f"{self.value:.3g} ({self.lower:.2g} to {self.upper:.2g}) {self.unit}".strip()
+
+    def __str__(self) -> str:
+        support = " and ".join(self.methods)
+        return f"{self.question}: {self.number}, by {support}{', extrapolated' if self.extrapolated else ''}."
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MeanTime(Answer):
+    """A mean time, which may be too long for a floating-point number.
+
+    Attributes
+    ----------
+    log_value, log_lower, log_upper : float
+        ln of the time in s and its 95 % interval.
+    period : float
+        Forcing period, or 2π/ω_n without forcing (s).
+    metastable : bool
+        Whether the state lasts ten of its relaxation times. If not, it is left before it has formed.
+    """
+
+    log_value: float
+    log_lower: float
+    log_upper: float
+    period: float
+    metastable: bool
+
+    @property
+    def number(self) -> str:
+        """The time with its interval in the unit that reads best, and as a number of periods where that is readable."""
+        text = interval_text(self.log_value, self.log_lower, self.log_upper)
+        periods = self.log_value - math.log(self.period)
+        return f"{text}, {math.exp(periods):.3g} periods" if periods < _READABLE else text
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AllowedIntensity(Answer):
+    """The largest noise intensity at which a state lasts a given mean time."""
+
+    @property
+    def psd(self) -> tuple[float, float, float]:
+        """One-sided power spectral density of the acceleration, 2D, and its interval ((m/s²)²/Hz)."""
+        return 2 * self.value, 2 * self.lower, 2 * self.upper
+
+    @property
+    def number(self) -> str:
+        """D and the spectral density that it stands for."""
+        value, lower, upper = self.psd
+        return f"{super().number}, a PSD of {value:.3g} ({lower:.2g} to {upper:.2g}) (m/s²)²/Hz"
+
+
+def exponential(logarithm: float) -> float:
+    """Return exp of a logarithm; infinite where that is too large."""
+    return math.exp(logarithm) if logarithm < _LARGEST else math.inf

@@ -1,0 +1,343 @@
+"""assess: from a scene to the answers, in an order that answers early and improves."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+from vibrokit.analyzers.analyzer import Analyzer
+from vibrokit.analyzers.exits import Exit, LeaveBasin
+from vibrokit.analyzers.mean_exit_times import MFET
+from vibrokit.analyzers.sgcm_wkb import SGCM
+from vibrokit.assessment.assessment import Assessment
+from vibrokit.assessment.ladder import at_intensities, fitted, ladder
+from vibrokit.errors import OutOfTime, ParameterError, StructureError, VibrokitError, shown
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
+from vibrokit.registry import Group, load
+from vibrokit.results.codes import Code
+from vibrokit.results.files import load_result
+from vibrokit.results.finding import Finding
+from vibrokit.results.merging import merged
+from vibrokit.results.result import Result
+from vibrokit.results.structure import Structure
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.find import find_structure
+from vibrokit.structure.validation import check_belongs
+
+METHODS = ("least-action", "mfet", "sgcm")
+"""Analyzers that an assessment runs, in this order, by their registered names."""
+TIME_LIMIT = 300.0
+"""Default budget (s)."""
+
+_PATHS = 0.4  # share of the time left that least action may take when rates are wanted too
+_EARLY = 0.98  # of its time: a piece of work that ended before was stopped by its user
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is wanted of an assessment, checked before any work is done.
+
+    Attributes
+    ----------
+    accuracy : float
+    time_limit : float or None
+    analyzers : dict of str to Analyzer
+        Fitted to the accuracy, by their registered names.
+    source : int, str or None
+    rng : int
+    executor : Executor or None
+    """
+
+    accuracy: float
+    time_limit: float | None
+    analyzers: dict[str, Analyzer]
+    source: int | str | None
+    rng: int
+    executor: Executor | None
+
+    @classmethod
+    def of(
+        cls,
+        osc: Oscillator,
+        *,
+        accuracy: float,
+        time_limit: float | None,
+        methods: Sequence[str] | None,
+        source: int | str | None,
+        exit: Exit,  # noqa: A002 - the name that analyzers use
+        rng: int,
+        executor: Executor | None,
+    ) -> Request:
+        """Check arguments; raises a VibrokitError."""
+        if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
+            raise ParameterError(f"accuracy must be above 0 and below 1, got {shown(accuracy)}.")
+        if isinstance(methods, str) or (methods is not None and not methods):
+            raise ParameterError(f"methods must be names of analyzers, such as {METHODS!r}, got {shown(methods)}.")
+        analyzers = {}
+        for name in methods or METHODS:
+            analyzers[name] = dataclasses.replace(fitted(load(Group.ANALYZERS, name, Analyzer)(), accuracy), exit=exit)
+            analyzers[name].check(osc)
+        return cls(
+            accuracy=float(accuracy), time_limit=checked_time_limit(time_limit), analyzers=analyzers, source=source,
+            rng=rng, executor=executor,
+        )  # fmt: skip
+
+
+def assess(
+    osc: Oscillator,
+    *,
+    accuracy: float = 0.1,
+    time_limit: float | None = TIME_LIMIT,
+    methods: Sequence[str] | None = None,
+    source: int | str | None = None,
+    exit: Exit | None = None,  # noqa: A002 - the name that analyzers use
+    known: Iterable[Any] = (),
+    checkpoint: str | os.PathLike[str] | None = None,
+    rng: int = 0,
+    executor: Executor | None = None,
+    progress: Progress = None,
+) -> Assessment:
+    """Find out which states a scene has, how long each lasts by several methods, and whether these agree.
+
+    The steady states come first, then paths of least action, then exit rates of each state: at the scene's noise
+    intensity, and at a ladder of intensities where simulation, splitting and densities overlap. On Ctrl-C, or when the
+    time limit is reached, what was found so far is returned, marked incomplete.
+
+    Parameters
+    ----------
+    osc : Oscillator
+    accuracy : float
+        Relative error of mean times and of the bounds of ΔU, above 0 and below 1.
+    time_limit : float, optional
+        In seconds, 300 by default; None for as long as it takes.
+    methods : sequence of str, optional
+        Registered names of analyzers, by default ``("least-action", "mfet", "sgcm")``.
+    source : int or str, optional
+        Label or name of the state to leave; by default all.
+    exit : Exit, optional
+        What counts as leaving; by default `LeaveBasin`.
+    known : iterable of Record or path, optional
+        A structure, results or assessments of this scene, as objects or as files, that are taken and not computed
+        again unless they are incomplete.
+    checkpoint : path, optional
+        A file in which the assessment is saved after each of its stages. If it exists, it is taken as known.
+    rng : int
+        Seed of what is random.
+    executor : concurrent.futures.Executor, optional
+        As for `Analyzer.run`.
+    progress : bool or callable, optional
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    ParameterError
+        The accuracy or the methods are not allowed.
+    SceneError
+        The scene has no noise.
+    StructureError
+        There is nothing to leave, or what is known is of another scene.
+    OutOfTime
+        The time limit was reached before the steady states were found.
+    """
+    request = Request.of(
+        osc, accuracy=accuracy, time_limit=time_limit, methods=methods, source=source, exit=exit or LeaveBasin(),
+        rng=rng, executor=executor,
+    )  # fmt: skip
+    last: Assessment | None = None
+    with working(progress, request.time_limit) as work:
+        try:
+            for assessment in improving(osc, request, work, known, checkpoint):
+                last = assessment
+        except (KeyboardInterrupt, OutOfTime) as stopped:
+            if last is None:
+                raise
+            finding = Finding.stopped("the assessment", stopped)
+            last = dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
+    assert last is not None  # the first stage yields one, or raises
+    return last
+
+
+def improving(
+    osc: Oscillator,
+    request: Request,
+    work: Work,
+    known: Iterable[Any] = (),
+    checkpoint: str | os.PathLike[str] | None = None,
+) -> Iterator[Assessment]:
+    """Yield the assessment after each of its stages; each is whole as far as it goes. `work` is the work under way."""
+    kept = None if checkpoint is None else Path(checkpoint)
+    if kept is not None and not kept.parent.is_dir():
+        raise StructureError(f"the folder {kept.parent} of the checkpoint does not exist; make it first.")
+    given = [*known, *([kept] if kept is not None and kept.exists() else [])]
+    road = _Road(osc, request, work, [load_result(one) if isinstance(one, str | os.PathLike) else one for one in given])
+    for assessment in road.stages():
+        if kept is not None:
+            assessment.save(kept)
+        yield assessment
+
+
+class _Road:
+    """The stages of one assessment, and what they found."""
+
+    def __init__(self, osc: Oscillator, request: Request, work: Work, known: Sequence[Any]) -> None:
+        self.osc, self.request, self.work = osc, request, work
+        self.structure: Structure | None = None
+        self.parts: dict[tuple[str, int | None], Result] = {}  # by analyzer and by source; None for all sources at once
+        self.left: list[Finding] = []
+        self.complete = False
+        for one in known:
+            self._take(one)
+
+    def stages(self) -> Iterator[Assessment]:
+        """Run what is wanted and not known, and yield the assessment after each stage."""
+        wanted = self.request
+        if self.structure is None:
+            with stage("which states are there"):
+                self.structure = find_structure(self.osc, rng=wanted.rng)
+        structure = self.structure
+        if not structure.complete or not structure.attractors:
+            yield self._assessment()
+            return
+        self._check_exit(structure)
+        yield self._assessment()
+        labels = (
+            range(len(structure.attractors)) if wanted.source is None else [structure.attractor(wanted.source).label]
+        )
+        rated = {name: one for name, one in wanted.analyzers.items() if isinstance(one, MFET | SGCM)}
+        tasks: list[tuple[str, int | None]] = [
+            (name, None if wanted.source is None else labels[0]) for name in wanted.analyzers if name not in rated
+        ]
+        stopped = False
+        for name, source in tasks:
+            stopped = stopped or self._run(name, wanted.analyzers[name], source, _PATHS if rated else 1.0 / len(tasks))
+            yield self._assessment()
+        order = sorted(labels, key=self._energy)
+        runs = [(name, label) for label in order for name in rated]
+        for number, (name, label) in enumerate(runs):
+            one = at_intensities(rated[name], label, self._intensities(label))
+            stopped = stopped or self._run(name, one, label, 1.0 / (len(runs) - number))
+            self.complete = number == len(runs) - 1 and not stopped
+            yield self._assessment()
+        self.complete = not stopped
+        yield self._assessment()
+
+    def _run(self, name: str, analyzer: Analyzer, source: int | None, share: float) -> bool:
+        """Run one analyzer in a share of the time left; return whether the user stopped it."""
+        assert self.structure is not None
+        known = self.parts.get((name, source))
+        if known is not None and known.complete:
+            return False
+        limit = None
+        if self.request.time_limit is not None:
+            limit = share * (self.request.time_limit - self.work.seconds)
+            if limit <= 0:
+                self._leave(name, source, "the time was up.")
+                return True
+        subject = "" if source is None else self.structure.names[source]
+        try:
+            with stage("how it is left" if source is None else "how long it lasts", subject=subject):
+                found = analyzer.run(self.osc, self.structure, executor=self.request.executor, time_limit=limit)
+        except VibrokitError as error:
+            self._leave(name, source, str(error))
+            return False
+        if known is None or found.complete or _content(found) >= _content(known):
+            self.parts[name, source] = found
+        return not found.complete and (limit is None or found.seconds < _EARLY * limit)
+
+    def _leave(self, name: str, source: int | None, reason: str) -> None:
+        assert self.structure is not None
+        which = name if source is None else f"{name} of {self.structure.names[source]}"
+        self.left.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=which, reason=reason))
+
+    def _check_exit(self, structure: Structure) -> None:
+        for analyzer in self.request.analyzers.values():
+            try:
+                analyzer.exit.check(self.osc, structure)
+            except StructureError as error:
+                offer = (
+                    "; ask for exit=vk.FirstContact() to learn how long no stop is touched."
+                    if self.osc.barriers
+                    else "."
+                )
+                raise StructureError(f"{str(error).rstrip('.')}{offer}") from error
+
+    def _intensities(self, label: int) -> tuple[float, ...]:
+        """The ladder of one state; without an energy, what the analyzers take by themselves."""
+        assert self.osc.noise is not None
+        energy, own = self._energy(label), self.osc.noise.intensity
+        if math.isinf(energy) or not energy > 0:
+            return 1.5 * own, 1.2 * own, own
+        return ladder(energy, own, self.request.accuracy)
+
+    def _energy(self, label: int) -> float:
+        """ΔU of the cheapest known exit of a state; infinite if none is known."""
+        known = [e for one in self.parts.values() for e in one.energies if e.source == label]
+        return min((e.value for e in known), default=math.inf)
+
+    def _take(self, record: Any) -> None:
+        """Take what is known already; raises StructureError if it is of another scene."""
+        match record:
+            case Assessment():
+                self._take(record.structure)
+                for result in record.results.values():
+                    self._take(result)
+            case Structure():
+                check_belongs(self.osc, record)
+                self.structure = record
+            case Result():
+                name = str(record.settings.get("analyzer"))
+                sources = record.data["source"].values.tolist() if "source" in record.data else []
+                if name in self.request.analyzers and isinstance(self.request.analyzers[name], MFET | SGCM):
+                    for place, label in enumerate(sources):
+                        self.parts[name, label] = record if len(sources) == 1 else _part(record, place, label)
+                else:
+                    self.parts[name, None] = record
+            case _:
+                raise StructureError(
+                    f"what is known must be a structure, a result or an assessment, or the file of one, got "
+                    f"{shown(record)}."
+                )
+
+    def _assessment(self) -> Assessment:
+        assert self.structure is not None
+        results = {}
+        for name in dict.fromkeys(name for name, _ in self.parts):
+            own = [part for (other, _), part in self.parts.items() if other == name]
+            results[name] = merged(own)
+        wanted = self.request
+        return Assessment(
+            scene=scene_data(self.osc),
+            settings={"accuracy": wanted.accuracy, "time_limit": wanted.time_limit, "methods": list(wanted.analyzers)},
+            findings=tuple(self.left),
+            stats=self.work.stats,
+            complete=self.complete and all(one.complete for one in results.values()),
+            seed=wanted.rng,
+            seconds=self.work.seconds,
+            structure=self.structure,
+            results=results,
+        )
+
+
+def _content(found: Result) -> int:
+    """How much a result has: a run that was stopped does not replace one that got further."""
+    return len(found.energies) + len(found.rates)
+
+
+def _part(record: Result, place: int, label: int) -> Result:
+    """What a result says of one of its attractors."""
+    return dataclasses.replace(
+        record,
+        energies=tuple(e for e in record.energies if e.source == label),
+        branches=tuple(e for e in record.branches if e.source == label),
+        findings=tuple(f for f in record.findings if f.source in (None, label)),
+        data=record.data.isel(source=[place]),
+    )

@@ -1,0 +1,60 @@
+"""Noise intensities and settings with which each method answers at a wanted accuracy."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from vibrokit.analyzers.analyzer import Analyzer
+from vibrokit.analyzers.least_action import LeastAction
+from vibrokit.analyzers.mean_exit_times import MFET
+from vibrokit.analyzers.sgcm_wkb import SGCM
+
+_RUNGS = ((0.05, (4.0, 7.0, 12.0)), (0.0, (4.0, 7.0, 12.0, 20.0)))
+"""Accuracies, and from each on the ΔU/D at which rates are computed: direct simulation reaches 7 cheaply and splitting
+20, and a density is resolved up to about 15."""
+_SIMULATED = (0.25, 25.0)  # ΔU/D between which the scene's own intensity is added: below, nothing is a state
+_APART = 1.25  # ratio below which two intensities count as one
+_LEAST_ERROR, _LARGEST_ERROR = 0.002, 0.25  # of a simulated rate: 250 000 and 16 exits
+_REPLICAS = 32  # of splitting at a relative error of 0.1: its default of 128 replicas reaches 0.05
+
+
+def ladder(energy: float, intensity: float, accuracy: float) -> tuple[float, ...]:
+    """Return the noise intensities for one state, descending (m² s⁻³).
+
+    Parameters
+    ----------
+    energy : float
+        ΔU of its cheapest exit.
+    intensity : float
+        D of the scene, which is among them where rates can be computed there.
+    accuracy : float
+    """
+    ratios: tuple[float, ...] = next(ratios for least, ratios in _RUNGS if accuracy >= least)
+    own = energy / intensity
+    if _SIMULATED[0] <= own <= _SIMULATED[1]:
+        ratios = (*(one for one in ratios if abs(math.log(one / own)) > math.log(_APART)), own)
+    return tuple(intensity if ratio == own else energy / ratio for ratio in sorted(ratios))
+
+
+def fitted(analyzer: Analyzer, accuracy: float) -> Analyzer:
+    """Return an analyzer with settings for an accuracy: the relative error of ΔU's bound and of mean times.
+
+    The error of a simulated rate is half of the accuracy, so that its 95 % interval is as wide as that. The other
+    methods choose their own effort from the scene; `LeastAction` refines its graph to the accuracy.
+    """
+    if isinstance(analyzer, LeastAction):
+        return dataclasses.replace(analyzer, accuracy=accuracy)
+    if isinstance(analyzer, MFET):
+        error = min(max(accuracy / 2, _LEAST_ERROR), _LARGEST_ERROR)
+        return dataclasses.replace(
+            analyzer, target_error=error, replicas=max(16, math.ceil(_REPLICAS * (0.1 / error) ** 2))
+        )
+    return analyzer
+
+
+def at_intensities(analyzer: Analyzer, source: int, intensities: tuple[float, ...]) -> Analyzer:
+    """Return an analyzer that leaves one attractor at given noise intensities, if it takes any."""
+    if isinstance(analyzer, MFET | SGCM):
+        return dataclasses.replace(analyzer, source=source, intensities=intensities)
+    return dataclasses.replace(analyzer, source=source)

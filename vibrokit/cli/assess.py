@@ -1,0 +1,113 @@
+"""vibrokit assess: from a scene to the answers; each stage is kept as soon as it ends."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vibrokit.cli.interrupts import Interrupts
+from vibrokit.errors import OutOfTime, VibrokitError
+
+if TYPE_CHECKING:
+    from vibrokit.assessment.assessment import Assessment
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], scene: argparse.ArgumentParser) -> None:
+    """Add the command to the parser of the command line."""
+    parser = commands.add_parser(
+        "assess",
+        parents=[scene],
+        help="answer how long each state lasts, by all methods, and whether they agree",
+        epilog="Ctrl-C, SIGTERM and the time limit stop the work; the answers that were reached are printed and kept.",
+    )
+    parser.add_argument("--accuracy", type=float, default=0.1, help="relative error that is wanted (default 0.1)")
+    parser.add_argument("--mean-time", metavar="TIME", help='how much noise a state bears that has to last "1yr"')
+    parser.add_argument("--within", metavar="TIME", help='how likely a state is left within "8h"')
+    parser.add_argument("--source", metavar="STATE", help="name or label of the state to leave (default: each)")
+    parser.add_argument(
+        "--exit", metavar="NAME[:ARGUMENT]", help="what counts as leaving: leave-basin (default), first-contact[:SIDE]"
+    )
+    parser.add_argument("--method", action="append", metavar="NAME", help="an analyzer to run (default: all three)")
+    parser.add_argument(
+        "--time-limit", type=float, metavar="SECONDS", help="stop after this time (default 300; 0 for no limit)"
+    )
+    parser.add_argument("--known", action="append", default=[], type=Path, metavar="FILE", help="a result to take over")
+    parser.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and draw nothing")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE",
+        help="save the assessment after each stage (netCDF); if the file exists, go on from it",
+    )  # fmt: skip
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="where to save the figure (default: none)")
+    parser.set_defaults(command=assess_scene)
+
+
+def assess_scene(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    from vibrokit.analyzers.exits import LeaveBasin
+    from vibrokit.analyzers.settings import named_exit
+    from vibrokit.assessment.assess import TIME_LIMIT, Request, improving
+    from vibrokit.assessment.durations import seconds_in
+    from vibrokit.progress import working
+    from vibrokit.report.assessment import Question
+    from vibrokit.results.finding import Finding
+    from vibrokit.results.pictures import checked_picture, save_figure
+    from vibrokit.scene_file import load_scene
+
+    for target in (options.output, options.figure):
+        if target is not None and not target.parent.is_dir():
+            raise VibrokitError(f"the folder {target.parent} of {target} does not exist; make it first.")
+    if options.figure is not None:
+        checked_picture(options.figure)
+    osc = load_scene(options.scene)
+    for duration in (options.mean_time, options.within):
+        if duration is not None:
+            seconds_in(duration, period=osc.section_interval)
+    question = Question(options.mean_time, options.within)
+    source = int(options.source) if options.source and options.source.isdecimal() else options.source
+    limit = TIME_LIMIT if options.time_limit is None else options.time_limit
+    request = Request.of(
+        osc, accuracy=options.accuracy, time_limit=limit or None, methods=options.method, source=source,
+        exit=LeaveBasin() if options.exit is None else named_exit(options.exit), rng=options.seed, executor=None,
+    )  # fmt: skip
+    last: Assessment | None = None
+    with Interrupts() as interrupts:
+        with working(True, request.time_limit) as work:
+            interrupts.stops(work)
+            try:
+                for assessment in improving(osc, request, work, options.known, options.output):
+                    last = assessment
+                interrupts.finishing()
+            except (KeyboardInterrupt, OutOfTime) as stopped:
+                interrupts.finishing()
+                if last is None:
+                    raise
+                finding = Finding.stopped("the assessment", stopped)
+                last = dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
+        assert last is not None  # the first stage yields one, or raises
+        _print(options, last, question)
+        if options.figure is not None and not interrupts.requested:
+            save_figure(last.plot(), options.figure)
+            print(f"figure: {options.figure}")
+        if interrupts.requested:
+            return interrupts.status
+    return 0 if last.complete else 1
+
+
+def _print(options: argparse.Namespace, last: Assessment, question: object) -> None:
+    from vibrokit.report.assessment import Question, assessment_data, assessment_text
+    from vibrokit.results.record import versions
+
+    assert isinstance(question, Question)
+    if options.json:
+        found = {"scene": options.scene, **assessment_data(last, question), "versions": versions()}
+        print(json.dumps({**found, "seed": options.seed, "seconds": last.seconds}, allow_nan=False))
+    else:
+        print(assessment_text(f"{options.scene}: which state lasts, and how long", last, question))
+        if options.output is not None:
+            print(f"written: {options.output}")
+    sys.stdout.flush()

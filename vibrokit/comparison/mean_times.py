@@ -1,0 +1,210 @@
+"""MeanTimes: the mean time of an exit over the noise intensity, also between and beyond the computed intensities."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+from scipy.special import logsumexp
+
+from vibrokit.errors import StructureError
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.exit_rate import ExitRate
+
+_SAME = 1e-9  # relative: intensities that differ by less are one
+_FARTHEST = 30.0  # in ln D, from a computed intensity: twelve decades, farther than any noise is from it
+_STEP = 0.1  # in ln D, of a search for an intensity: ln τ is smooth over 10 %
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class LogTime:
+    """ln of a mean time at one noise intensity.
+
+    Attributes
+    ----------
+    value, lower, upper : float
+        ln τ, τ in s, and its 95 % interval.
+    intensity : float
+        D (m² s⁻³).
+    methods : tuple of str
+        The methods that support it.
+    extrapolated : bool
+        Whether D lies outside the intensities at which rates were computed.
+    """
+
+    value: float
+    lower: float
+    upper: float
+    intensity: float
+    methods: tuple[str, ...]
+    extrapolated: bool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MeanTimes:
+    """ln of the mean time of one exit, or of leaving a state at all, by one method at several noise intensities.
+
+    Attributes
+    ----------
+    method : str
+    event : str
+        What counts as an exit, as in `ExitRate`.
+    intensities : array (count,)
+        D (m² s⁻³), descending.
+    log_times, lower, upper : array (count,)
+        ln τ, τ in s, and 95 % intervals.
+    """
+
+    method: str
+    event: str
+    intensities: Array
+    log_times: Array
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def of(cls, rates: Iterable[ExitRate], method: str) -> MeanTimes:
+        """Return the mean times of rates of one state; rates to several targets at one intensity are added.
+
+        Raises
+        ------
+        StructureError
+            There is no rate, or the rates count different events.
+        """
+        groups: dict[float, list[ExitRate]] = {}
+        for rate in sorted(rates, key=lambda rate: -rate.intensity):
+            same = [known for known in groups if abs(math.log(known / rate.intensity)) < _SAME]
+            groups.setdefault(same[0] if same else rate.intensity, []).append(rate)
+        events = {rate.event for group in groups.values() for rate in group}
+        if len(events) != 1:
+            raise StructureError(f"mean times need rates of one event, got {', '.join(sorted(events)) or 'no rate'}.")
+        sums = np.array([log_sum(group) for group in groups.values()])
+        return cls(method, events.pop(), np.array(list(groups)), -sums[:, 0], -sums[:, 2], -sums[:, 1])
+
+    def at(self, intensity: float, energy: ActivationEnergy | None = None) -> LogTime | None:
+        """Return ln τ at a noise intensity; None where it cannot be told.
+
+        Between computed intensities ln τ is interpolated in 1/D, monotonically where there are three or more; the
+        interval contains the difference from a straight line between neighbours. Beyond them, τ = C exp(ΔU/D) with C
+        from the nearest intensity. There the interval contains that of ΔU and a prefactor C that varies with a power of
+        D: with the power that the local slope shows, and with the first power at least.
+
+        Parameters
+        ----------
+        intensity : float
+            D (m² s⁻³).
+        energy : ActivationEnergy, optional
+            ΔU; without it, nothing is known beyond the computed intensities.
+        """
+        places, place = 1.0 / self.intensities, 1.0 / intensity
+        nearest = int(np.argmin(np.abs(np.log(places / place))))
+        if abs(math.log(places[nearest] / place)) < _SAME:
+            value, lower, upper = (float(ends[nearest]) for ends in (self.log_times, self.lower, self.upper))
+            return LogTime(value, lower, upper, intensity, (self.method,), extrapolated=False)
+        if places[0] < place < places[-1]:
+            return LogTime(*self._between(place), intensity, (self.method,), extrapolated=False)
+        if energy is None:
+            return None
+        return LogTime(*self._beyond(nearest, place, energy), intensity, (self.method,), extrapolated=True)
+
+    @property
+    def slopes(self) -> Array:
+        """Local slopes d ln τ/d(1/D) between neighbouring intensities (m² s⁻³), shape (count − 1,)."""
+        slopes: Array = np.diff(self.log_times) / np.diff(1.0 / self.intensities)
+        return slopes
+
+    def _between(self, place: float) -> tuple[float, float, float]:
+        places = 1.0 / self.intensities
+        straight = float(np.interp(place, places, self.log_times))
+        curved = float(PchipInterpolator(places, self.log_times)(place)) if len(places) > 2 else straight
+        bend = abs(curved - straight)
+        below, above = (
+            float(np.interp(place, places, np.abs(ends - self.log_times))) for ends in (self.lower, self.upper)
+        )
+        return curved, curved - below - bend, curved + above + bend
+
+    def _beyond(self, nearest: int, place: float, energy: ActivationEnergy) -> tuple[float, float, float]:
+        from_here = 1.0 / float(self.intensities[nearest])
+        far = place - from_here
+        power = 1.0
+        if len(self.intensities) > 1:
+            slope = float(self.slopes[0 if nearest == 0 else -1])
+            power = max(power, abs(slope - energy.value) * from_here)
+        drift = power * abs(math.log(place / from_here))
+        value = float(self.log_times[nearest]) + energy.value * far
+        ends = sorted((far * (energy.lower - energy.value), far * (energy.upper - energy.value)))
+        lower, upper = float(self.lower[nearest]), float(self.upper[nearest])
+        return value, lower + energy.value * far + ends[0] - drift, upper + energy.value * far + ends[1] + drift
+
+
+def most_certain(
+    known: Sequence[MeanTimes], intensity: float, energy: ActivationEnergy | None = None
+) -> LogTime | None:
+    """Return ln τ by the method with the narrowest interval; None where no method tells it.
+
+    A method that computed rates on both sides of D is preferred to one that did not. An interval that contradicts the
+    narrowest one is added to it: then the methods disagree, and the interval has to say so.
+    """
+    found = [one for times in known if (one := times.at(intensity, energy)) is not None]
+    if not found:
+        return None
+    known_best = [one for one in found if not one.extrapolated] or found
+    best = min(known_best, key=lambda one: one.upper - one.lower)
+    others = [one for one in known_best if one.lower > best.upper or one.upper < best.lower]
+    return dataclasses.replace(
+        best,
+        lower=min(one.lower for one in (best, *others)),
+        upper=max(one.upper for one in (best, *others)),
+        methods=tuple(method for one in (best, *others) for method in one.methods),
+    )
+
+
+def intensity_for(
+    known: Sequence[MeanTimes], log_time: float, energy: ActivationEnergy | None = None
+) -> tuple[LogTime, float, float] | None:
+    """Return what is known at the noise intensity at which ln τ is `log_time`, and bounds of that intensity.
+
+    None if no intensity gives that mean time within what the methods and the energy tell.
+    """
+
+    def excess(log_intensity: float, end: str) -> float:
+        found = most_certain(known, math.exp(log_intensity), energy)
+        return math.nan if found is None else float(getattr(found, end)) - log_time
+
+    def crossing(start: float, end: str, step: float) -> float | None:
+        """ln of the nearest intensity from a start at which an end of the interval is `log_time`."""
+        first = excess(start, end)
+        for number in range(math.ceil(_FARTHEST / abs(step))):
+            low, high = start + number * step, start + (number + 1) * step
+            if not excess(high, end) * first > 0:
+                known_there = not math.isnan(excess(high, end))
+                return float(brentq(excess, low, high, args=(end,))) if known_there else None
+        return None
+
+    computed = np.log(np.unique(np.concatenate([times.intensities for times in known])))
+    start = float(computed[np.argmin([abs(excess(one, "value")) for one in computed])])
+    value = crossing(start, "value", _STEP if excess(start, "value") > 0 else -_STEP)
+    if value is None:
+        return None
+    found = most_certain(known, math.exp(value), energy)
+    assert found is not None
+    lower, upper = crossing(value, "lower", -_STEP), crossing(value, "upper", _STEP)
+    return found, 0.0 if lower is None else math.exp(lower), math.inf if upper is None else math.exp(upper)
+
+
+def log_sum(rates: Sequence[ExitRate]) -> tuple[float, float, float]:
+    """Return ln of the sum of rates with independent errors, and its interval."""
+    logs = np.array([rate.log_value for rate in rates])
+    total = float(logsumexp(logs))
+    widths = np.array([[rate.log_value - rate.log_lower, rate.log_upper - rate.log_value] for rate in rates])
+    halves = widths.mean(axis=1, keepdims=True)  # for an interval that does not hold its value
+    widths = np.where(widths.min(axis=1, keepdims=True) < 0, halves, widths)
+    below, above = np.linalg.norm(np.exp(logs - total)[:, None] * widths, axis=0).tolist()
+    return total, total - below, total + above

@@ -1,0 +1,164 @@
+"""An assessment as text and as plain data: the answers first, then whether the methods agree, then what is open."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from vibrokit.assessment.answers import Answer
+from vibrokit.assessment.assessment import Assessment
+from vibrokit.comparison.tables import agreement_text, verdicts_text
+from vibrokit.errors import StructureError
+from vibrokit.report.data import findings_data, plain, run_data
+from vibrokit.report.text import findings_text
+from vibrokit.results.codes import Severity
+from vibrokit.results.energy import bounds_text
+from vibrokit.results.finding import Finding
+from vibrokit.results.labels import goal_name
+from vibrokit.text_table import text_table
+
+
+@dataclasses.dataclass(frozen=True)
+class Question:
+    """What a user asks beside how long each state lasts at the scene's noise.
+
+    Attributes
+    ----------
+    mean_time : str or None
+        A mean time that each state has to last, such as ``"1 yr"``.
+    within : str or None
+        A time within which a state may be left.
+    """
+
+    mean_time: str | None = None
+    within: str | None = None
+
+
+def assessment_text(title: str, one: Assessment, question: Question = Question()) -> str:
+    """Return the answers, the verdicts on the methods, and what is left open."""
+    heading = title if one.complete else f"{title} (incomplete)"
+    sections = [heading, states_text(one), *_questions(one, question), trust_text(one)]
+    parts = {"states": one.structure.findings, **{name: part.findings for name, part in one.results.items()}}
+    sections += [
+        _open_text(name, findings, one.names) for name, findings in {**parts, "assessment": one.findings}.items()
+    ]
+    return "\n\n".join(section for section in sections if section) + f"\n\n{one.seconds:.1f} s."
+
+
+def _open_text(name: str, findings: Sequence[Finding], names: Sequence[str]) -> str:
+    """What limits the numbers, each sentence once; what only explains them is in the records."""
+    serious = [finding for finding in findings if finding.severity is not Severity.INFO]
+    text = findings_text(list({finding.sentence(names): finding for finding in serious}.values()), names)
+    return f"{name}:\n{text}" if text else ""
+
+
+def states_text(one: Assessment) -> str:
+    """Return a line for each state: its share of time, how long it lasts, and its activation energy."""
+    if not one.names:
+        return "No steady state was found."
+    shares = _shares(one)
+    rows: list[tuple[str, ...]] = [
+        ("state", "share of time", "mean time until it is left", "by", "ΔU (m² s⁻³)", "bounds", "to")
+    ]
+    for label, name in enumerate(one.names):
+        rows.append((name, shares[label], *_lasting(one, label), *_barrier(one, label)))
+    head = f"At D = {one.intensity:g} m² s⁻³, a PSD of {2 * one.intensity:g} (m/s²)²/Hz:"
+    return "\n".join([head, *text_table(rows)])
+
+
+def trust_text(one: Assessment) -> str:
+    """Return whether the methods agree; nothing if there is nothing to compare."""
+    try:
+        found = one.reconciliation
+    except StructureError as error:
+        return f"The methods could not be compared: {error}" if one.results else ""
+    return f"{agreement_text(found)}\n{verdicts_text(found)}".strip()
+
+
+def assessment_data(one: Assessment, question: Question = Question()) -> dict[str, Any]:
+    """Return the answers, verdicts and all numbers behind them as JSON has them."""
+    asked: dict[str, list[Any]] = {"mean_times": _each(one, one.mean_time)}
+    if question.within is not None:
+        within = question.within
+        asked["probabilities_of_leaving"] = _each(one, lambda label: one.probability_of_leaving(label, within))
+    if question.mean_time is not None:
+        wanted = question.mean_time
+        asked["allowed_intensities"] = _each(one, lambda label: one.allowed_intensity(label, wanted))
+    found = run_data(one.structure, one.results)
+    found["findings"] += findings_data("assessment", one.findings, one.names)
+    return plain(
+        {"intensity": one.intensity, "complete": one.complete, **asked, "occupancies": _share_data(one), **found}
+    )
+
+
+def _questions(one: Assessment, question: Question) -> list[str]:
+    """Answers to what was asked, for each state."""
+    asked: list[Callable[[int], Answer]] = []
+    if question.within is not None:
+        within = question.within
+        asked.append(lambda label: one.probability_of_leaving(label, within))
+    if question.mean_time is not None:
+        wanted = question.mean_time
+        asked.append(lambda label: one.allowed_intensity(label, wanted))
+    return ["\n".join(_answered(answer, label) for label in range(len(one.names))) for answer in asked]
+
+
+def _answered(answer: Callable[[int], Answer], label: int) -> str:
+    try:
+        return str(answer(label))
+    except StructureError as error:
+        return str(error)
+
+
+def _shares(one: Assessment) -> list[str]:
+    try:
+        found = one.occupancy()
+    except StructureError:
+        return ["not known" for _ in one.names]
+    texts = []
+    for share, name in zip(found, one.names, strict=True):
+        state = str(share["state"].item())
+        interval = f"({float(share['lower']):.2g} to {float(share['upper']):.2g})"
+        texts.append(f"{float(share):.3g} {interval}" if state == name else f"with {state}")
+    return texts
+
+
+def _lasting(one: Assessment, label: int) -> Sequence[str]:
+    try:
+        found = one.mean_time(label)
+    except StructureError:
+        return "not known", "–"
+    remarks = ["extrapolated"] * found.extrapolated + ["left before it has formed"] * (not found.metastable)
+    return found.number, ", ".join([" and ".join(found.methods), *remarks])
+
+
+def _barrier(one: Assessment, label: int) -> Sequence[str]:
+    try:
+        found = one.energy(label)
+    except StructureError:
+        return "not known", "–", "–"
+    return f"{found.value:.6g}", f"{bounds_text(found)} ({found.bound})", goal_name(one.names, found.target)
+
+
+def _each(one: Assessment, answer: Callable[[int], Answer]) -> list[dict[str, Any]]:
+    """An answer for each state that has one."""
+    found = []
+    for label, name in enumerate(one.names):
+        try:
+            found.append({"state": name, **dataclasses.asdict(answer(label))})
+        except StructureError:
+            continue
+    return found
+
+
+def _share_data(one: Assessment) -> list[dict[str, Any]]:
+    try:
+        found = one.occupancy()
+    except StructureError:
+        return []
+    names = ("state", "lower", "upper")
+    return [
+        {"attractor": name, "value": float(share), **{key: share[key].item() for key in names}}
+        for share, name in zip(found, one.names, strict=True)
+    ]
