@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from vibrokit.analyzers.shooting.shooting import Shooting as Shooting
     from vibrokit.assessment.assess import assess as assess
     from vibrokit.assessment.assessment import Assessment as Assessment
+    from vibrokit.assessment.plausibility import plausibility as plausibility
     from vibrokit.comparison.occupancies import occupancies as occupancies
     from vibrokit.comparison.reconcile import reconcile as reconcile
     from vibrokit.comparison.reconciliation import Reconciliation as Reconciliation
@@ -95,6 +96,7 @@ _MODULES = {
     "Shooting": "vibrokit.analyzers.shooting.shooting",
     "assess": "vibrokit.assessment.assess",
     "Assessment": "vibrokit.assessment.assessment",
+    "plausibility": "vibrokit.assessment.plausibility",
     "occupancies": "vibrokit.comparison.occupancies",
     "reconcile": "vibrokit.comparison.reconcile",
     "Reconciliation": "vibrokit.comparison.reconciliation",

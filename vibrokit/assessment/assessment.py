@@ -12,6 +12,7 @@ import xarray
 
 from vibrokit.assessment.answers import AllowedIntensity, Answer, MeanTime, exponential
 from vibrokit.assessment.durations import seconds_in
+from vibrokit.assessment.plausibility import Plausibility, plausibility
 from vibrokit.comparison.mean_times import LogTime, MeanTimes, intensity_for, most_certain
 from vibrokit.comparison.occupancies import Balance, shares_over
 from vibrokit.comparison.reconcile import reconcile
@@ -62,6 +63,11 @@ class Assessment(Record):
     def period(self) -> float:
         """Forcing period, or 2π/ω_n without forcing (s)."""
         return self.oscillator.section_interval
+
+    @cached_property
+    def plausibility(self) -> Plausibility:
+        """What closed forms say of the scene, and which numbers are odd; see `vibrokit.plausibility`."""
+        return plausibility(self.oscillator)
 
     @cached_property
     def reconciliation(self) -> Reconciliation:

@@ -52,6 +52,7 @@ def assess_scene(options: argparse.Namespace) -> int:
     from vibrokit.analyzers.settings import named_exit
     from vibrokit.assessment.assess import TIME_LIMIT, Request, improving
     from vibrokit.assessment.durations import seconds_in
+    from vibrokit.assessment.plausibility import plausibility
     from vibrokit.progress import working
     from vibrokit.report.assessment import Question
     from vibrokit.results.finding import Finding
@@ -74,6 +75,8 @@ def assess_scene(options: argparse.Namespace) -> int:
         osc, accuracy=options.accuracy, time_limit=limit or None, methods=options.method, source=source,
         exit=LeaveBasin() if options.exit is None else named_exit(options.exit), rng=options.seed, executor=None,
     )  # fmt: skip
+    if not options.json:
+        print(f"{plausibility(osc)}\n", flush=True)
     last: Assessment | None = None
     with Interrupts() as interrupts:
         with working(True, request.time_limit) as work:

@@ -114,12 +114,6 @@ class MeanTimes:
             return None
         return LogTime(*self._beyond(nearest, place, energy), intensity, (self.method,), extrapolated=True)
 
-    @property
-    def slopes(self) -> Array:
-        """Local slopes d ln τ/d(1/D) between neighbouring intensities (m² s⁻³), shape (count − 1,)."""
-        slopes: Array = np.diff(self.log_times) / np.diff(1.0 / self.intensities)
-        return slopes
-
     def _between(self, place: float) -> tuple[float, float, float]:
         places = 1.0 / self.intensities
         straight = float(np.interp(place, places, self.log_times))
@@ -135,13 +129,13 @@ class MeanTimes:
         far = place - from_here
         power = 1.0
         if len(self.intensities) > 1:
-            slope = float(self.slopes[0 if nearest == 0 else -1])
-            power = max(power, abs(slope - energy.value) * from_here)
+            ends = slice(0, 2) if nearest == 0 else slice(-2, None)
+            (near, next_), (one, other) = 1.0 / self.intensities[ends], self.log_times[ends]
+            power = max(power, abs((other - one - energy.value * (next_ - near)) / math.log(next_ / near)))
         drift = power * abs(math.log(place / from_here))
-        value = float(self.log_times[nearest]) + energy.value * far
-        ends = sorted((far * (energy.lower - energy.value), far * (energy.upper - energy.value)))
-        lower, upper = float(self.lower[nearest]), float(self.upper[nearest])
-        return value, lower + energy.value * far + ends[0] - drift, upper + energy.value * far + ends[1] + drift
+        less, more = sorted((far * energy.lower, far * energy.upper))
+        value, lower, upper = (float(known[nearest]) for known in (self.log_times, self.lower, self.upper))
+        return value + far * energy.value, lower + less - drift, upper + more + drift
 
 
 def most_certain(
