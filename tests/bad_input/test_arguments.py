@@ -132,6 +132,7 @@ def users_functions():
     """Public functions, and the methods that users call with arguments."""
     classes = [vk.Oscillator, vk.Analyzer, vk.Transitions, vk.StationaryDensity, vk.Record]
     classes += [kind for one in map(vars(vk).get, vk.__all__) if inspect.isclass(one) for kind in one.__subclasses__()]
+    classes = [kind for kind in classes if kind.__module__.startswith("vibrokit.")]
     for name in vk.__all__:
         if inspect.isfunction(getattr(vk, name)):
             yield name, getattr(vk, name)
@@ -144,6 +145,8 @@ def users_functions():
 USED = {
     "trajectory", "section_map", "error_estimate", "run", "route", "stationary_weights", "found", "save", "energy",
     "exit_of", "plot", "attractor", "plot_orbits", "plot_paths", "plot_history", "plot_quasi_potential", "changes",
+    "mean_time", "probability_of_leaving", "allowed_intensity", "occupancy", "sensitivities", "table", "shares",
+    "verdicts_of",
 }  # fmt: skip
 
 

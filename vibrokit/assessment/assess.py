@@ -16,6 +16,7 @@ from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.ladder import at_intensities, fitted, ladder
+from vibrokit.construction import called
 from vibrokit.errors import OutOfTime, ParameterError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
@@ -89,6 +90,7 @@ class Request:
         )  # fmt: skip
 
 
+@called
 def assess(
     osc: Oscillator,
     *,

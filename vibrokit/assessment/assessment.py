@@ -18,6 +18,7 @@ from vibrokit.comparison.occupancies import Balance, shares_over
 from vibrokit.comparison.reconcile import reconcile
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.sensitivities import Sensitivity, sensitivities
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.labels import goal_name, goal_of, label_of
@@ -74,6 +75,7 @@ class Assessment(Record):
         """What the methods say of each exit, and whether they agree; see `vibrokit.reconcile`."""
         return reconcile(*self.results.values())
 
+    @called
     def energy(self, source: int | str, target: int | str | None = None) -> ActivationEnergy:
         """Return the activation energy of one exit by the method that proves most; by default of the cheapest exit.
 
@@ -88,6 +90,7 @@ class Assessment(Record):
             raise StructureError(f"no activation energy of {self._leaving(start, end)} is known; give more time.")
         return found
 
+    @called
     def mean_time(
         self, source: int | str, target: int | str | None = None, *, intensity: float | None = None
     ) -> MeanTime:
@@ -126,6 +129,7 @@ class Assessment(Record):
             metastable=not found.value < math.log(METASTABLE * relaxation) if relaxation > 0 else True,
         )
 
+    @called
     def probability_of_leaving(
         self,
         source: int | str,
@@ -162,6 +166,7 @@ class Assessment(Record):
             extrapolated=mean.extrapolated,
         )  # fmt: skip
 
+    @called
     def allowed_intensity(
         self, source: int | str, mean_time: float | str, target: int | str | None = None
     ) -> AllowedIntensity:
@@ -200,6 +205,7 @@ class Assessment(Record):
             methods=found.methods, extrapolated=found.extrapolated,
         )  # fmt: skip
 
+    @called
     def occupancy(self, *, intensity: float | None = None) -> xarray.DataArray:
         """Return the share of time spent in each metastable state, over attractors, with bounds; see `occupancies`.
 
@@ -222,6 +228,7 @@ class Assessment(Record):
         balance = Balance(self.names, logs, lower, upper, relaxations, self._core_shares(at))
         return shares_over([at], [balance])[0]
 
+    @called
     def sensitivities(
         self,
         source: int | str,
@@ -246,6 +253,7 @@ class Assessment(Record):
                 rows.append((name, "is left after a time that is not known"))
         return Summary(f"Assessment at D = {self.intensity:g} m² s⁻³", tuple(rows))
 
+    @called
     def plot(self, ax: Any = None) -> Any:
         """Draw ln τ against 1/D by all methods; see `Reconciliation.plot`."""
         return self.reconciliation.plot(ax)

@@ -10,6 +10,7 @@ from enum import StrEnum
 from vibrokit.assessment.contact_times import contact_time
 from vibrokit.assessment.linear_response import LinearResponse, departure, linear_response
 from vibrokit.assessment.oddities import Oddity, OddityCode
+from vibrokit.construction import called
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.numeric import amplitude_at
@@ -96,6 +97,7 @@ class Plausibility:
         return "\n".join([*(text_table(cells) if cells else []), *map(str, self.oddities)])
 
 
+@called
 def plausibility(osc: Oscillator) -> Plausibility:
     """Return closed forms of a scene: frequencies, linear response, contact times, noise. Nothing is compiled.
 

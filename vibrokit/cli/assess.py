@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vibrokit.cli.interrupts import Interrupts
 from vibrokit.errors import OutOfTime, VibrokitError
 
 if TYPE_CHECKING:
@@ -53,6 +52,7 @@ def assess_scene(options: argparse.Namespace) -> int:
     from vibrokit.assessment.assess import TIME_LIMIT, Request, improving
     from vibrokit.assessment.durations import seconds_in
     from vibrokit.assessment.plausibility import plausibility
+    from vibrokit.cli.interrupts import Interrupts
     from vibrokit.progress import working
     from vibrokit.report.assessment import Question
     from vibrokit.results.finding import Finding

@@ -19,6 +19,7 @@ from vibrokit.comparison.pairs import Side, verdict_of, verdict_of_shares
 from vibrokit.comparison.quantities import OF_EXITS, Kind, Quantity
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.verdicts import Verdict
+from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, shown
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
@@ -29,6 +30,7 @@ _SAME_POINT = 0.01  # of the extent of the region: two searches find one orbit t
 _LARGEST_PERIOD = 64  # points: an orbit has fewer, a sample of chaotic motion more, which no two searches share
 
 
+@called
 def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
     """Compare what several results say of one scene.
 

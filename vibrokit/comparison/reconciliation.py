@@ -9,6 +9,7 @@ import xarray
 
 from vibrokit.comparison.quantities import OF_EXITS, OF_STATES, Kind, Quantity
 from vibrokit.comparison.verdicts import Agreement, Verdict, exit_name
+from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import Number, Whole, Word
@@ -68,6 +69,7 @@ class Reconciliation(Record):
         targets = [target for start, target in self.exits if start == source]
         return targets[0] if len(targets) == 1 else None
 
+    @called
     def table(self, source: int | str, target: int | str | None = None) -> tuple[Quantity, ...]:
         """Return all numbers of one exit, by labels or names.
 
@@ -85,11 +87,13 @@ class Reconciliation(Record):
         wanted = self._exit(source, target)
         return tuple(q for q in self.quantities if (q.source, q.target) == wanted and q.kind not in OF_STATES)
 
+    @called
     def shares(self, source: int | str) -> tuple[Quantity, ...]:
         """Return all numbers on the share of time in one state, by label or name."""
         label = label_of(source, self.names)
         return tuple(q for q in self.quantities if q.source == label and q.kind in OF_STATES)
 
+    @called
     def verdicts_of(self, source: int | str, target: int | str | None = None) -> tuple[Verdict, ...]:
         """Return the verdicts on one exit; arguments and errors as of `table`."""
         wanted = self._exit(source, target)
@@ -119,6 +123,7 @@ class Reconciliation(Record):
 
         return reconciliation_text(self)
 
+    @called
     def plot(self, ax: Any = None) -> ReconciliationArtists:
         """Draw ln τ against 1/D by all methods with a line of slope ΔU; see `vibrokit.plots.exit_times`.
 

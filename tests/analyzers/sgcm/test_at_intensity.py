@@ -11,7 +11,7 @@ from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary
 
 NONE = np.empty((0, 0))
-CORES, POSITION = CoreSets(NONE, {1: NONE}, NONE), CoreSets(NONE, {}, NONE)
+CORES, POSITION = CoreSets(NONE, {1: NONE}, NONE, None), CoreSets(NONE, {}, NONE, -1)
 DENSITY = QuasiStationary(NONE, NONE, {1: -9.0}, NONE, 0.0, 0.3, True, 0.0, 10)  # what it loses is no rate
 
 
