@@ -8,7 +8,7 @@ import pytest
 import scipy.integrate
 
 import vibrokit as vk
-from vibrokit.results.basins import ESCAPED
+from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
 
 QUICK = vk.LeastAction(shooting=None, graph=vk.GraphSearch(nodes=(60, 60)))
@@ -65,7 +65,7 @@ def test_a_pendulum_has_one_rest_that_is_left_over_the_lower_barrier(push):
     assert energy.target == ESCAPED
 
 
-def test_cells_of_a_pendulum_escape_if_they_end_in_another_well():
+def test_cells_of_a_pendulum_have_a_label_of_their_own_if_they_end_in_another_well():
     _, structure = pendulum(0.0)
     centres = structure.basins.region.cell_centres(structure.basins.labels.shape)
     labels = structure.basins.labels.ravel()
@@ -75,7 +75,7 @@ def test_cells_of_a_pendulum_escape_if_they_end_in_another_well():
             lambda _, z: (z[1], -2 * DAMPING * z[1] - math.sin(z[0])), (0, 100), state, method="DOP853", rtol=1e-9
         )  # fmt: skip
         assert (label == 0) == (abs(motion.y[0, -1]) < math.pi)
-    assert set(labels.tolist()) == {0, ESCAPED}
+    assert set(labels.tolist()) == {0, AT_COPY}
 
 
 def test_a_region_keeps_all_wells_of_a_pendulum():

@@ -210,3 +210,55 @@ def test_rates_between_two_poles_agree():
     values = np.array([rate.value for rate in rates])
     errors = np.array([math.log(rate.upper / rate.lower) for rate in rates])  # two standard errors or more
     assert (np.abs(np.log(values / values.mean())) < errors.max()).all()
+
+
+def shaken(formula, **values):
+    """In units of the gap and 1/ω_n, with a weak force beside the rest."""
+    return vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring(formula, **values),
+        excitations=(vk.Harmonic(0.01, 0.8),),
+    )  # fmt: skip
+
+
+def settled(spring):
+    """State of the forced motion from rest after 30 periods, by SciPy; (1 − x)² = b/x has a root at 1.204 as well."""
+    period = 2 * math.pi / 0.8
+
+    def rates(t, y):
+        return [y[1], -0.2 * y[1] - spring(y[0]) + 0.01 * math.cos(0.8 * t)]
+
+    return solve_ivp(rates, (0.0, 30 * period), (0.0, 0.0), rtol=1e-11, atol=1e-13).y[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("formula", "values", "spring", "borders"),
+    [
+        ("x - b/(1-x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2, (-math.inf, 1.0)),
+        pytest.param(
+            "x + b/(1+x)**2", {"b": 0.05}, lambda x: x + 0.05 / (1 + x) ** 2, (-1.0, math.inf), marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "x - b/(1-x)**2 + b/(1+x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2 + 0.05 / (1 + x) ** 2,
+            (-1.0, 1.0), marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "x - b/sqrt(1-x)", {"b": 0.2}, lambda x: x - 0.2 / math.sqrt(1 - x), (-math.inf, 1.0),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)  # fmt: skip
+def test_a_weak_force_shows_nothing_behind_a_border(formula, values, spring, borders):
+    found = vk.find_structure(shaken(formula, **values), **COARSE)
+    (attractor,) = found.attractors
+    assert attractor.points[0] == pytest.approx(settled(spring), abs=1e-8)
+    assert borders[0] <= found.basins.region.x[0] < found.basins.region.x[1] <= borders[1]
+    assert found.saddles
+    assert all(set(saddle.leads_to) == {0, ESCAPED} for saddle in found.saddles)
+
+
+@pytest.mark.slow
+def test_motion_behind_the_pole_is_found_in_a_region_there():
+    found = vk.find_structure(shaken("x - b/(1-x)**2", b=0.05), region=((1.05, 1.5), (-0.3, 0.3)), **COARSE)
+    (attractor,) = found.attractors
+    assert attractor.points[0, 0] == pytest.approx(1.2046, abs=1e-3)
+    assert not found.found(Code.REGION_TOO_SMALL)

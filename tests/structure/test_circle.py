@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import vibrokit as vk
-from vibrokit.results.basins import ESCAPED
+from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.structure.circle import turn_of
 
@@ -98,6 +99,39 @@ def test_without_running_states_copies_are_escape():
     assert not found.circle
     assert ESCAPED in {label for saddle in found.saddles for label in saddle.leads_to}
     assert found.found(Code.SHIFTED_COPIES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("push", "tone", "region"),
+    [(0.5, 0.0, None), (-0.4, 0.0, ((-math.pi, math.pi), (-6.0, 6.0))), (0.0, 0.3, None)],
+    ids=["default region", "one turn", "forced"],
+)
+def test_motion_that_ends_at_a_copy_has_not_escaped(push, tone, region, tmp_path):
+    """Damping 0.6 lets nothing turn over; where a motion comes to rest, to whole turns, is compared with SciPy."""
+    tones = [vk.Harmonic(tone, 0.8)] if tone else [vk.Constant(push)]
+    found = vk.find_structure(
+        pendulum(*tones, damping=0.6), region=region, cells=(60, 60), starts=(8, 8), manifolds=False
+    )  # fmt: skip
+    (rest,), basins = found.attractors, found.basins
+    assert basins.fraction(ESCAPED) == 0.0
+    assert 0.2 < basins.fraction(AT_COPY) == pytest.approx(1.0 - rest.basin_fraction, abs=1e-12)
+    assert not found.found(Code.CELLS_LEFT_REGION)
+    assert found.found(Code.CELLS_AT_COPIES)[0].values["fraction"] == basins.fraction(AT_COPY)
+    assert {ESCAPED, 0} == set(found.saddles[0].leads_to)
+    found.save(tmp_path / "copies.nc")
+    assert np.array_equal(vk.load_result(tmp_path / "copies.nc").basins.labels, basins.labels)
+
+    def rates(t, y):
+        return [y[1], -0.6 * y[1] - math.sin(y[0]) + push + tone * math.cos(0.8 * t)]
+
+    duration = 12 * 2 * math.pi / 0.8
+    places = np.random.default_rng(1).choice(basins.region.cell_centres((60, 60)), 40, replace=False)
+    ends = [solve_ivp(rates, (0.0, duration), place, rtol=1e-8, atol=1e-8).y[0, -1] for place in places]
+    turns = (np.array(ends) - rest.points[0, 0]) / (2 * math.pi)
+    assert np.abs(turns - np.rint(turns)).max() < 1e-2
+    agree = (np.rint(turns) == 0) == (basins.at(places) == 0)
+    assert agree.sum() >= 39  # a cell on the boundary may have another label than its centre
 
 
 @pytest.mark.slow

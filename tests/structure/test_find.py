@@ -5,7 +5,7 @@ from scipy.optimize import fsolve
 
 import vibrokit as vk
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.grid import cell_findings
@@ -193,10 +193,10 @@ def test_what_escapes_is_said_to_have_left():
 
 
 def test_cells_without_an_attractor_are_findings():
-    labels = np.array([[0, 1, ESCAPED, ESCAPED], [0, UNSETTLED, 0, 0]], dtype=np.int16)
+    labels = np.array([[0, 1, ESCAPED, ESCAPED], [AT_COPY, UNSETTLED, 0, 0]], dtype=np.int16)
     found = cell_findings(Basins(Region((0, 1), (0, 1)), labels))
     assert {finding.code: finding.values["fraction"] for finding in found} == {
-        Code.CELLS_UNSETTLED: 1 / 8, Code.CELLS_LEFT_REGION: 2 / 8,
+        Code.CELLS_UNSETTLED: 1 / 8, Code.CELLS_LEFT_REGION: 2 / 8, Code.CELLS_AT_COPIES: 1 / 8,
     }  # fmt: skip
     assert cell_findings(Basins(Region((0, 1), (0, 1)), np.zeros((3, 2), dtype=np.int16))) == ()
 

@@ -10,7 +10,7 @@ from vibrokit.kernels.ensemble import UNBOUNDED, run_ensemble
 from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED
+from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.structure import Structure
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 def escapes(structure: Structure) -> bool:
     """Whether motion without noise escapes from the region of a structure, from a saddle or from any cell."""
     leaves = any(ESCAPED in saddle.leads_to for saddle in structure.saddles)
-    return leaves or bool((structure.basins.labels == ESCAPED).any())
+    return leaves or bool((structure.basins.exits == ESCAPED).any())
 
 
 def escape_faces(osc: Oscillator, structure: Structure, attractor: Attractor) -> Array:
@@ -39,7 +39,7 @@ def escape_faces(osc: Oscillator, structure: Structure, attractor: Attractor) ->
     faces = UNBOUNDED.copy()
     low, high = osc.model.domain.around(float(attractor.points[0, 0]))
     centres = structure.region.cell_centres(structure.basins.labels.shape)
-    labels = np.where((centres[:, 0] > low) & (centres[:, 0] < high), structure.basins.labels.ravel(), ESCAPED - 1)
+    labels = np.where((centres[:, 0] > low) & (centres[:, 0] < high), structure.basins.exits.ravel(), UNSETTLED)
     outgoing = _some(centres[labels == ESCAPED])
     if structure.circle or not len(outgoing):
         return faces

@@ -192,7 +192,7 @@ class LeaveBasin(Exit):
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the basin grid."""
         basins, reached = structure.basins, [attractor.label for attractor in self.targets(structure, source)]
-        labels = np.where((basins.labels < 0) | np.isin(basins.labels, reached), basins.labels, source)
+        labels = np.where((basins.labels < 0) | np.isin(basins.labels, reached), basins.exits, source)
         return Stop().with_cells(basins.region.bounds, labels, home=source)
 
     def path_ends(self, osc: Oscillator, structure: Structure, source: int) -> tuple[PathEnd, ...]:

@@ -21,8 +21,9 @@ from vibrokit.plots.clipping import clipped
 Style = dict[str, Any]
 
 # Labels of cells that lead to no attractor, as `vibrokit.results.basins` has them, and how they look.
-UNSETTLED, ESCAPED, NOT_FOLLOWED = -1, -2, -3
+UNSETTLED, ESCAPED, NOT_FOLLOWED, AT_COPY = -1, -2, -3, -4
 _GREY, _DARK, _CLEAR = (0.8, 0.8, 0.8, 1.0), (0.42, 0.42, 0.42, 1.0), (1.0, 1.0, 1.0, 0.0)
+_PAPER = (0.96, 0.93, 0.86, 1.0)
 _HATCH: Style = {"facecolor": "white", "edgecolor": "0.72", "hatch": "////", "linewidth": 0}
 _PALE = 0.35
 _DENSE = 20_000  # points of a curve above which it is drawn as pixels
@@ -129,8 +130,8 @@ def basin_map(
         cells.T,
         origin="lower",
         extent=(x_low, x_high, v_low, v_high),
-        cmap=ListedColormap([_DARK, _CLEAR, _GREY, *pale]),
-        vmin=NOT_FOLLOWED - 0.5,
+        cmap=ListedColormap([_PAPER, _DARK, _CLEAR, _GREY, *pale]),
+        vmin=AT_COPY - 0.5,
         vmax=len(points) - 0.5,
         aspect="auto",
         interpolation="nearest",
@@ -234,6 +235,7 @@ def cell_samples(cells: NDArray[Any]) -> list[Patch]:
     samples = (
         (UNSETTLED, {"facecolor": _GREY}, "not settled"),
         (ESCAPED, _HATCH, "leaves the region"),
+        (AT_COPY, {"facecolor": _PAPER}, "copy, turns away"),
         (NOT_FOLLOWED, {"facecolor": _DARK}, "not followed"),
     )
     return [

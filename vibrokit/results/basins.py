@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,18 @@ from vibrokit.results.region import Region, centres
 if TYPE_CHECKING:
     from vibrokit.results.attractor import Attractor
 
+Whole = TypeVar("Whole", bound=np.signedinteger[Any])
+
 UNSETTLED = -1
 """Label of cells whose motion is in the region and had reached no attractor within the budget."""
 ESCAPED = -2
 """Label of cells whose motion was outside the region at the end of the budget, or diverged."""
 NOT_FOLLOWED = -3
 """Label of cells that were not followed, because the work was stopped."""
+AT_COPY = -4
+"""Label of cells whose motion came to a copy of an attractor, whole turns away, where x is not taken modulo a turn."""
 
-_OTHERS = {NOT_FOLLOWED: "not_followed", ESCAPED: "left_region", UNSETTLED: "unsettled"}
+_OTHERS = {AT_COPY: "at_copy", NOT_FOLLOWED: "not_followed", ESCAPED: "left_region", UNSETTLED: "unsettled"}
 _AXES = {"x": ("displacement", "m"), "v": ("velocity", "m s-1")}
 
 
@@ -36,7 +40,8 @@ class Basins:
     ----------
     region : Region
     labels : int16 array (nx, nv)
-        Label of the attractor that each cell's centre leads to; UNSETTLED, ESCAPED or NOT_FOLLOWED if it leads to none.
+        Label of the attractor that each cell's centre leads to; UNSETTLED, ESCAPED, NOT_FOLLOWED or AT_COPY if it
+        leads to none.
     """
 
     region: Region
@@ -45,6 +50,11 @@ class Basins:
     def fraction(self, label: int) -> float:
         """Share of the cells with a label."""
         return float(np.mean(self.labels == label))
+
+    @property
+    def exits(self) -> NDArray[np.int16]:
+        """The labels by which motion leaves a basin: ESCAPED too where it comes to a copy."""
+        return exits_of(self.labels)
 
     def at(self, states: NDArray[np.float64], every: int = 1) -> NDArray[np.int16]:
         """Return the label of the cell in which each state (…, 2) is; UNSETTLED outside the region.
@@ -66,6 +76,11 @@ class Basins:
 
     def __repr__(self) -> str:
         return f"Basins: {' × '.join(map(str, self.labels.shape))} cells on {self.region}"
+
+
+def exits_of(labels: NDArray[Whole]) -> NDArray[Whole]:
+    """Return labels with ESCAPED in place of AT_COPY: what leaves a basin for a copy of an attractor has left it."""
+    return np.where(labels == AT_COPY, ESCAPED, labels).astype(labels.dtype)
 
 
 def region_variables(region: Region) -> dict[str, Variable]:
@@ -112,7 +127,7 @@ def grid_variables(labels: NDArray[np.int16], region: Region, names: Sequence[st
 def read_grid(arrays: Arrays, attractors: int) -> tuple[Region, NDArray[np.int16]]:
     """Return the region and the labels of its cells; raises ResultFileError."""
     highest = min(attractors - 1, int(np.iinfo(np.int16).max))
-    labels = arrays.wholes("basin", (None, None), NOT_FOLLOWED, highest)
+    labels = arrays.wholes("basin", (None, None), min(_OTHERS), highest)
     if labels.size == 0:
         raise ResultFileError("its array 'basin' is empty")
     return read_region(arrays), np.ascontiguousarray(labels.T, dtype=np.int16)

@@ -64,7 +64,7 @@ class Code(StrEnum):
     SHIFTED_COPIES = (
         "shifted-copies", INFO,
         "A shift by {shift:.6g} m along x leaves the motion unchanged. Of attractors that differ by such shifts, those "
-        "in the region are kept; motion that ends at a copy elsewhere has left the region.",
+        "in the region are kept; motion that ends at a copy elsewhere is counted apart.",
         "Give a wider region to keep more of them.",
     )  # fmt: skip
     ON_CIRCLE = (
@@ -120,6 +120,10 @@ class Code(StrEnum):
     CELLS_LEFT_REGION = (
         "cells-left-region", INFO, "{fraction:.2%} of the cells escaped from the region.",
         "Widen the region if this matters.",
+    )  # fmt: skip
+    CELLS_AT_COPIES = (
+        "cells-at-copies", INFO, "{fraction:.2%} of the cells lead to copies of steady states, whole turns away.",
+        "Give a wider region to tell the copies apart.",
     )  # fmt: skip
     CELLS_NOT_FOLLOWED = (
         "cells-not-followed", WARNING, "{fraction:.2%} of the cells were not followed.", "Run it again with more time.",

@@ -53,6 +53,12 @@ def apart(osc: Oscillator, one: float, other: float) -> bool:
     return osc.model.domain.around(one) != osc.model.domain.around(other)
 
 
+def connected(osc: Oscillator, region: Region, place: float) -> bool:
+    """Return whether motion from a region may come to a place (m): some of the region is in the same interval."""
+    low, high = osc.model.domain.around(place)
+    return low <= place <= high and low < region.x[1] and region.x[0] < high
+
+
 def intervals_within(osc: Oscillator, low: float, high: float) -> list[tuple[float, float]]:
     """Return the parts of a range of x (m) between borders; those that end at a border end a little before it."""
     found = []

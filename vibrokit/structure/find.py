@@ -56,7 +56,7 @@ def find_structure(
         Where to search; by default a region that contains the steady states and the stops with a margin around them,
         and, if the force of the spring repeats along x, as that of a pendulum does, one copy of each steady state. If
         some motion turns over and over, the region is one turn wide, and x is taken modulo a turn; so it is in a given
-        region that is no wider. Otherwise, motion that ends at a copy of an attractor elsewhere has left the region.
+        region that is no wider. Otherwise, motion that ends at a copy of an attractor elsewhere is counted apart.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
         are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map. The number

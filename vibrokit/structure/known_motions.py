@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.region import Region
+from vibrokit.structure.borders import connected
 from vibrokit.structure.harmonic_balance import SteadyForce, balances_of, tones_of
 from vibrokit.structure.scales import length_of, states_at
 
@@ -19,17 +21,18 @@ _BEYOND = 1.01  # of the distance to a stop: amplitude of the motion that touche
 Array = NDArray[np.float64]
 
 
-def known_motions(osc: Oscillator) -> Array:
+def known_motions(osc: Oscillator, region: Region) -> Array:
     """Return states (count, n) on the section from which motion that is known in closed form starts.
 
     They are the linear response about each rest to all tones together, the same response grown or shrunk until it just
-    touches a stop, and the motions of harmonic balance.
+    touches a stop, and the motions of harmonic balance. Those beyond a border of the forces, where no motion from the
+    region comes, are left out.
     """
     length, steady = length_of(osc), SteadyForce(osc)
     starts = [one.start for one in balances_of(osc, length)]
     for rest in steady.rests(length):
         starts += _responses(osc, steady, rest)
-    return states_at(osc, np.array(starts).reshape(-1, 2))
+    return states_at(osc, np.array([start for start in starts if connected(osc, region, start[0])]).reshape(-1, 2))
 
 
 def _responses(osc: Oscillator, steady: SteadyForce, rest: float) -> list[tuple[float, float]]:

@@ -22,7 +22,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.survival import Survival
-from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering
+from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering, is_cycle
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.wells import wells
@@ -95,7 +95,7 @@ class Search:
                 for rest in self.at_rest:
                     self._add_orbit(rest.point, 1)
             else:
-                for start in known_motions(self.osc):
+                for start in known_motions(self.osc, self.region):
                     self._add_orbit(start, 1)
             for periods in _rounds(wait):
                 states = self.unsettled = self._add_orbits(self._after(states, periods), LONGEST_PERIOD)
@@ -192,6 +192,8 @@ class Search:
         points = visited(self.osc, orbit, stepper)
         if not same_point(self.osc, point, points, _REACH):
             return False
+        if is_cycle(self.osc, orbit, stepper):
+            return False  # its own duration is unknown here; see `_add_cycles`
         if not self._known(orbit.point, EQUAL):
             self.attractors.append(describe_orbit(self.osc, orbit, stepper))
         return same_point(self.osc, point, points, _NEAR)
@@ -221,7 +223,8 @@ class Search:
                 break
         if cycle is None:
             return False
-        if np.sort(np.abs(cycle.multipliers))[-2:][0] >= 1:
+        along = int(np.argmin(np.abs(cycle.multipliers - 1.0)))  # 1, up to rounding: that of a shift in time
+        if np.abs(np.delete(cycle.multipliers, along)).max() >= 1:
             return False
         if not self._on_cycle(cycle.point):
             self.attractors.append(describe_orbit(self.osc, cycle, self.orbit_stepper))

@@ -148,7 +148,7 @@ class Shooter:
         if not self.problem.ends_by_escape:
             return stop
         return dataclasses.replace(
-            stop, labels=np.where(known.basins.labels == ESCAPED, len(known.attractors), stop.labels)
+            stop, labels=np.where(known.basins.exits == ESCAPED, len(known.attractors), stop.labels)
         )
 
     def _integrated(self, states: Array, budget: int | Whole, stop: Stop) -> Ensemble:

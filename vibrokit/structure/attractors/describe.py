@@ -39,10 +39,8 @@ Array = NDArray[np.float64]
 
 def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor:
     """Describe a stable orbit or limit cycle, or the equilibrium that an orbit of an autonomous scene rests at."""
-    count = _SAMPLES * max(1, round(orbit.duration / osc.section_interval))
-    path = _path(osc, wrapped(osc, orbit.point), orbit.duration, count, stepper)
-    still = np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max())
-    resting = still and osc.autonomous and orbit.kind != "limit cycle"
+    path = _path_of(osc, orbit, stepper)
+    resting = osc.autonomous and orbit.kind != "limit cycle" and _still(osc, path)
     return _described(
         osc, path, stepper,
         kind="equilibrium" if resting else orbit.kind,
@@ -55,6 +53,11 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
         residual=orbit.residual,
         error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
     )  # fmt: skip
+
+
+def is_cycle(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> bool:
+    """Whether an orbit of an autonomous scene moves: a limit cycle that nearly repeats after section intervals."""
+    return osc.autonomous and not _still(osc, _path_of(osc, orbit, stepper))
 
 
 def describe_wandering(
@@ -97,6 +100,16 @@ def _described(osc: Oscillator, path: Path, stepper: Stepper, *, exponent_error:
         basin_fraction_error=0.0,
         **own,
     )
+
+
+def _path_of(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Path:
+    """Samples along an orbit, so many in a section interval."""
+    count = _SAMPLES * max(1, round(orbit.duration / osc.section_interval))
+    return _path(osc, wrapped(osc, orbit.point), orbit.duration, count, stepper)
+
+
+def _still(osc: Oscillator, path: Path) -> bool:
+    return bool(np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max()))
 
 
 def _path(osc: Oscillator, point: Array, duration: float, count: int, stepper: Stepper) -> Path:

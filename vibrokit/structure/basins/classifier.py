@@ -17,7 +17,7 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, REACHED, 
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins, exits_of
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.landings import Landings, landed
@@ -64,8 +64,8 @@ class BasinClassifier:
     core : Basins, optional
         Cells that classify trajectories which are in them at a section; negative labels for cells that do not.
     circle : bool
-        Whether states a turn apart along x are one, where the force of the spring repeats. If not, a state that leads
-        to a copy of an attractor which is not among the attractors has escaped.
+        Whether states a turn apart along x are one, where the force of the spring repeats. If not, a state may
+        lead to a copy of an attractor that is not among the attractors.
     """
 
     osc: Oscillator
@@ -100,10 +100,12 @@ class BasinClassifier:
         """
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.label(found, states, start_time)
-        return found
+        return exits_of(found)
 
     def label(self, found: Whole, states: Array, start_time: float = 0.0) -> int:
         """Write the labels of states into an array of NOT_FOLLOWED; an interrupt leaves those known so far in it.
+
+        Those of motion that came to a copy of an attractor are AT_COPY.
 
         Returns the number of sections that all of them took together.
         """

@@ -14,7 +14,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
@@ -33,6 +33,7 @@ _FINEST = 2048  # cells along a side of a grid that is refined for an attractor 
 _SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
     UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
+    AT_COPY: Code.CELLS_AT_COPIES,
 }  # fmt: skip
 CELL_CODES = tuple(_WITHOUT_ATTRACTOR.values())
 """Codes of the findings about cells that lead to no attractor."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.ensemble import Stop
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED, UNSETTLED, Basins
+from vibrokit.results.basins import AT_COPY, UNSETTLED, Basins
 from vibrokit.results.region import Region
 from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 
@@ -26,8 +26,8 @@ class Landings:
     """The attractors as motion meets them that is moved back by whole turns to the middle of a region.
 
     Each has an entry for itself where it lies, which the labels of cells are, and entries for its copies in that turn
-    and the two beside it. On the line, motion that comes to a copy of an attractor which is not known has escaped; on
-    the circle, all copies of an attractor are one. Motion that turns over, and motion that never repeats, is the same
+    and the two beside it. On the line, motion may come to a copy that is no known attractor (AT_COPY); on the circle,
+    all copies of an attractor are one. Motion that turns over, and motion that never repeats, is the same
     attractor wherever it is met.
     """
 
@@ -74,7 +74,7 @@ class Landings:
         return self.attractors[self.entries[label][0]]
 
     def labels(self, found: Whole, turns: Whole) -> Whole:
-        """Return the attractors of entries that motion met, after it was moved back by some turns; else ESCAPED."""
+        """Return the attractors of entries that motion met, after it was moved back by some turns; else AT_COPY."""
         pairs, places = np.unique(np.stack([found, turns], axis=1), axis=0, return_inverse=True)
         each = np.array([self._label(*pair) for pair in pairs.tolist()], dtype=np.int64)
         return each[places.reshape(-1)] if len(found) else found
@@ -83,7 +83,7 @@ class Landings:
         label, away = self.entries[entry]
         if not turn_of(self.osc) or self._anywhere(label):
             return label
-        return self._first[label] if self.circle else self._at.get((self._first[label], away + turns), ESCAPED)
+        return self._first[label] if self.circle else self._at.get((self._first[label], away + turns), AT_COPY)
 
     def _anywhere(self, label: int) -> bool:
         return self.attractors[label].turns != 0 or not self.attractors[label].repeats

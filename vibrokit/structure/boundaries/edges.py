@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins, exits_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.circle import shifted, turn_of, turns_to
 from vibrokit.structure.scales import states_at
@@ -222,7 +222,7 @@ class Straddles:
     def _labels(self, states: Array) -> NDArray[np.int64]:
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.sections += self.classifier.label(found, states, self.time)
-        return grouped(found, self.groups)
+        return grouped(exits_of(found), self.groups)
 
     def _widths(self) -> Array:
         return self.classifier.region.apart(self.ends[:, 1], self.ends[:, 0])
@@ -254,7 +254,7 @@ def meeting_cells(basins: Basins, groups: Mapping[int, int] | None = None) -> di
     """
     numbers = np.arange(basins.labels.size).reshape(basins.labels.shape)
     meetings: dict[tuple[int, int], list[tuple[int, int, int]]] = {}
-    every = grouped(basins.labels, groups or {})
+    every = grouped(basins.exits, groups or {})
     for labels, cells in ((every, numbers), (every.T, numbers.T)):
         for row, cell in zip(labels, cells, strict=True):
             known = np.flatnonzero(settled(row))
