@@ -13,7 +13,7 @@ from vibrokit.errors import ArgumentError, shown
 
 
 def real(value: Any) -> float:
-    """Return an argument as a number; NaN for what is none, infinity for one that is too large."""
+    """Return an argument as a float; NaN if it is not a number, infinity if it is too large."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -23,7 +23,7 @@ def real(value: Any) -> float:
 
 
 def members(values: Any) -> tuple[Any, ...] | None:
-    """Return the members of an argument that is a sequence; None for what is none, texts and tables included."""
+    """Return the members of a sequence; None for any other argument, such as a text or a table."""
     if isinstance(values, str | bytes | Mapping):
         return None
     try:

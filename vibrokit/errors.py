@@ -48,7 +48,7 @@ class ResultFileError(VibrokitError, ValueError):
 
 
 class FileError(VibrokitError, OSError):
-    """A file cannot be written."""
+    """A file cannot be written, or there is none."""
 
 
 class NoSuchFileError(FileError, FileNotFoundError):

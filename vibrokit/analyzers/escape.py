@@ -1,4 +1,4 @@
-"""Escape: bounds of x beyond which motion has left a region for good, as motion without noise shows them."""
+"""Escape: bounds of x beyond which motion has left a region for good, found from motion without noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 256  # cells that lead to attractors, and as many that lead outside
 _CHECKS = 16  # places of a motion in a section interval
-_AT_ONCE = 8  # section intervals, of which the mean place tells where motion has come to
+_AT_ONCE = 8  # section intervals over which x is averaged to tell where motion is
 _FOLLOWED = 256  # section intervals at most: 7 relaxations at a damping ratio of 0.0045
 
 Array = NDArray[np.float64]
@@ -29,12 +29,12 @@ def escapes(structure: Structure) -> bool:
 
 
 def escape_faces(osc: Oscillator, structure: Structure, attractor: Attractor) -> Array:
-    """Return the bounds of x that escaping motion passes, and no motion that comes to an attractor, shape (2, 2).
+    """Return bounds of x that escaping motion passes and motion to an attractor does not, shape (2, 2).
 
-    A side through which no motion escapes has no bound. A bound is where the first escaping motion settles, as at the
-    bottom of the next well, but at most as far beyond the barrier as that is from the attractors, unless motion returns
-    from there, and halfway to a pole. On the circle there is no outside along x. Cells of the region are samples of
-    both motions.
+    Cells of the region are samples of both motions. A side through which no motion escapes has an infinite bound. A
+    bound is where the first escaping motion settles, as at the bottom of the next well. It is at most as far beyond the
+    barrier as the barrier is from the attractors, unless motion returns from there, and at most halfway to a pole. On
+    the circle no bound is finite, because there is no outside along x.
     """
     faces = UNBOUNDED.copy()
     low, high = osc.model.domain.around(float(attractor.points[0, 0]))
@@ -64,14 +64,14 @@ def escape_faces(osc: Oscillator, structure: Structure, attractor: Attractor) ->
 
 
 def _some(states: Array) -> Array:
-    """At most so many of some states, evenly chosen."""
+    """At most `_SAMPLES` of the states, evenly chosen."""
     return states[np.unique(np.linspace(0, len(states) - 1, min(len(states), _SAMPLES)).astype(int))]
 
 
 def _followed(osc: Oscillator, states: Array, borders: tuple[float, float]) -> tuple[Array, Array]:
-    """Least and largest x of motions from some states (count, 2), of all their time and of late, shape (count, 2).
+    """Least and largest x of motions from some states (count, 2): over all time, and over the last section intervals.
 
-    Motion that ends, at a pole or because it diverges, has come to the border ahead.
+    Both have shape (count, 2). Motion that ends, at a pole or because it diverges, is placed at the border ahead of it.
     """
     started = np.zeros((len(states), 2 + len(osc.noise.extra_states if osc.noise else ())))
     started[:, :2] = states

@@ -120,9 +120,10 @@ def beyond_faces(faces: Array, states: Array) -> Array:
 class LeaveBasin(Exit):
     """Leaving the basin of attraction, tested on the section, for the basin of another attractor, or by escape.
 
-    Motion escapes if it leaves the region of the structure for good: without noise it never comes back. At finite noise
-    a state has escaped when x is beyond all that comes back, where the first escaping motion settles or a width of the
-    region farther, at any time; or when motion ended, as at a pole.
+    Motion escapes if it leaves the region of the structure and never comes back without noise. At finite noise a state
+    has escaped when, at any time, x is beyond all motion that comes back: where the first escaping motion settles, but
+    at most as far beyond the barrier as the attractors are before it. It has also escaped when motion ended, as at a
+    pole.
 
     Parameters
     ----------

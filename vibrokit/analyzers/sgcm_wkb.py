@@ -39,8 +39,8 @@ class SGCM(Analyzer):
 
     The density p on the section is carried from section to section as φ = ln p: along the exact flow, and by diffusion
     of the velocity in closed form (see `vibrokit.kernels.log_density`). Tails are as exact as the maximum, at any
-    depth. The density of an attractor that loses what leaves it, and is normalized, converges to the quasi-stationary
-    one; what is lost in a section interval is the exit rate.
+    depth. States that have left are put back into the core of their attractor, so that the density is stationary. The
+    exit rate follows from this density and the committor, see the notes.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
     shape and the standard deviations of the density there, or 2.5 node spacings where that is more; or when it has
@@ -71,15 +71,15 @@ class SGCM(Analyzer):
     Notes
     -----
     A rate is the probability in the attractor's own core times the committor: the probability to reach an exit before
-    that core, which the backward equation gives. What the density loses in a section interval is the same, but less
-    exact where it leaves in thin arms. The error estimate is all that a grid changes whose nodes are √2 times as far
-    apart, plus all that steps 1.5 times as long change, plus the iteration error, plus what basins of twice as large
-    cells change if they decide. A rate depends on the cores if the attractors are not metastable; that is no error,
-    since cores are defined, and there is a finding.
+    that core, which the backward equation gives. The loss of the density in a section interval is the same rate, but
+    less accurate where the density leaves in thin arms. The error estimate of ln of the rate is the whole change by a
+    grid whose nodes are √2 times as far apart, plus the whole change by steps 1.5 times as long, plus the iteration
+    error, plus the change by basin cells twice as large if basins decide about exits. A rate depends on the cores if
+    the attractors are not metastable. This is no error, because cores are defined; a finding reports it.
 
     An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more.
     Its interval allows for a prefactor that is proportional to D or 1/D, for more if three or more intensities show
-    that, and for what cores 1.5 times as large change. Intensities that the nodes cannot resolve are left out, with a
+    that, and for the change by cores 1.5 times as large. Intensities that the nodes cannot resolve are left out, with a
     finding.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,

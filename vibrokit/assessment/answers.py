@@ -1,4 +1,4 @@
-"""Answers: numbers in a user's terms, each with its 95 % interval and the methods that support it."""
+"""Answers: mean times, probabilities and noise intensities, each with its 95 % interval and the methods behind it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Answer:
     intensity : float
         Noise intensity D that it is for (m² s⁻³).
     methods : tuple of str
-        The methods that support it. Several where one of them contradicts the interval of another: then the interval
-        contains both.
+        The methods behind it: the one with the narrowest interval first, then those whose intervals do not overlap that
+        one. The interval of the answer contains theirs.
     extrapolated : bool
         Whether D lies outside the intensities at which rates were computed.
     """
@@ -61,7 +61,7 @@ class MeanTime(Answer):
     period : float
         Forcing period, or 2π/ω_n without forcing (s).
     metastable : bool
-        Whether the state lasts ten of its relaxation times. If not, it is left before it has formed.
+        Whether the mean time is at least ten relaxation times of the state; true where the relaxation time is unknown.
     """
 
     log_value: float

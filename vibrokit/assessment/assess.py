@@ -1,4 +1,4 @@
-"""assess: from a scene to the answers, in an order that answers early and improves."""
+"""assess: runs all analyzers on one scene within a time limit; each stage improves the answers."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ TIME_LIMIT = 300.0
 """Default budget (s)."""
 
 _PATHS = 0.4  # share of the time left that least action may take when rates are wanted too
-_EARLY = 0.98  # of its time: a piece of work that ended before was stopped by its user
+_EARLY = 0.98  # of its time: incomplete work that took less was stopped by the user, not by the limit
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is wanted of an assessment, checked before any work is done.
+    """The checked arguments of an assessment.
 
     Attributes
     ----------
@@ -105,17 +105,18 @@ def assess(
     executor: Executor | None = None,
     progress: Progress = None,
 ) -> Assessment:
-    """Find out which states a scene has, how long each lasts by several methods, and whether these agree.
+    """Find the steady states of a scene and how long each lasts by several methods, and compare these methods.
 
-    The steady states come first, then paths of least action, then exit rates of each state: at the scene's noise
-    intensity, and at a ladder of intensities where simulation, splitting and densities overlap. On Ctrl-C, or when the
-    time limit is reached, what was found so far is returned, marked incomplete.
+    Steady states are found first, then paths of least action, then the exit rates of each state. Rates are computed at
+    several noise intensities, at which simulation, splitting and densities overlap, and at that of the scene if it is
+    in their range. On Ctrl-C, or when the time limit is reached, the assessment so far is returned, marked incomplete.
 
     Parameters
     ----------
     osc : Oscillator
     accuracy : float
-        Relative error of mean times and of the bounds of ΔU, above 0 and below 1.
+        Relative error that is wanted of the bounds of ΔU, and of simulated mean times (half of their 95 % interval);
+        above 0 and below 1. The intervals of the answers say what was reached.
     time_limit : float, optional
         In seconds, 300 by default; None for as long as it takes.
     methods : sequence of str, optional
@@ -125,8 +126,8 @@ def assess(
     exit : Exit, optional
         What counts as leaving; by default `LeaveBasin`.
     known : iterable of Record or path, optional
-        A structure, results or assessments of this scene, as objects or as files, that are taken and not computed
-        again unless they are incomplete.
+        A structure, results or assessments of this scene and this exit, as objects or as files. Those that are complete
+        are not computed again, whatever their accuracy.
     checkpoint : path, optional
         A file in which the assessment is saved after each of its stages. If it exists, it is taken as known.
     rng : int
@@ -175,7 +176,7 @@ def improving(
     known: Iterable[Any] = (),
     checkpoint: str | os.PathLike[str] | None = None,
 ) -> Iterator[Assessment]:
-    """Yield the assessment after each of its stages; each is whole as far as it goes. `work` is the work under way."""
+    """Yield the assessment after each of its stages. `work` measures the time and passes on interrupts."""
     kept = None if checkpoint is None else Path(checkpoint)
     if kept is not None and not kept.parent.is_dir():
         raise StructureError(f"the folder {kept.parent} of the checkpoint does not exist; make it first.")
@@ -188,7 +189,7 @@ def improving(
 
 
 class _Road:
-    """The stages of one assessment, and what they found."""
+    """Runs the stages of one assessment and keeps their results."""
 
     def __init__(self, osc: Oscillator, request: Request, work: Work, known: Sequence[Any]) -> None:
         self.osc, self.request, self.work = osc, request, work
@@ -273,7 +274,7 @@ class _Road:
                 raise StructureError(f"{str(error).rstrip('.')}{offer}") from error
 
     def _intensities(self, label: int) -> tuple[float, ...]:
-        """The ladder of one state; without an energy, what the analyzers take by themselves."""
+        """Noise intensities for one state; without an energy, the multiples of D that analyzers have by default."""
         assert self.osc.noise is not None
         energy, own = self._energy(label), self.osc.noise.intensity
         if math.isinf(energy) or not energy > 0:
@@ -286,7 +287,7 @@ class _Road:
         return min((e.value for e in known), default=math.inf)
 
     def _take(self, record: Any) -> None:
-        """Take what is known already; raises StructureError if it is of another scene."""
+        """Use a record as a finished stage; raises StructureError for a structure of another scene."""
         match record:
             case Assessment():
                 self._take(record.structure)
@@ -330,12 +331,12 @@ class _Road:
 
 
 def _content(found: Result) -> int:
-    """How much a result has: a run that was stopped does not replace one that got further."""
+    """Number of energies and rates: of two incomplete results, the one with more is kept."""
     return len(found.energies) + len(found.rates)
 
 
 def _part(record: Result, place: int, label: int) -> Result:
-    """What a result says of one of its attractors."""
+    """The part of a result that is about one of its attractors."""
     return dataclasses.replace(
         record,
         energies=tuple(e for e in record.energies if e.source == label),

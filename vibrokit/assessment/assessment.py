@@ -1,4 +1,4 @@
-"""Assessment: what is known of a scene, and the answers that follow."""
+"""Assessment: steady states and results of one scene, and the answers that follow from them."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ _TRUST = (Bound.EXACT, Bound.CERTIFIED, Bound.UPPER, Bound.BRACKET, Bound.ESTIMA
 
 
 class Assessment(Record):
-    """What is known of a scene: its steady states, how each is left by every method, and the answers that follow.
+    """Steady states of a scene, the results of every method on their exits, and the answers that follow from these.
 
     Attributes
     ----------
     structure : Structure
     results : dict of str to Result
-        By the name of the analyzer, and of the state where each state was analyzed by itself.
+        By the name of the analyzer; each has all states that were analyzed.
     """
 
     kind: ClassVar[str] = "assessment"
@@ -67,17 +67,25 @@ class Assessment(Record):
 
     @cached_property
     def plausibility(self) -> Plausibility:
-        """What closed forms say of the scene, and which numbers are odd; see `vibrokit.plausibility`."""
+        """Closed forms of the scene, and which of them are unusual; see `vibrokit.plausibility`."""
         return plausibility(self.oscillator)
 
     @cached_property
     def reconciliation(self) -> Reconciliation:
-        """What the methods say of each exit, and whether they agree; see `vibrokit.reconcile`."""
+        """The numbers of all methods for each exit, and whether they agree; see `vibrokit.reconcile`.
+
+        Raises
+        ------
+        StructureError
+            There are fewer than two results, or they have no exit in common.
+        """
         return reconcile(*self.results.values())
 
     @called
     def energy(self, source: int | str, target: int | str | None = None) -> ActivationEnergy:
-        """Return the activation energy of one exit by the method that proves most; by default of the cheapest exit.
+        """Return the activation energy of one exit by the method with the strongest bounds.
+
+        Without a target it is that of the exit with the least energy.
 
         Raises
         ------
@@ -171,6 +179,8 @@ class Assessment(Record):
         self, source: int | str, mean_time: float | str, target: int | str | None = None
     ) -> AllowedIntensity:
         """Return the largest noise intensity at which a state lasts a given mean time.
+
+        Its bounds are the intensities at which the ends of the interval of the mean time equal the given one.
 
         Parameters
         ----------
@@ -292,7 +302,7 @@ class Assessment(Record):
         return float(intensity)
 
     def _energy(self, start: int, end: int | None) -> ActivationEnergy | None:
-        """The energy of an exit by the method that proves most; of the cheapest one, if no end is given."""
+        """The energy of an exit with the strongest kind of bounds; without an end, the least such energy."""
         known = [
             e for one in self.results.values() for e in one.energies if e.source == start and end in (None, e.target)
         ]

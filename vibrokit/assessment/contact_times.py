@@ -1,4 +1,4 @@
-"""Duration of a contact in which no other force counts, by quadrature."""
+"""Duration of a contact without other forces, by quadrature."""
 
 from __future__ import annotations
 

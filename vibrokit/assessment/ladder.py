@@ -1,4 +1,4 @@
-"""Noise intensities and settings with which each method answers at a wanted accuracy."""
+"""Noise intensities at which rates are computed, and settings of the analyzers for a wanted accuracy."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
 
 _RUNGS = ((0.05, (4.0, 7.0, 12.0)), (0.0, (4.0, 7.0, 12.0, 20.0)))
-"""Accuracies, and from each on the ΔU/D at which rates are computed: direct simulation reaches 7 cheaply and splitting
-20, and a density is resolved up to about 15."""
-_SIMULATED = (0.25, 25.0)  # ΔU/D between which the scene's own intensity is added: below, nothing is a state
+"""Least accuracy, and the values of ΔU/D at which rates are then computed: direct simulation is cheap up to 7,
+splitting up to 20, and the nodes resolve a density up to about 15."""
+_SIMULATED = (0.25, 25.0)  # ΔU/D between which the scene's own intensity is added: below, no state is metastable
 _APART = 1.25  # ratio below which two intensities count as one
 _LEAST_ERROR, _LARGEST_ERROR = 0.002, 0.25  # of a simulated rate: 250 000 and 16 exits
 _REPLICAS = 32  # of splitting at a relative error of 0.1: its default of 128 replicas reaches 0.05
@@ -27,7 +27,7 @@ def ladder(energy: float, intensity: float, accuracy: float) -> tuple[float, ...
     energy : float
         ΔU of its cheapest exit.
     intensity : float
-        D of the scene, which is among them where rates can be computed there.
+        D of the scene, which is one of them if its ΔU/D is between 0.25 and 25.
     accuracy : float
     """
     ratios: tuple[float, ...] = next(ratios for least, ratios in _RUNGS if accuracy >= least)
@@ -38,7 +38,7 @@ def ladder(energy: float, intensity: float, accuracy: float) -> tuple[float, ...
 
 
 def fitted(analyzer: Analyzer, accuracy: float) -> Analyzer:
-    """Return an analyzer with settings for an accuracy: the relative error of ΔU's bound and of mean times.
+    """Return an analyzer with settings for an accuracy: a relative error of the bounds of ΔU and of mean times.
 
     The error of a simulated rate is half of the accuracy, so that its 95 % interval is as wide as that. The other
     methods choose their own effort from the scene; `LeastAction` refines its graph to the accuracy.
@@ -54,7 +54,7 @@ def fitted(analyzer: Analyzer, accuracy: float) -> Analyzer:
 
 
 def at_intensities(analyzer: Analyzer, source: int, intensities: tuple[float, ...]) -> Analyzer:
-    """Return an analyzer that leaves one attractor at given noise intensities, if it takes any."""
+    """Return an analyzer for the exits of one attractor, at given noise intensities if it has such a setting."""
     if isinstance(analyzer, MFET | SGCM):
         return dataclasses.replace(analyzer, source=source, intensities=intensities)
     return dataclasses.replace(analyzer, source=source)

@@ -1,4 +1,4 @@
-"""Oddities: what is unusual about the numbers of a scene, as codes with values. All sentences are defined here."""
+"""Oddities: unusual numbers of a scene, as codes with values. All sentences are defined here."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import StrEnum
 
 
 class OddityCode(StrEnum):
-    """What may be odd. Each code has a sentence, a template of the oddity's values."""
+    """Kinds of oddities. Each code has a sentence, a template of the oddity's values."""
 
     sentence: str
 

@@ -1,4 +1,4 @@
-"""Plausibility: closed forms of a scene before any work, where wrong units show."""
+"""Plausibility: closed forms of a scene, in which wrong units are visible before any integration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.numeric import amplitude_at
 from vibrokit.text_table import text_table
 
-# The scenes of tests/assessment/test_plausibility.py that are right lie inside these, but for those counted there.
+# The correct scenes of tests/assessment/test_plausibility.py lie within these limits, except those counted there.
 _FAR = (
     100.0  # of a ratio of forcing to natural frequency, or of amplitude to gap: two decades from resonance, or contact
 )
@@ -29,7 +29,7 @@ _GRAVITY = 9.80665  # m s⁻²
 
 
 class Measure(StrEnum):
-    """What a row is about, with its heading and its unit."""
+    """The quantity of a row, with its heading and its unit."""
 
     heading: str
     unit: str
@@ -60,7 +60,7 @@ class Measure(StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One number: what it is, its value, and the stop (its side) or the excitation (its path) that it is about."""
+    """One number: its quantity, its value, and the stop (by side) or the excitation (by path) that it belongs to."""
 
     measure: Measure
     value: float
@@ -73,12 +73,12 @@ class Row:
 
 @dataclasses.dataclass(frozen=True)
 class Plausibility:
-    """Closed forms of a scene, and what is odd about them; ``str`` of it is the text.
+    """Closed forms of a scene, and which of them are unusual; ``str(plausibility)`` is a table and sentences.
 
     Attributes
     ----------
     rows : tuple of Row
-        Rows without meaning in the scene are left out.
+        Rows that do not apply to the scene are left out.
     oddities : tuple of Oddity
     """
 
@@ -101,8 +101,8 @@ class Plausibility:
 def plausibility(osc: Oscillator) -> Plausibility:
     """Return closed forms of a scene: frequencies, linear response, contact times, noise. Nothing is compiled.
 
-    The response is that of the scene without stops, linearized about its position of rest nearest to x = 0. It is left
-    out for a stop as far as which the forces depart from linear ones by more than a tenth.
+    The response is that of the scene without stops, linearized about its position of rest nearest to x = 0. It is not
+    compared with the gap to a stop if the forces up to that stop depart from linear ones by more than a tenth.
     """
     response = linear_response(osc)
     found: list[Row | Oddity] = [*_frequencies(osc, response), *_noise(osc, response)]
@@ -139,7 +139,7 @@ def _frequencies(osc: Oscillator, response: LinearResponse | None) -> Iterator[R
 
 
 def _odd_frequency(ratio: float) -> Iterator[Oddity]:
-    """What is odd about the forcing nearest to resonance."""
+    """Unusual ratios of the forcing nearest to resonance."""
     for code, other in (
         (OddityCode.NATURAL_FREQUENCY_IN_HZ, ratio / (2 * math.pi)),
         (OddityCode.FORCING_IN_HZ, ratio * 2 * math.pi),

@@ -1,4 +1,4 @@
-"""MeanTimes: the mean time of an exit over the noise intensity, also between and beyond the computed intensities."""
+"""MeanTimes: mean exit times by one method; interpolated between computed noise intensities, extrapolated beyond."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class LogTime:
     intensity : float
         D (m² s⁻³).
     methods : tuple of str
-        The methods that support it.
+        The method that gives the value, then those whose contradicting intervals are included.
     extrapolated : bool
         Whether D lies outside the intensities at which rates were computed.
     """
@@ -89,12 +89,12 @@ class MeanTimes:
         return cls(method, events.pop(), np.array(list(groups)), -sums[:, 0], -sums[:, 2], -sums[:, 1])
 
     def at(self, intensity: float, energy: ActivationEnergy | None = None) -> LogTime | None:
-        """Return ln τ at a noise intensity; None where it cannot be told.
+        """Return ln τ at a noise intensity; None where it is not known.
 
-        Between computed intensities ln τ is interpolated in 1/D, monotonically where there are three or more; the
-        interval contains the difference from a straight line between neighbours. Beyond them, τ = C exp(ΔU/D) with C
-        from the nearest intensity. There the interval contains that of ΔU and a prefactor C that varies with a power of
-        D: with the power that the local slope shows, and with the first power at least.
+        Between computed intensities ln τ is interpolated in 1/D, monotonically where there are three or more. The
+        interval also contains the difference from a straight line between neighbours. Beyond them, τ = C exp(ΔU/D) with
+        C from the nearest intensity. There the interval contains the bounds of ΔU and a prefactor C that varies with a
+        power of D. This power is the one that the last two intensities show, and at least 1.
 
         Parameters
         ----------
@@ -141,10 +141,10 @@ class MeanTimes:
 def most_certain(
     known: Sequence[MeanTimes], intensity: float, energy: ActivationEnergy | None = None
 ) -> LogTime | None:
-    """Return ln τ by the method with the narrowest interval; None where no method tells it.
+    """Return ln τ by the method with the narrowest interval; None where no method knows it.
 
-    A method that computed rates on both sides of D is preferred to one that did not. An interval that contradicts the
-    narrowest one is added to it: then the methods disagree, and the interval has to say so.
+    Methods that computed rates at D, or on both sides of it, precede those that extrapolate. If the interval of another
+    method does not overlap the narrowest one, the methods disagree, and the interval is widened to contain both.
     """
     found = [one for times in known if (one := times.at(intensity, energy)) is not None]
     if not found:
@@ -163,9 +163,9 @@ def most_certain(
 def intensity_for(
     known: Sequence[MeanTimes], log_time: float, energy: ActivationEnergy | None = None
 ) -> tuple[LogTime, float, float] | None:
-    """Return what is known at the noise intensity at which ln τ is `log_time`, and bounds of that intensity.
+    """Return ln τ at the noise intensity at which it equals `log_time`, and bounds of that intensity.
 
-    None if no intensity gives that mean time within what the methods and the energy tell.
+    None if the methods and the energy give that mean time at no intensity. A bound that is not found is 0 or infinite.
     """
 
     def excess(log_intensity: float, end: str) -> float:
@@ -198,7 +198,7 @@ def log_sum(rates: Sequence[ExitRate]) -> tuple[float, float, float]:
     logs = np.array([rate.log_value for rate in rates])
     total = float(logsumexp(logs))
     widths = np.array([[rate.log_value - rate.log_lower, rate.log_upper - rate.log_value] for rate in rates])
-    halves = widths.mean(axis=1, keepdims=True)  # for an interval that does not hold its value
+    halves = widths.mean(axis=1, keepdims=True)  # where an interval does not contain its value
     widths = np.where(widths.min(axis=1, keepdims=True) < 0, halves, widths)
     below, above = np.linalg.norm(np.exp(logs - total)[:, None] * widths, axis=0).tolist()
     return total, total - below, total + above

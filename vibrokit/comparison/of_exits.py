@@ -1,4 +1,4 @@
-"""What one result says of its exits: energies, mean times, slopes, barriers."""
+"""Quantities of the exits in one result: energies, mean times, slopes, barriers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vibrokit.results.sgcm import SGCMResult
 
 
 def exit_quantities(result: Result, method: str) -> list[Quantity]:
-    """Return what one result says of its exits, each by target and, where there are several, at all."""
+    """Return the quantities of the exits in one result: for each target, and for all targets of a source together."""
     found = list(_energies(result, method))
     if isinstance(result, RatedResult) and result.rates:
         for one in _exits(result):
@@ -55,7 +55,7 @@ def with_prefactors(quantities: Sequence[Quantity]) -> list[Quantity]:
 
 
 def _energies(result: Result, method: str) -> Iterator[Quantity]:
-    """The energy of each exit, and of leaving at all: the least of all exits."""
+    """The energy of each exit; for leaving a state at all, the least energy of its exits."""
     for source in dict.fromkeys(energy.source for energy in result.energies):
         own = [energy for energy in result.energies if energy.source == source]
         for target in dict.fromkeys(energy.target for energy in own):
@@ -100,7 +100,7 @@ def _log_times(result: RatedResult, source: int, target: int | None, method: str
 
 
 class _Standing:
-    """What a result says of whether its attractors are states of their own."""
+    """Relaxation times and core shares in a result, which decide whether its attractors are metastable."""
 
     def __init__(self, result: RatedResult) -> None:
         self.known = "relaxation_time" in result.data

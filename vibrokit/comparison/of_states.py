@@ -1,4 +1,4 @@
-"""What one result says of the share of time spent in each state: by rates, by the density, by energies alone."""
+"""Shares of time in each state from one result: by rates, by the density, by energies alone."""
 
 from __future__ import annotations
 

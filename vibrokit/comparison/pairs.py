@@ -16,12 +16,12 @@ from vibrokit.comparison.verdicts import Agreement, Verdict
 from vibrokit.results.rated import HELD, METASTABLE
 
 _ONE_SIDED = 1.645  # standard errors that a normal error exceeds on one side in 5 % of all cases
-_LEAST_ERROR = 1e-9  # relative: below it, what two ways of rounding change
+_LEAST_ERROR = 1e-9  # relative: the effect of rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class Side:
-    """What one method knows of one exit or state.
+    """The numbers of one method for one exit or state.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class Side:
     series : tuple of Quantity
         Mean times over D, or shares over D.
     exit : tuple of str
-        What counts as leaving: the first entry decides about energies, all of them about times.
+        What counts as leaving. Energies can be compared if the first entries are equal, times if both are.
     remedy : str
-        What refines the method.
+        The setting that refines the method.
     """
 
     method: str
@@ -128,11 +128,11 @@ def _of_energies(sides: Sides, about: dict[str, Any], level: float) -> Verdict |
 
 
 def _drift(rated: Side, fixed: Side) -> tuple[float, ...]:
-    """First and last slope, if they drift towards an energy as D falls, far enough to reach it.
+    """First and last slope, if they drift towards an energy as D falls, far enough to reach it; otherwise nothing.
 
-    Whether they drift is a one-sided test at 5 % of the curvature of ln τ over 1/D, since the direction is given. A
-    prefactor that is a power of D, fitted too, shows how far its drift still goes. Terms of higher order are not known,
-    so it may be twice as far, as in the error of the density's limit.
+    The drift is tested by the curvature of ln τ over 1/D, one-sided at 5 %, because its direction is given. A fit with
+    a prefactor that is a power of D estimates the remaining drift. Terms of higher order are not known, so twice this
+    drift is allowed, as in the error of the density's limit.
     """
     fit = fit_of([each for each in rated.series if each.metastable and each.resolved])
     if fit is None or not math.isfinite(fit.limit) or rated.energy is None or fixed.energy is None:

@@ -13,7 +13,7 @@ DEVIATIONS = 1.96
 
 
 class Kind(StrEnum):
-    """What a quantity is."""
+    """Kinds of quantities, with their units."""
 
     ENERGY = "energy"
     """ΔU for D → 0 (m² s⁻³): the least action with its bounds, or the limit of rates."""
@@ -36,9 +36,9 @@ class Kind(StrEnum):
 
 
 OF_EXITS = (Kind.ENERGY, Kind.LOG_TIME)
-"""What makes an exit known."""
+"""Kinds that an exit needs to be listed: one of them at least."""
 OF_STATES = (Kind.OCCUPANCY, Kind.DENSITY_SHARE, Kind.WEIGHT_EXPONENT)
-"""What is of a state and not of an exit."""
+"""Kinds that belong to a state and not to an exit."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,19 +51,20 @@ class Quantity:
     source : int
         Label of the attractor that is left, or whose share it is.
     target : int or None
-        Label of what is reached, as in `ExitRate`; None for leaving at all, and for shares.
+        Label of the state that is reached, as in `ExitRate`; None for all exits together, and for shares.
     method : str
-        The result that it is from, by the name of its analyzer.
+        Name of the analyzer of the result.
     intensity : float
         D (m² s⁻³); NaN where it does not depend on D.
     value, lower, upper : float
         The number and its 95 % interval, or bounds; NaN where none is known.
     event : str
-        What counts as an exit, as in `ExitRate`; empty for what does not depend on it.
+        What counts as an exit, as in `ExitRate`; empty for quantities that do not depend on it.
     relaxations : float
         Mean time until the source is left, in its relaxation times; NaN where that is not known.
     core_share : float
-        Share of the core of the source that lies in its own basin, or of the target, the smaller; NaN where not known.
+        Share of the core of the source in its own basin, or that of the target if it is smaller; NaN where neither is
+        known.
     """
 
     kind: Kind
@@ -80,7 +81,7 @@ class Quantity:
 
     @property
     def metastable(self) -> bool:
-        """Whether source and target are states of their own at this noise, as far as that is known."""
+        """Whether source and target are metastable at this noise; true where this is not known."""
         return not (self.relaxations < METASTABLE or self.core_share < HELD)
 
     @property
@@ -90,12 +91,12 @@ class Quantity:
 
     @property
     def below(self) -> float:
-        """How far the lower end is from the value; half of the interval if that does not hold the value."""
+        """Distance of the lower end from the value; half of the interval if it does not contain the value."""
         return self.value - self.lower if self._held else (self.upper - self.lower) / 2.0
 
     @property
     def above(self) -> float:
-        """How far the upper end is from the value; half of the interval if that does not hold the value."""
+        """Distance of the upper end from the value; half of the interval if it does not contain the value."""
         return self.upper - self.value if self._held else (self.upper - self.lower) / 2.0
 
     @property

@@ -26,13 +26,13 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 
-_SAME_POINT = 0.01  # of the extent of the region: two searches find one orbit to far better than that
+_SAME_POINT = 0.01  # of the extent of the region: two searches find the same orbit with a much smaller difference
 _LARGEST_PERIOD = 64  # points: an orbit has fewer, a sample of chaotic motion more, which no two searches share
 
 
 @called
 def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
-    """Compare what several results say of one scene.
+    """Compare several results of one scene.
 
     Each pair of results is compared exit by exit: mean times at common noise intensities, which a χ² test takes
     together, or energies where there are none. A result that is incomplete is used as far as it goes.

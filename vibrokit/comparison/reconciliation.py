@@ -1,4 +1,4 @@
-"""Reconciliation: what several results say of each exit of one scene, side by side, and whether they agree."""
+"""Reconciliation: the numbers of several results for each exit of one scene, and whether they agree."""
 
 from __future__ import annotations
 

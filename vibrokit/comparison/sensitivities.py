@@ -1,4 +1,4 @@
-"""What a change of each parameter by 1 % does to an activation energy and to the mean time."""
+"""Effect of 1 % of each parameter on an activation energy and on the mean time."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Sensitivity:
     energy, energy_error : float
         Change of ΔU (%), to first order: the exponent of the power with which ΔU grows.
     time, time_error : float
-        Change of the mean time (%) at the intensity D, by exp(ΔU/D) alone: a change of the prefactor is neglected. NaN
-        without an intensity.
+        Change of the mean time (%) at the noise intensity D by the factor exp(ΔU/D); the change of the prefactor is
+        neglected. NaN without an intensity.
     """
 
     parameter: str

@@ -1,4 +1,4 @@
-"""Verdicts: what two methods say of one exit, or of one state's share of time, as a code with numbers."""
+"""Verdicts: whether two methods agree on one exit, or on one state's share of time, as codes with numbers."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from vibrokit.results.rated import HELD, METASTABLE
 
 
 class Agreement(StrEnum):
-    """What a verdict says; each code has a template of its sentence."""
+    """Codes of verdicts; each has a template of its sentence."""
 
     AGREE = "agree"
-    """The differences are as large as the stated errors let expect."""
+    """The differences are explained by the stated errors."""
     ARRHENIUS_NOT_REACHED = "arrhenius-not-reached"
     """The limit of rates misses the energy, and the slopes drift towards it as D falls, far enough to explain that."""
     NOT_METASTABLE = "not-metastable"
-    """At no common noise intensity are both source and target states of their own."""
+    """At no common noise intensity are source and target both metastable."""
     EVENTS_DIFFER = "events-differ"
-    """The methods count different events, so that their numbers are not those of one quantity."""
+    """The methods count different events, so that their numbers cannot be compared."""
     UNDER_RESOLVED = "under-resolved"
-    """A method does not know the number, or the errors are as large as the number itself."""
+    """A method has no number with bounds, or the errors are as large as the number itself."""
     DISAGREE = "disagree"
-    """The differences are larger than the stated errors let expect."""
+    """The differences are too large for the stated errors."""
 
 
 _SENTENCES = {
@@ -47,7 +47,7 @@ _SENTENCES = {
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What the numbers of two methods say of one exit, or of the share of one state.
+    """Whether two methods agree on one exit, or on the share of one state.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Verdict:
     error : float
         Least combined standard error: of ΔU (m² s⁻³), of ln τ, or of ln of the odds of a share.
     less_certain, remedy : str
-        The method with the larger error, or without a number, and what to change of it first.
+        The method with the larger error, or without a number, and the setting of it to change first.
     first, last, energy : float
         Where slopes drift: the first and the last one, D descending, and the energy they tend to (m² s⁻³).
     relaxations, core_share : float

@@ -1,4 +1,4 @@
-"""Why a trajectory needs too many steps: the force whose own time is far shorter than the time to integrate over."""
+"""Names the force that makes a trajectory need too many steps: the one with the shortest time scale."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHARES = np.geomspace(1e-13, 1e-1, 25)  # changes of a variable, as shares of i
 
 
 class FastForce(NamedTuple):
-    """A force whose own time limits the steps, in words, and that time (s)."""
+    """A force whose time scale limits the steps: a description, and the time scale (s)."""
 
     words: str
     time: float
@@ -26,10 +26,10 @@ class FastForce(NamedTuple):
 
 
 def fastest_force(scene: Scene, state: NDArray[np.float64]) -> FastForce | None:
-    """Return the force with the shortest time of its own around a state; None where no force has one.
+    """Return the force with the shortest time scale around a state; None where no force has one.
 
-    A force f(x, v) changes the motion within 1/(√|∂f/∂x| + |∂f/∂v|). Of a stop it is the time where the mass is in
-    contact, at the depth of the state, or, if it is outside, at the depth where the stop would stop it.
+    The time scale of a force f(x, v) is 1/(√|∂f/∂x| + |∂f/∂v|). For a spring only the slope in v counts. For a stop the
+    slopes are those at the depth of the state, or at a depth close to first touch if the mass is not in contact.
     """
     return min(_forces(scene, state), key=lambda force: force.time, default=None)
 

@@ -1,6 +1,6 @@
 """Tops of the potential barriers around a range of x: beyond them motion leads elsewhere, or leaves for good.
 
-Activation energies ask about motion over these tops, however weak the forces of a scene are.
+Exits lead over these tops, however weak the forces of a scene are.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class Top(NamedTuple):
-    """A place where the steady force that pushes the mass back begins to push it away."""
+    """A place beyond which the steady force no longer pushes the mass back, but away."""
 
     speed: float  # m/s, of a mass at the lowest point of the potential that just reaches the top
     place: float  # m
@@ -42,7 +42,7 @@ def tops_around(osc: Oscillator, low: float, high: float) -> list[Top]:
 def speed_to_reach(osc: Oscillator, low: float, high: float) -> float:
     """Return the speed (m/s) that a mass at the lowest point of the steady potential needs to reach both ends.
 
-    It is 0 where a border of the forces lies between, which no speed crosses.
+    It is 0 where a border of the forces lies between the ends, because no speed crosses it.
     """
     if osc.model.domain.borders(low, high):
         return 0.0
@@ -78,5 +78,5 @@ def _next_top(osc: Oscillator, steady: SteadyForce, low: float, high: float, sig
 
 
 def in_front_of_stops(osc: Oscillator, tops: Iterable[Top]) -> list[Top]:
-    """Return the tops that no stop has to be pressed in to reach."""
+    """Return the tops that the mass reaches without contact with a stop."""
     return [top for top in tops if not any(one.sign * (top.place - one.position) > 0 for one in osc.barriers)]

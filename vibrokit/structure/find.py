@@ -53,10 +53,12 @@ def find_structure(
     ----------
     osc : Oscillator
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
-        Where to search; by default a region that contains the steady states and the stops with a margin around them,
-        and, if the force of the spring repeats along x, as that of a pendulum does, one copy of each steady state. If
-        some motion turns over and over, the region is one turn wide, and x is taken modulo a turn; so it is in a given
-        region that is no wider. Otherwise, motion that ends at a copy of an attractor elsewhere is counted apart.
+        Where to search. The default region contains the steady states and the stops with a margin around them, and the
+        tops of the potential barriers around the steady states if the grid then still resolves these and the stops. If
+        the force of the spring repeats along x, as that of a pendulum does, it contains one copy of each steady state.
+        If some motion turns over and over, the default region is one turn wide, and x is taken modulo a turn, as in a
+        given region that is no wider. Otherwise, motion that ends at a copy of an attractor elsewhere is counted
+        apart.
     cells : (int, int), optional
         Cells of the basin grid in x and v. By default 200 × 200; half or a quarter of that, or less, where transients
         are so long that the next finer grid would take more than 5 · 10⁶ iterations of the section map. The number

@@ -1,4 +1,4 @@
-"""Formulas of a scene as functions of numbers that need no compiled code: a few evaluations, not an integration."""
+"""Formulas of a scene as Python functions of numbers, for a few evaluations without compiled code."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def jacobian_of(model: Model) -> Callable[[Sequence[float]], list[list[float]]]:
 
 
 def amplitude_at(model: Model, state: Sequence[float]) -> list[float]:
-    """Return the factors of √D dW at a state, shape (n,)."""
+    """Return the factors by which √D dW enters each equation at a state, length n."""
     return [_function(model, model.state, factor)(*state) for factor in model.amplitude]
 
 

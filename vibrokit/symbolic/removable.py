@@ -10,7 +10,7 @@ import sympy
 def without_removable(expression: sympy.Expr, variables: Sequence[sympy.Symbol]) -> sympy.Expr:
     """Return the same function without the divisions by a variable, or by a polynomial in it, that cancel.
 
-    An expression is returned as it was written if none cancels; 0/0 may remain, as in sin(x)/x.
+    If none cancels, the expression is returned as it was written. A 0/0 such as that of sin(x)/x may remain.
     """
     for variable in variables:
         if variable in _divisors(expression):
