@@ -31,10 +31,15 @@ def _as_data(value: Any) -> Any:
     if isinstance(value, Stepper):
         return stepper_name(value)
     if isinstance(value, Exit):
-        return {"name": name_of(Group.EXITS, type(value)), **_fields_as_data(value)}
+        return exit_data(value)
     if dataclasses.is_dataclass(value):
         return _fields_as_data(value)
     return list(value) if isinstance(value, tuple) else value
+
+
+def exit_data(one: Exit) -> dict[str, Any]:
+    """Return an exit as plain data, as `settings_of` has it."""
+    return {"name": name_of(Group.EXITS, type(one)), **_fields_as_data(one)}
 
 
 def analyzer_from(settings: Mapping[str, Any]) -> Analyzer:

@@ -43,7 +43,7 @@ class Answer:
     @property
     def number(self) -> str:
         """The number with its interval and unit, as text."""
-        return f"{self.value:.3g} ({self.lower:.2g} to {self.upper:.2g}) {self.unit}".strip()
+        return f"{self.value:.3g} ({self.lower:.3g} to {self.upper:.3g}) {self.unit}".strip()
 
     def __str__(self) -> str:
         support = " and ".join(self.methods)
@@ -91,7 +91,7 @@ class AllowedIntensity(Answer):
     def number(self) -> str:
         """D and the spectral density that it stands for."""
         value, lower, upper = self.psd
-        return f"{super().number}, a PSD of {value:.3g} ({lower:.2g} to {upper:.2g}) (m/s²)²/Hz"
+        return f"{super().number}, a PSD of {value:.3g} ({lower:.3g} to {upper:.3g}) (m/s²)²/Hz"
 
 
 def exponential(logarithm: float) -> float:

@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from pathlib import Path
 from typing import Any
 
 from vibrokit.analyzers.analyzer import Analyzer
@@ -15,16 +14,18 @@ from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.assessment.assessment import Assessment
+from vibrokit.assessment.known import Known
 from vibrokit.assessment.ladder import at_intensities, fitted, ladder
 from vibrokit.construction import called
-from vibrokit.errors import OutOfTime, ParameterError, StructureError, VibrokitError, shown
+from vibrokit.errors import OutOfTime, ParameterError, SceneError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
 from vibrokit.registry import Group, load
+from vibrokit.results.atomic import checked_target
 from vibrokit.results.codes import Code
-from vibrokit.results.files import load_result
 from vibrokit.results.finding import Finding
-from vibrokit.results.merging import merged
+from vibrokit.results.merging import merged, part_of
+from vibrokit.results.rated import RatedResult
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
@@ -80,6 +81,8 @@ class Request:
             raise ParameterError(f"accuracy must be above 0 and below 1, got {shown(accuracy)}.")
         if isinstance(methods, str) or (methods is not None and not methods):
             raise ParameterError(f"methods must be names of analyzers, such as {METHODS!r}, got {shown(methods)}.")
+        if osc.noise is not None and not osc.noise.intensity > 0:
+            raise SceneError("the noise of the scene has the intensity 0, so nothing is left; give it a positive one.")
         analyzers = {}
         for name in methods or METHODS:
             analyzers[name] = dataclasses.replace(fitted(load(Group.ANALYZERS, name, Analyzer)(), accuracy), exit=exit)
@@ -177,11 +180,9 @@ def improving(
     checkpoint: str | os.PathLike[str] | None = None,
 ) -> Iterator[Assessment]:
     """Yield the assessment after each of its stages. `work` measures the time and passes on interrupts."""
-    kept = None if checkpoint is None else Path(checkpoint)
-    if kept is not None and not kept.parent.is_dir():
-        raise StructureError(f"the folder {kept.parent} of the checkpoint does not exist; make it first.")
+    kept = None if checkpoint is None else checked_target(checkpoint)
     given = [*known, *([kept] if kept is not None and kept.exists() else [])]
-    road = _Road(osc, request, work, [load_result(one) if isinstance(one, str | os.PathLike) else one for one in given])
+    road = _Road(osc, request, work, given)
     for assessment in road.stages():
         if kept is not None:
             assessment.save(kept)
@@ -194,84 +195,76 @@ class _Road:
     def __init__(self, osc: Oscillator, request: Request, work: Work, known: Sequence[Any]) -> None:
         self.osc, self.request, self.work = osc, request, work
         self.structure: Structure | None = None
-        self.parts: dict[tuple[str, int | None], Result] = {}  # by analyzer and by source; None for all sources at once
+        self.parts: dict[tuple[str, int], Result] = {}  # by analyzer and by source
         self.left: list[Finding] = []
         self.complete = False
-        for one in known:
-            self._take(one)
+        self.known = Known.of(known, request.accuracy)
+        for one in self.known.structures:
+            check_belongs(osc, one)
+            self.structure = one
 
     def stages(self) -> Iterator[Assessment]:
         """Run what is wanted and not known, and yield the assessment after each stage."""
         wanted = self.request
-        if self.structure is None:
+        if self.structure is None or not self.structure.complete:
             with stage("which states are there"):
                 self.structure = find_structure(self.osc, rng=wanted.rng)
         structure = self.structure
         if not structure.complete or not structure.attractors:
             yield self._assessment()
             return
-        self._check_exit(structure)
+        self.parts = self.known.parts(self.osc, structure, next(iter(wanted.analyzers.values())).exit)
         yield self._assessment()
+        for analyzer in wanted.analyzers.values():
+            analyzer.exit.check(self.osc, structure)
         labels = (
             range(len(structure.attractors)) if wanted.source is None else [structure.attractor(wanted.source).label]
         )
         rated = {name: one for name, one in wanted.analyzers.items() if isinstance(one, MFET | SGCM)}
-        tasks: list[tuple[str, int | None]] = [
-            (name, None if wanted.source is None else labels[0]) for name in wanted.analyzers if name not in rated
-        ]
+        others = [name for name in wanted.analyzers if name not in rated]
         stopped = False
-        for name, source in tasks:
-            stopped = stopped or self._run(name, wanted.analyzers[name], source, _PATHS if rated else 1.0 / len(tasks))
+        for number, name in enumerate(others):
+            paths = dataclasses.replace(wanted.analyzers[name], source=wanted.source)
+            share = _PATHS if rated else 1.0 / (len(others) - number)
+            stopped = stopped or self._run(name, paths, labels, share)
             yield self._assessment()
         order = sorted(labels, key=self._energy)
         runs = [(name, label) for label in order for name in rated]
         for number, (name, label) in enumerate(runs):
-            one = at_intensities(rated[name], label, self._intensities(label))
-            stopped = stopped or self._run(name, one, label, 1.0 / (len(runs) - number))
+            rates = at_intensities(rated[name], label, self._intensities(label))
+            stopped = stopped or self._run(name, rates, [label], 1.0 / (len(runs) - number))
             self.complete = number == len(runs) - 1 and not stopped
             yield self._assessment()
         self.complete = not stopped
         yield self._assessment()
 
-    def _run(self, name: str, analyzer: Analyzer, source: int | None, share: float) -> bool:
+    def _run(self, name: str, analyzer: Analyzer, labels: Sequence[int], share: float) -> bool:
         """Run one analyzer in a share of the time left; return whether the user stopped it."""
         assert self.structure is not None
-        known = self.parts.get((name, source))
-        if known is not None and known.complete:
+        if all((name, label) in self.parts and self.parts[name, label].complete for label in labels):
             return False
+        subject = "" if analyzer.source is None else self.structure.names[labels[0]]
         limit = None
         if self.request.time_limit is not None:
             limit = share * (self.request.time_limit - self.work.seconds)
             if limit <= 0:
-                self._leave(name, source, "the time was up.")
+                self._leave(name, subject, "the time was up.")
                 return True
-        subject = "" if source is None else self.structure.names[source]
         try:
-            with stage("how it is left" if source is None else "how long it lasts", subject=subject):
+            with stage("how it is left" if not subject else "how long it lasts", subject=subject):
                 found = analyzer.run(self.osc, self.structure, executor=self.request.executor, time_limit=limit)
         except VibrokitError as error:
-            self._leave(name, source, str(error))
+            self._leave(name, subject, str(error))
             return False
-        if known is None or found.complete or _content(found) >= _content(known):
-            self.parts[name, source] = found
+        for label in labels:
+            known, part = self.parts.get((name, label)), part_of(found, label)
+            if known is None or part.complete or _content(part) > _content(known):
+                self.parts[name, label] = part
         return not found.complete and (limit is None or found.seconds < _EARLY * limit)
 
-    def _leave(self, name: str, source: int | None, reason: str) -> None:
-        assert self.structure is not None
-        which = name if source is None else f"{name} of {self.structure.names[source]}"
+    def _leave(self, name: str, subject: str, reason: str) -> None:
+        which = f"{name} of {subject}" if subject else name
         self.left.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=which, reason=reason))
-
-    def _check_exit(self, structure: Structure) -> None:
-        for analyzer in self.request.analyzers.values():
-            try:
-                analyzer.exit.check(self.osc, structure)
-            except StructureError as error:
-                offer = (
-                    "; ask for exit=vk.FirstContact() to learn how long no stop is touched."
-                    if self.osc.barriers
-                    else "."
-                )
-                raise StructureError(f"{str(error).rstrip('.')}{offer}") from error
 
     def _intensities(self, label: int) -> tuple[float, ...]:
         """Noise intensities for one state; without an energy, the multiples of D that analyzers have by default."""
@@ -282,44 +275,29 @@ class _Road:
         return ladder(energy, own, self.request.accuracy)
 
     def _energy(self, label: int) -> float:
-        """ΔU of the cheapest known exit of a state; infinite if none is known."""
-        known = [e for one in self.parts.values() for e in one.energies if e.source == label]
-        return min((e.value for e in known), default=math.inf)
+        """ΔU of the cheapest exit of a state by methods without rates; infinite if none is known.
 
-    def _take(self, record: Any) -> None:
-        """Use a record as a finished stage; raises StructureError for a structure of another scene."""
-        match record:
-            case Assessment():
-                self._take(record.structure)
-                for result in record.results.values():
-                    self._take(result)
-            case Structure():
-                check_belongs(self.osc, record)
-                self.structure = record
-            case Result():
-                name = str(record.settings.get("analyzer"))
-                sources = record.data["source"].values.tolist() if "source" in record.data else []
-                if name in self.request.analyzers and isinstance(self.request.analyzers[name], MFET | SGCM):
-                    for place, label in enumerate(sources):
-                        self.parts[name, label] = record if len(sources) == 1 else _part(record, place, label)
-                else:
-                    self.parts[name, None] = record
-            case _:
-                raise StructureError(
-                    f"what is known must be a structure, a result or an assessment, or the file of one, got "
-                    f"{shown(record)}."
-                )
+        An energy that follows from rates would give each method another ladder, and no intensity in common.
+        """
+        own = [one for (_, source), one in self.parts.items() if source == label and not isinstance(one, RatedResult)]
+        return min((e.value for one in own for e in one.energies if e.source == label), default=math.inf)
 
     def _assessment(self) -> Assessment:
         assert self.structure is not None
-        results = {}
+        results, finished = {}, {}
         for name in dict.fromkeys(name for name, _ in self.parts):
-            own = [part for (other, _), part in self.parts.items() if other == name]
-            results[name] = merged(own)
+            own = {label: part for (other, label), part in sorted(self.parts.items()) if other == name}
+            results[name] = merged(list(own.values()))
+            finished[name] = [label for label, part in own.items() if part.complete]
         wanted = self.request
         return Assessment(
             scene=scene_data(self.osc),
-            settings={"accuracy": wanted.accuracy, "time_limit": wanted.time_limit, "methods": list(wanted.analyzers)},
+            settings={
+                "accuracy": wanted.accuracy,
+                "time_limit": wanted.time_limit,
+                "methods": list(wanted.analyzers),
+                "finished": finished,
+            },
             findings=tuple(self.left),
             stats=self.work.stats,
             complete=self.complete and all(one.complete for one in results.values()),
@@ -333,14 +311,3 @@ class _Road:
 def _content(found: Result) -> int:
     """Number of energies and rates: of two incomplete results, the one with more is kept."""
     return len(found.energies) + len(found.rates)
-
-
-def _part(record: Result, place: int, label: int) -> Result:
-    """The part of a result that is about one of its attractors."""
-    return dataclasses.replace(
-        record,
-        energies=tuple(e for e in record.energies if e.source == label),
-        branches=tuple(e for e in record.branches if e.source == label),
-        findings=tuple(f for f in record.findings if f.source in (None, label)),
-        data=record.data.isel(source=[place]),
-    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -21,7 +22,8 @@ from vibrokit.comparison.sensitivities import Sensitivity, sensitivities
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.labels import goal_name, goal_of, label_of
+from vibrokit.results.labels import exit_between, goal_name, goal_of, label_of
+from vibrokit.results.merging import part_of
 from vibrokit.results.nested import nested, records_in
 from vibrokit.results.rated import METASTABLE, RatedResult
 from vibrokit.results.record import Record
@@ -196,12 +198,7 @@ class Assessment(Record):
         StructureError
             As for `mean_time`; the time is shorter than a period, or no intensity gives it within what is known.
         """
-        time, (start, end) = seconds_in(mean_time, period=self.period), self._labels(source, target)
-        if time < self.period:
-            raise StructureError(
-                f"mean_time must be a period at least ({self.period:g} s), for exits are counted once in a period, got "
-                f"{shown(mean_time)}."
-            )
+        time, (start, end) = required_time(mean_time, self.period), self._labels(source, target)
         solved = intensity_for(self._mean_times(start, end), math.log(time), self._energy(start, end))
         if solved is None:
             raise StructureError(
@@ -222,10 +219,20 @@ class Assessment(Record):
         Raises
         ------
         StructureError
-            The rates of some state are not known.
+            The rates of some state are not known, or motion leaves some state for good: then no state has a share of
+            time in the long run.
         """
         at = self._checked(intensity)
         count = len(self.names)
+        if not count:
+            raise StructureError("no steady state is known, so that nothing has a share of time; give more time.")
+        ends = {(rate.source, rate.target) for one in self.rated.values() for rate in one.rates if rate.target < 0}
+        if ends:
+            listed = ", ".join(exit_between(self.names, *way) for way in sorted(ends))
+            raise StructureError(
+                f"motion that leaves does not come back ({listed}), so that no state has a share of time in the long "
+                "run; ask how long each lasts."
+            )
         logs, lower, upper = (np.full((count, count), end) for end in (-np.inf, -np.inf, np.inf))
         for start in range(count):
             self._mean_times(start, None)  # raises where nothing is known
@@ -286,6 +293,16 @@ class Assessment(Record):
     def rated(self) -> dict[str, RatedResult]:
         """Results with rates, by name."""
         return {name: one for name, one in self.results.items() if isinstance(one, RatedResult)}
+
+    def parts(self, name: str) -> list[Result]:
+        """What one result says of each attractor that was analyzed; complete where its analysis came to its end."""
+        whole = self.results[name]
+        finished = self.settings.get("finished", {}).get(name, [])
+        source = whole.settings.get("source")
+        labels = range(len(self.names)) if source is None else [label_of(source, self.names)]
+        return [
+            dataclasses.replace(part_of(whole, label), complete=whole.complete or label in finished) for label in labels
+        ]
 
     def _labels(self, source: int | str, target: int | str | None) -> tuple[int, int | None]:
         return label_of(source, self.names), None if target is None else goal_of(target, self.names)
@@ -355,3 +372,14 @@ class Assessment(Record):
                 if apart < distance:
                     shares, distance = values[place], apart
         return shares
+
+
+def required_time(mean_time: float | str, period: float) -> float:
+    """Return a mean time that a state has to last (s); raises StructureError if it is shorter than a period."""
+    time = seconds_in(mean_time, period=period)
+    if time < period:
+        raise StructureError(
+            f"mean_time must be a period at least ({period:g} s), for exits are counted once in a period, got "
+            f"{shown(mean_time)}."
+        )
+    return time

@@ -50,6 +50,7 @@ def assess_scene(options: argparse.Namespace) -> int:
     from vibrokit.analyzers.exits import LeaveBasin
     from vibrokit.analyzers.settings import named_exit
     from vibrokit.assessment.assess import TIME_LIMIT, Request, improving
+    from vibrokit.assessment.assessment import required_time
     from vibrokit.assessment.durations import seconds_in
     from vibrokit.assessment.plausibility import plausibility
     from vibrokit.cli.interrupts import Interrupts
@@ -65,9 +66,10 @@ def assess_scene(options: argparse.Namespace) -> int:
     if options.figure is not None:
         checked_picture(options.figure)
     osc = load_scene(options.scene)
-    for duration in (options.mean_time, options.within):
-        if duration is not None:
-            seconds_in(duration, period=osc.section_interval)
+    if options.mean_time is not None:
+        required_time(options.mean_time, osc.section_interval)
+    if options.within is not None:
+        seconds_in(options.within, period=osc.section_interval)
     question = Question(options.mean_time, options.within)
     source = int(options.source) if options.source and options.source.isdecimal() else options.source
     limit = TIME_LIMIT if options.time_limit is None else options.time_limit

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import math
 import time
 from collections import Counter
 from collections.abc import Sequence
 from numbers import Real
 from typing import Any
-
-import numpy as np
 
 from vibrokit.comparison.of_exits import exit_quantities, with_prefactors
 from vibrokit.comparison.of_states import state_quantities
@@ -22,12 +19,10 @@ from vibrokit.comparison.verdicts import Verdict
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, shown
 from vibrokit.results.codes import Code
+from vibrokit.results.comparable import check_comparable
 from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
-
-_SAME_POINT = 0.01  # of the extent of the region: two searches find the same orbit with a much smaller difference
-_LARGEST_PERIOD = 64  # points: an orbit has fewer, a sample of chaotic motion more, which no two searches share
 
 
 @called
@@ -102,53 +97,7 @@ def _check(results: Sequence[Any]) -> None:
         raise StructureError(f"reconcile needs two results or more to compare, got {len(results)}.")
     first = results[0]
     for number, other in enumerate(results[1:], start=2):
-        changed = _differences(_noiseless(first.scene), _noiseless(other.scene))
-        if changed:
-            raise StructureError(
-                f"result {number} is of another scene than the first: {changed}. Reconcile results of one scene."
-            )
-        if first.names != other.names or len(first.section.points) != len(other.section.points):
-            raise StructureError(
-                f"result {number} has the attractors {', '.join(other.names) or 'none'}, and the first "
-                f"{', '.join(first.names) or 'none'}. Run all analyzers on one structure."
-            )
-        _check_points(first, other, number)
-
-
-def _check_points(first: Result, other: Result, number: int) -> None:
-    extent = np.ptp(first.section.bounds, axis=1)
-    for name, own, its in zip(first.names, first.section.points, other.section.points, strict=True):
-        if len(own) != len(its):
-            same = len(own) > _LARGEST_PERIOD and len(its) > _LARGEST_PERIOD
-            distance = 0.0 if same else math.inf
-        else:
-            distance = max(np.min(np.abs((its[:, :2] - point[:2]) / extent).max(axis=1)) for point in own)
-            distance = distance if len(own) <= _LARGEST_PERIOD else 0.0
-        if distance > _SAME_POINT:
-            raise StructureError(
-                f"{name} of result {number} lies elsewhere on the section than that of the first. Run all analyzers on "
-                "one structure."
-            )
-
-
-def _noiseless(scene: Any) -> dict[str, Any]:
-    """A scene without its noise intensity, which results may have in common or not: each rate has its own D."""
-    noise = {key: value for key, value in (scene.get("noise") or {}).items() if key != "intensity"}
-    return {**scene, "noise": noise}
-
-
-def _differences(one: Any, other: Any, path: str = "") -> str:
-    """The first place where plain data differ, with both values; empty if they are equal."""
-    if isinstance(one, dict) and isinstance(other, dict):
-        for key in {**one, **other}:
-            found = _differences(one.get(key), other.get(key), f"{path}.{key}" if path else str(key))
-            if found:
-                return found
-        return ""
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
-        pairs = zip(one, other, strict=True)
-        return next(filter(None, (_differences(a, b, f"{path}.{n}") for n, (a, b) in enumerate(pairs))), "")
-    return "" if one == other else f"{path} is {shown(other)} instead of {shown(one)}"
+        check_comparable(f"result {number}", other, first.scene, first.section)
 
 
 def _method_names(results: Sequence[Result]) -> tuple[str, ...]:

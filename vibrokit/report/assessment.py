@@ -57,14 +57,14 @@ def states_text(one: Assessment) -> str:
     """Return a line for each state: its share of time, how long it lasts, and its activation energy."""
     if not one.names:
         return "No steady state was found."
-    shares = _shares(one)
+    shares, why = _shares(one)
     rows: list[tuple[str, ...]] = [
         ("state", "share of time", "mean time until it is left", "by", "ΔU (m² s⁻³)", "bounds", "to")
     ]
     for label, name in enumerate(one.names):
         rows.append((name, shares[label], *_lasting(one, label), *_barrier(one, label)))
     head = f"At D = {one.intensity:g} m² s⁻³, a PSD of {2 * one.intensity:g} (m/s²)²/Hz:"
-    return "\n".join([head, *text_table(rows)])
+    return "\n".join([head, *text_table(rows), *why])
 
 
 def trust_text(one: Assessment) -> str:
@@ -72,7 +72,7 @@ def trust_text(one: Assessment) -> str:
     try:
         found = one.reconciliation
     except StructureError as error:
-        return f"The methods could not be compared: {error}" if one.results else ""
+        return f"The methods could not be compared: {error}" if len(one.results) > 1 else ""
     return f"{agreement_text(found)}\n{verdicts_text(found)}".strip()
 
 
@@ -111,17 +111,18 @@ def _answered(answer: Callable[[int], Answer], label: int) -> str:
         return str(error)
 
 
-def _shares(one: Assessment) -> list[str]:
+def _shares(one: Assessment) -> tuple[list[str], list[str]]:
+    """The share of time of each state, and why there is none."""
     try:
         found = one.occupancy()
-    except StructureError:
-        return ["not known" for _ in one.names]
+    except StructureError as error:
+        return ["–" for _ in one.names], [f"There are no shares of time: {error}"]
     texts = []
     for share, name in zip(found, one.names, strict=True):
         state = str(share["state"].item())
         interval = f"({float(share['lower']):.2g} to {float(share['upper']):.2g})"
         texts.append(f"{float(share):.3g} {interval}" if state == name else f"with {state}")
-    return texts
+    return texts, []
 
 
 def _lasting(one: Assessment, label: int) -> Sequence[str]:

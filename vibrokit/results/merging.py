@@ -1,13 +1,16 @@
-"""merged: one result of an analyzer from runs that left different attractors."""
+"""merged: one result of an analyzer from runs that left different attractors; part_of: the way back."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
+import xarray
 
 from vibrokit.errors import StructureError
+from vibrokit.results.comparable import noiseless
 from vibrokit.results.data import joined
 from vibrokit.results.result import Result
 
@@ -27,7 +30,10 @@ def merged(results: Sequence[R]) -> R:
     first = results[0]
     if len(results) == 1:
         return first
-    if any((type(one), one.scene, one.names) != (type(first), first.scene, first.names) for one in results):
+    if any(
+        (type(one), noiseless(one.scene), one.names) != (type(first), noiseless(first.scene), first.names)
+        for one in results
+    ):
         raise StructureError("results can be merged if they are of one analyzer and one scene.")
     labels = [label for one in results for label in _sources(one)]
     if len(set(labels)) < len(labels):
@@ -38,7 +44,7 @@ def merged(results: Sequence[R]) -> R:
             data[label] = one.data.isel(source=place).drop_vars(["source", "source_name"])
     return type(first)(
         scene=first.scene,
-        settings={**first.settings, "source": None, "intensities": None},
+        settings={key: None if key in ("source", "intensities") else value for key, value in first.settings.items()},
         findings=tuple(finding for one in results for finding in one.findings),
         stats=first.stats,
         complete=all(one.complete for one in results),
@@ -48,6 +54,23 @@ def merged(results: Sequence[R]) -> R:
         branches=tuple(branch for one in results for branch in one.branches),
         section=first.section,
         data=joined(data, first.names),
+    )
+
+
+def part_of(result: R, label: int) -> R:
+    """Return what a result says of one of its attractors, with its share of the time."""
+    sources = _sources(result)
+    some = [label] if label in sources else []
+    general = (None, label) if label == min([*sources, label]) else (label,)  # what is of no attractor is told once
+    data = result.data.isel(source=[sources.index(label)]) if some else xarray.Dataset()
+    return dataclasses.replace(
+        result,
+        settings={**result.settings, "source": label},
+        findings=tuple(finding for finding in result.findings if finding.source in general),
+        energies=tuple(energy for energy in result.energies if energy.source == label),
+        branches=tuple(energy for energy in result.branches if energy.source == label),
+        seconds=result.seconds / max(1, len(sources)),
+        data=data,
     )
 
 
