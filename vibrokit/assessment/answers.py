@@ -80,17 +80,27 @@ class MeanTime(Answer):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AllowedIntensity(Answer):
-    """The largest noise intensity at which a state lasts a given mean time."""
+    """The largest noise intensity at which a state lasts a given mean time.
+
+    Attributes
+    ----------
+    psd_ratio : float
+        One-sided power spectral density of the acceleration at rest over D: 2 for white noise; NaN for coloured noise.
+    """
+
+    psd_ratio: float
 
     @property
     def psd(self) -> tuple[float, float, float]:
-        """One-sided power spectral density of the acceleration, 2D, and its interval ((m/s²)²/Hz)."""
-        return 2 * self.value, 2 * self.lower, 2 * self.upper
+        """One-sided power spectral density of the acceleration and its interval ((m/s²)²/Hz)."""
+        return self.psd_ratio * self.value, self.psd_ratio * self.lower, self.psd_ratio * self.upper
 
     @property
     def number(self) -> str:
         """D and the spectral density that it stands for."""
         value, lower, upper = self.psd
+        if math.isnan(value):
+            return super().number
         return f"{super().number}, a PSD of {value:.3g} ({lower:.3g} to {upper:.3g}) (m/s²)²/Hz"
 
 

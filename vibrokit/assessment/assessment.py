@@ -13,7 +13,7 @@ import xarray
 
 from vibrokit.assessment.answers import AllowedIntensity, Answer, MeanTime, exponential
 from vibrokit.assessment.durations import seconds_in
-from vibrokit.assessment.plausibility import Plausibility, plausibility
+from vibrokit.assessment.plausibility import Measure, Plausibility, plausibility
 from vibrokit.comparison.mean_times import LogTime, MeanTimes, intensity_for, most_certain
 from vibrokit.comparison.occupancies import Balance, shares_over
 from vibrokit.comparison.reconcile import reconcile
@@ -71,6 +71,11 @@ class Assessment(Record):
     def plausibility(self) -> Plausibility:
         """Closed forms of the scene, and which of them are unusual; see `vibrokit.plausibility`."""
         return plausibility(self.oscillator)
+
+    @property
+    def psd_ratio(self) -> float:
+        """One-sided power spectral density of the acceleration at rest over D; NaN for coloured noise."""
+        return self.plausibility.value(Measure.PSD) / self.intensity
 
     @cached_property
     def reconciliation(self) -> Reconciliation:
@@ -209,7 +214,7 @@ class Assessment(Record):
         return AllowedIntensity(
             question=f"largest noise intensity at which {self._leaving(start, end)} after {mean_time} on average",
             value=found.intensity, lower=lower, upper=upper, unit="m² s⁻³", intensity=found.intensity,
-            methods=found.methods, extrapolated=found.extrapolated,
+            methods=found.methods, extrapolated=found.extrapolated, psd_ratio=self.psd_ratio,
         )  # fmt: skip
 
     @called

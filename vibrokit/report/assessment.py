@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -63,7 +64,9 @@ def states_text(one: Assessment) -> str:
     ]
     for label, name in enumerate(one.names):
         rows.append((name, shares[label], *_lasting(one, label), *_barrier(one, label)))
-    head = f"At D = {one.intensity:g} m² s⁻³, a PSD of {2 * one.intensity:g} (m/s²)²/Hz:"
+    density = one.psd_ratio * one.intensity
+    psd = "" if math.isnan(density) else f", a PSD of {density:.4g} (m/s²)²/Hz"
+    head = f"At D = {one.intensity:g} m² s⁻³{psd}:"
     return "\n".join([head, *text_table(rows), *why])
 
 
