@@ -613,3 +613,49 @@ def test_help_is_quick_and_light():
         subprocess.run([sys.executable, "-m", "vibrokit.cli", "--help"], check=True, capture_output=True)
         times.append(time.perf_counter() - began)
     assert min(times) < 0.5
+
+
+ASSESS = ["assess", "double-well"]
+
+
+def test_assess_prints_answers_and_keeps_them(toys, capsys):
+    status = main([*ASSESS, "--method", "toy", "-o", "a.nc"])
+    printed = capsys.readouterr().out
+    assert status == 0
+    assert "ΔU" in printed
+    assert "written: a.nc" in printed
+    assert vk.load_result("a.nc").complete
+
+
+def test_assess_prints_one_object(toys, capsys):
+    assert main([*ASSESS, "--method", "toy", "--json", "--within", "8h", "--mean-time", "1yr"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [one["analyzer"] for one in found["energies"]] == ["toy", "toy"]
+    assert found["complete"]
+    assert found["mean_times"] == found["occupancies"] == found["allowed_intensities"] == []
+
+
+def test_an_interrupted_assessment_is_printed_kept_and_taken_up(toys, capsys, monkeypatch):
+    def stop(problem):
+        press()
+
+    monkeypatch.setattr(Toy, "happens", staticmethod(stop))
+    assert main([*ASSESS, "--method", "toy", "--json", "-o", "a.nc"]) == 130
+    assert not json.loads(capsys.readouterr().out)["complete"]
+    assert not vk.load_result("a.nc").complete
+    monkeypatch.setattr(Toy, "happens", staticmethod(nothing_happens))
+    assert main([*ASSESS, "--method", "toy", "--json", "-o", "a.nc"]) == 0
+    assert json.loads(capsys.readouterr().out)["complete"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--accuracy", "1"], ["--accuracy", "nan"], ["--method", "nope"], ["--mean-time", "1 s"],
+        ["--mean-time=-3 s"], ["--within", "3 lightyears"], ["--time-limit", "-1"], ["-o", "no/folder.nc"], ["-o", "."],
+        ["--known", "nothing.nc"], ["--source", "nowhere"], ["--exit", "first-contact"],
+    ],
+)  # fmt: skip
+def test_assess_refuses_in_a_sentence(toys, capsys, options):
+    assert main([*ASSESS, "--method", "toy", *options]) == 2
+    assert capsys.readouterr().err.startswith("vibrokit: ")

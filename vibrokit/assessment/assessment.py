@@ -15,14 +15,14 @@ from vibrokit.assessment.answers import AllowedIntensity, Answer, MeanTime, expo
 from vibrokit.assessment.durations import seconds_in
 from vibrokit.assessment.plausibility import Measure, Plausibility, plausibility
 from vibrokit.comparison.mean_times import LogTime, MeanTimes, intensity_for, most_certain
-from vibrokit.comparison.occupancies import Balance, shares_over
+from vibrokit.comparison.occupancies import Balance, check_returns, shares_over
 from vibrokit.comparison.reconcile import reconcile
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.sensitivities import Sensitivity, sensitivities
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.labels import exit_between, goal_name, goal_of, label_of
+from vibrokit.results.labels import goal_name, goal_of, label_of
 from vibrokit.results.merging import part_of
 from vibrokit.results.nested import nested, records_in
 from vibrokit.results.rated import METASTABLE, RatedResult
@@ -231,13 +231,7 @@ class Assessment(Record):
         count = len(self.names)
         if not count:
             raise StructureError("no steady state is known, so that nothing has a share of time; give more time.")
-        ends = {(rate.source, rate.target) for one in self.rated.values() for rate in one.rates if rate.target < 0}
-        if ends:
-            listed = ", ".join(exit_between(self.names, *way) for way in sorted(ends))
-            raise StructureError(
-                f"motion that leaves does not come back ({listed}), so that no state has a share of time in the long "
-                "run; ask how long each lasts."
-            )
+        check_returns((rate for one in self.rated.values() for rate in one.rates), self.names)
         logs, lower, upper = (np.full((count, count), end) for end in (-np.inf, -np.inf, np.inf))
         for start in range(count):
             self._mean_times(start, None)  # raises where nothing is known

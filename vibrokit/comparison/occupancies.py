@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,8 @@ from scipy.special import expit, logsumexp
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.labels import exit_between
 from vibrokit.results.rated import HELD, METASTABLE, RatedResult
 from vibrokit.text_table import text_table
 
@@ -48,12 +50,14 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
     Raises
     ------
     StructureError
-        The result has no rates, or none of the exits of some state at some intensity.
+        The result has no rates, or none of the exits of some state at some intensity; or motion leaves some state for
+        good: then no state has a share of time in the long run.
     """
     if not isinstance(result, RatedResult):
         raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
     if not result.rates:
         raise StructureError("the result has no rates; see its findings.")
+    check_returns(result.rates, result.names)
     return shares_over(result.intensities, balances(result))
 
 
@@ -212,6 +216,17 @@ class Balance:
             )
         odds: Array = np.clip(inside - outside, -_FARTHEST, _FARTHEST)
         return odds
+
+
+def check_returns(rates: Iterable[ExitRate], names: Sequence[str]) -> None:
+    """Raise StructureError if motion leaves some attractor for good: then nothing balances in the long run."""
+    ends = sorted({(rate.source, rate.target) for rate in rates if rate.target < 0})
+    if ends:
+        listed = ", ".join(exit_between(names, *way) for way in ends)
+        raise StructureError(
+            f"motion that leaves does not come back ({listed}), so that no state has a share of time in the long run; "
+            "ask how long each lasts."
+        )
 
 
 def balances(result: RatedResult) -> list[Balance]:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from vibrokit.comparison.occupancies import balances
+from vibrokit.comparison.occupancies import balances, check_returns
 from vibrokit.comparison.quantities import Kind, Quantity
 from vibrokit.comparison.stationary import StationaryDensity
 from vibrokit.comparison.transitions import Transitions
@@ -32,8 +32,9 @@ def state_quantities(result: Result, method: str) -> list[Quantity]:
 def _shares(result: RatedResult, method: str) -> list[Quantity]:
     found = []
     try:
+        check_returns(result.rates, result.names)
         known = balances(result)
-    except StructureError:  # not every state was analyzed
+    except StructureError:  # not every state was analyzed, or one is left for good
         return []
     for intensity, balance in zip(result.intensities, known, strict=True):
         try:

@@ -1,0 +1,207 @@
+"""The road of an assessment: order of its stages, what is known, checkpoints, interrupts and arguments."""
+
+import dataclasses
+import math
+
+import pytest
+
+import vibrokit as vk
+from tests.assessment.test_assessment import BARRIERS, SCENE, STRUCTURE, rated
+from tests.builders import energy
+from tests.klein_kramers import double_well_rate
+from vibrokit.analyzers.settings import settings_of
+from vibrokit.errors import ParameterError, SceneError, StructureError, UnknownNameError, VibrokitError
+from vibrokit.results.least_action import LeastActionResult
+from vibrokit.results.mfet import MFETResult
+from vibrokit.results.section import Section
+from vibrokit.results.sgcm import SGCMResult
+from vibrokit.scene_file import scene_data, scene_from_data
+
+OSC = scene_from_data(SCENE)
+DATA = scene_data(OSC)
+KNOWN = dataclasses.replace(STRUCTURE, scene=DATA, complete=True, findings=())
+SECTION = Section.of(KNOWN)
+PATHS, BOTH = ("least-action", None), [("mfet", 0), ("sgcm", 0), ("mfet", 1), ("sgcm", 1)]
+
+
+def made(analyzer, kind=None, **changes):
+    """What an analyzer would return, at once."""
+    sources = (0, 1) if analyzer.source is None else (analyzer.source,)
+    common = {"scene": DATA, "settings": settings_of(analyzer), "complete": True, **changes}
+    if kind is None:
+        known = [energy(*way, value, lower=value, upper=value) for way, value in BARRIERS.items() if way[0] in sources]
+        return LeastActionResult(energies=tuple(known), section=SECTION, **common)
+    return dataclasses.replace(rated(kind, sources=sources), findings=(), section=SECTION, **common)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Which analyzers ran, with source and intensities; all return made-up results, and `stop` some incomplete."""
+    ran = []
+
+    def stub(name, kind):
+        def run(self, osc, structure, **options):
+            ran.append((name, self.source, getattr(self, "intensities", None)))
+            if stop == [len(ran)]:
+                return made(self, kind, complete=False)
+            return made(self, kind)
+
+        return run
+
+    stop = []
+    for cls, name, kind in (
+        (vk.LeastAction, "least-action", None), (vk.MFET, "mfet", MFETResult), (vk.SGCM, "sgcm", SGCMResult)
+    ):  # fmt: skip
+        monkeypatch.setattr(cls, "run", stub(name, kind))
+    monkeypatch.setattr("vibrokit.assessment.assess.find_structure", lambda osc, **options: KNOWN)
+    return ran, stop
+
+
+def which(ran):
+    return [one[:2] for one in ran]
+
+
+def test_paths_come_first_then_the_state_that_is_left_soonest_and_all_methods_share_a_ladder(calls):
+    ran, _ = calls
+    found = vk.assess(OSC, accuracy=0.1)
+    assert found.complete
+    assert which(ran) == [PATHS, *BOTH]
+    ladders = {source: {one[2] for one in ran if one[1] == source} for source in (0, 1)}
+    assert all(len(ladder) == 1 for ladder in ladders.values())
+    assert OSC.noise.intensity in next(iter(ladders[0]))
+    assert found.reconciliation.agreed
+
+
+def test_what_is_known_is_taken(calls):
+    ran, _ = calls
+    known = made(vk.LeastAction()), made(vk.MFET(), MFETResult), made(vk.SGCM(source=1), SGCMResult)
+    found = vk.assess(OSC, known=(*known, KNOWN))
+    assert which(ran) == [("sgcm", 0)]
+    assert found.complete
+    assert found.results["mfet"].rates == known[1].rates
+    assert {rate.source for rate in found.results["sgcm"].rates} == {0, 1}
+
+
+def test_what_is_known_of_one_state_does_not_stand_for_all(calls):
+    ran, _ = calls
+    vk.assess(OSC, methods=["least-action"], known=[made(vk.LeastAction(source=0))])
+    vk.assess(OSC, methods=["least-action"], source=1, known=[made(vk.LeastAction())])
+    assert which(ran) == [PATHS]
+
+
+def test_a_second_result_of_a_method_stands_beside_the_first(calls):
+    first = made(vk.MFET(), MFETResult)
+    other = dataclasses.replace(
+        first, data=first.data.assign(rate_intensity=first.data["rate_intensity"] / 1.7), findings=()
+    )
+    found = vk.assess(OSC, known=[first, other, first])
+    assert [name for name in found.results if name.startswith("mfet")] == ["mfet", "mfet 2"]
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
+    ran, stop = calls
+    path = tmp_path / "a.nc"
+    stop.append(number)
+    first = vk.assess(OSC, checkpoint=path, time_limit=None)
+    assert not first.complete
+    assert which(ran) == [PATHS, *BOTH][:number]
+    stop.clear()
+    ran.clear()
+    second = vk.assess(OSC, checkpoint=path, time_limit=None)
+    assert which(ran) == [PATHS, *BOTH][number - 1 :]
+    assert second.complete
+    ran.clear()
+    third = vk.assess(OSC, known=[path])
+    assert third.complete
+    assert not ran
+    assert sum(one.seconds for one in third.results.values()) == pytest.approx(
+        sum(one.seconds for one in second.results.values())
+    )
+    vk.assess(OSC, known=[third], accuracy=0.05)
+    assert which(ran) == [PATHS, *BOTH]
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        (lambda: made(vk.LeastAction(), scene=scene_data(vk.load_scene("duffing"))), "another scene"),
+        (lambda: made(vk.LeastAction(exit=vk.FirstContact())), "other exits"),
+        (
+            lambda: dataclasses.replace(made(vk.LeastAction()), section=dataclasses.replace(SECTION, names=("a", "b"))),
+            "has the attractors a, b",
+        ),
+        (
+            lambda: dataclasses.replace(
+                made(vk.LeastAction()), section=dataclasses.replace(SECTION, points=SECTION.points[::-1])
+            ),
+            "elsewhere",
+        ),
+        (lambda: dataclasses.replace(KNOWN, scene=scene_data(vk.load_scene("duffing"))), "another scene"),
+        (lambda: 3.0, "a structure, a result or an assessment"),
+    ],
+)
+def test_what_is_known_of_something_else_is_refused(calls, known, words):
+    with pytest.raises(StructureError, match=words):
+        vk.assess(OSC, known=[known()])
+    assert not calls[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"accuracy": 0.0}, ParameterError), ({"accuracy": 1}, ParameterError),
+        ({"accuracy": math.nan}, ParameterError), ({"accuracy": "high"}, ParameterError),
+        ({"methods": []}, ParameterError), ({"methods": "sgcm"}, ParameterError),
+        ({"methods": ["sgmc"]}, UnknownNameError), ({"time_limit": 0}, StructureError),
+        ({"source": "nowhere"}, StructureError), ({"checkpoint": "no/such/folder/a.nc"}, VibrokitError),
+        ({"exit": "leave-basin"}, StructureError),
+    ],
+)  # fmt: skip
+def test_arguments_that_are_refused(calls, options, error):
+    with pytest.raises(error):
+        vk.assess(OSC, **options)
+    assert not calls[0]
+
+
+def test_scenes_without_noise_are_refused(calls):
+    for noise in (None, vk.WhiteNoise(0.0)):
+        with pytest.raises(SceneError):
+            vk.assess(dataclasses.replace(OSC, noise=noise))
+
+
+def test_a_single_state_is_kept_and_first_contact_is_offered(calls, monkeypatch, tmp_path):
+    one = dataclasses.replace(
+        KNOWN,
+        attractors=KNOWN.attractors[:1],
+        basins=dataclasses.replace(KNOWN.basins, labels=0 * KNOWN.basins.labels),
+    )
+    monkeypatch.setattr("vibrokit.assessment.assess.find_structure", lambda osc, **options: one)
+    with pytest.raises(StructureError, match="FirstContact"):
+        vk.assess(OSC, checkpoint=tmp_path / "a.nc")
+    assert vk.load_result(tmp_path / "a.nc").names == one.names
+
+
+WELL = vk.Oscillator(
+    natural_frequency=1.0, damping_ratio=0.2, spring=vk.CubicSpring(-1.0, 1.0), noise=vk.WhiteNoise(0.025)
+)
+
+
+@pytest.mark.slow
+def test_a_double_well_lasts_as_long_as_its_spectrum_says():
+    """ΔU/D = 8, exact rate by the spectrum of the Klein–Kramers operator."""
+    both = vk.assess(WELL, accuracy=0.3, time_limit=None, methods=["least-action", "sgcm"])
+    found = vk.assess(WELL, accuracy=0.3, time_limit=None, source=0, known=[both])
+    exact = -double_well_rate(0.2, 0.025)
+    (simulated,) = (rate for rate in found.results["mfet"].rates if rate.intensity == 0.025)
+    assert abs(-simulated.log_value - exact) < 3 * simulated.log_error
+    for source in (0, 1):
+        own = found.mean_time(source)
+        assert own.log_lower < exact < own.log_upper
+        assert found.energy(source).value == pytest.approx(0.2, rel=1e-6)
+        allowed = found.allowed_intensity(source, math.exp(exact))
+        assert allowed.lower < 0.025 < allowed.upper
+    shares = found.occupancy()
+    assert (shares["lower"] <= 0.5).all()
+    assert (shares["upper"] >= 0.5).all()
+    assert found.reconciliation.agreed
