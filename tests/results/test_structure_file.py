@@ -120,8 +120,8 @@ def stop(**changes):
 
 
 LIES = {
-    "a label above the attractors": (put("basin", (3, 4), 6), "'basin' goes from -3 to 6; -3 to 5"),
-    "a label below all": (put("basin", (0, 0), -4), "'basin' goes from -4"),
+    "a label above the attractors": (put("basin", (3, 4), 6), "'basin' goes from -3 to 6; -4 to 5"),
+    "a label below all": (put("basin", (0, 0), -5), "'basin' goes from -5"),
     "labels that are fractions": (lambda d, h: d.assign(basin=d["basin"] + 0.5), "'basin' holds numbers .* not whole"),
     "labels that are NaN": (lambda d, h: d.assign(basin=d["basin"] * np.nan), "'basin' holds numbers .* not whole"),
     "labels in one row": (lambda d, h: d.assign(basin=("n", d["basin"].values.ravel())), "shape .* any × any"),
