@@ -170,12 +170,14 @@ def test_bundled_scenes_are_not_odd():
 
 @pytest.mark.slow
 def test_right_scenes_of_other_people_are_rarely_odd():
-    """Three of 71: two are nearly overdamped, and the tip of one microscope touches softly."""
+    """Of the 91, three are nearly overdamped, one is pressed on its stop, and one microscope's tip touches softly."""
     cases = tomllib.loads(PUBLIC.read_text())["cases"]
     scenes = {case["name"]: scene_from_data(case["scene"]) for case in cases if isinstance(case.get("scene"), dict)}
     odd = {name: found for name, osc in scenes.items() if (found := codes(osc))}
     assert odd == {
         "langevin double well": {OddityCode.HEAVY_DAMPING},
+        "kramers double well": {OddityCode.HEAVY_DAMPING},
+        "lift-off from a preloaded stop": {OddityCode.PRELOADED},
         "washboard 0.5 0.9": {OddityCode.HEAVY_DAMPING},
         "tapping-mode afm": {OddityCode.STOP_SOFT},
     }
