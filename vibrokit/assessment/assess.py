@@ -15,7 +15,7 @@ from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known
-from vibrokit.assessment.ladder import at_intensities, fitted, ladder
+from vibrokit.assessment.ladder import fitted, ladder
 from vibrokit.construction import called
 from vibrokit.errors import OutOfTime, ParameterError, SceneError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
@@ -130,7 +130,7 @@ def assess(
         What counts as leaving; by default `LeaveBasin`.
     known : iterable of Record or path, optional
         A structure, results or assessments of this scene and this exit, as objects or as files. Those that are complete
-        are not computed again, whatever their accuracy.
+        are not computed again. Results of an assessment of less accuracy count as incomplete.
     checkpoint : path, optional
         A file in which the assessment is saved after each of its stages. If it exists, it is taken as known.
     rng : int
@@ -150,7 +150,7 @@ def assess(
     SceneError
         The scene has no noise.
     StructureError
-        There is nothing to leave, or what is known is of another scene.
+        No state can be left in this way, or a known record is of another scene.
     OutOfTime
         The time limit was reached before the steady states were found.
     """
@@ -158,35 +158,36 @@ def assess(
         osc, accuracy=accuracy, time_limit=time_limit, methods=methods, source=source, exit=exit or LeaveBasin(),
         rng=rng, executor=executor,
     )  # fmt: skip
-    last: Assessment | None = None
     with working(progress, request.time_limit) as work:
-        try:
-            for assessment in improving(osc, request, work, known, checkpoint):
-                last = assessment
-        except (KeyboardInterrupt, OutOfTime) as stopped:
-            if last is None:
-                raise
-            finding = Finding.stopped("the assessment", stopped)
-            last = dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
-    assert last is not None  # the first stage yields one, or raises
-    return last
+        return assessed(osc, request, work, known, checkpoint)
 
 
-def improving(
+def assessed(
     osc: Oscillator,
     request: Request,
     work: Work,
     known: Iterable[Any] = (),
     checkpoint: str | os.PathLike[str] | None = None,
-) -> Iterator[Assessment]:
-    """Yield the assessment after each of its stages. `work` measures the time and passes on interrupts."""
+) -> Assessment:
+    """Return the last assessment that was reached, and save it after each stage.
+
+    `work` is the work under way. If it is stopped before there is an assessment, its KeyboardInterrupt is raised.
+    """
     kept = None if checkpoint is None else checked_target(checkpoint)
     given = [*known, *([kept] if kept is not None and kept.exists() else [])]
-    road = _Road(osc, request, work, given)
-    for assessment in road.stages():
-        if kept is not None:
-            assessment.save(kept)
-        yield assessment
+    last: Assessment | None = None
+    try:
+        for assessment in _Road(osc, request, work, given).stages():
+            if kept is not None:
+                assessment.save(kept)
+            last = assessment
+    except (KeyboardInterrupt, OutOfTime) as stopped:
+        if last is None:
+            raise
+        finding = Finding.stopped("the assessment", stopped)
+        return dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
+    assert last is not None  # the first stage yields one, or raises
+    return last
 
 
 class _Road:
@@ -231,12 +232,13 @@ class _Road:
         order = sorted(labels, key=self._energy)
         runs = [(name, label) for label in order for name in rated]
         for number, (name, label) in enumerate(runs):
-            rates = at_intensities(rated[name], label, self._intensities(label))
+            rates = dataclasses.replace(rated[name], source=label, intensities=self._intensities(label))
             stopped = stopped or self._run(name, rates, [label], 1.0 / (len(runs) - number))
             self.complete = number == len(runs) - 1 and not stopped
             yield self._assessment()
-        self.complete = not stopped
-        yield self._assessment()
+        if not runs:
+            self.complete = not stopped
+            yield self._assessment()
 
     def _run(self, name: str, analyzer: Analyzer, labels: Sequence[int], share: float) -> bool:
         """Run one analyzer in a share of the time left; return whether the user stopped it."""
@@ -266,12 +268,12 @@ class _Road:
         which = f"{name} of {subject}" if subject else name
         self.left.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=which, reason=reason))
 
-    def _intensities(self, label: int) -> tuple[float, ...]:
-        """Noise intensities for one state; without an energy, the multiples of D that analyzers have by default."""
+    def _intensities(self, label: int) -> tuple[float, ...] | None:
+        """Noise intensities for one state; without an energy None, for those that analyzers have by default."""
         assert self.osc.noise is not None
         energy, own = self._energy(label), self.osc.noise.intensity
         if math.isinf(energy) or not energy > 0:
-            return 1.5 * own, 1.2 * own, own
+            return None
         return ladder(energy, own, self.request.accuracy)
 
     def _energy(self, label: int) -> float:

@@ -8,7 +8,6 @@ import math
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.least_action import LeastAction
 from vibrokit.analyzers.mean_exit_times import MFET
-from vibrokit.analyzers.sgcm_wkb import SGCM
 
 _RUNGS = ((0.05, (4.0, 7.0, 12.0)), (0.0, (4.0, 7.0, 12.0, 20.0)))
 """Least accuracy, and the values of ΔU/D at which rates are then computed: direct simulation is cheap up to 7,
@@ -51,10 +50,3 @@ def fitted(analyzer: Analyzer, accuracy: float) -> Analyzer:
             analyzer, target_error=error, replicas=max(16, math.ceil(_REPLICAS * (0.1 / error) ** 2))
         )
     return analyzer
-
-
-def at_intensities(analyzer: Analyzer, source: int, intensities: tuple[float, ...]) -> Analyzer:
-    """Return an analyzer for the exits of one attractor, at given noise intensities if it has such a setting."""
-    if isinstance(analyzer, MFET | SGCM):
-        return dataclasses.replace(analyzer, source=source, intensities=intensities)
-    return dataclasses.replace(analyzer, source=source)

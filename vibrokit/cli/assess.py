@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vibrokit.errors import OutOfTime, VibrokitError
-
 if TYPE_CHECKING:
     from vibrokit.assessment.assessment import Assessment
+    from vibrokit.report.assessment import Question
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], scene: argparse.ArgumentParser) -> None:
@@ -49,20 +47,21 @@ def assess_scene(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     from vibrokit.analyzers.exits import LeaveBasin
     from vibrokit.analyzers.settings import named_exit
-    from vibrokit.assessment.assess import TIME_LIMIT, Request, improving
+    from vibrokit.assessment.assess import TIME_LIMIT, Request, assessed
     from vibrokit.assessment.assessment import required_time
     from vibrokit.assessment.durations import seconds_in
     from vibrokit.assessment.plausibility import plausibility
     from vibrokit.cli.interrupts import Interrupts
+    from vibrokit.cli.run import source_of
     from vibrokit.progress import working
     from vibrokit.report.assessment import Question
-    from vibrokit.results.finding import Finding
+    from vibrokit.results.atomic import checked_target
     from vibrokit.results.pictures import checked_picture, save_figure
     from vibrokit.scene_file import load_scene
 
     for target in (options.output, options.figure):
-        if target is not None and not target.parent.is_dir():
-            raise VibrokitError(f"the folder {target.parent} of {target} does not exist; make it first.")
+        if target is not None:
+            checked_target(target)
     if options.figure is not None:
         checked_picture(options.figure)
     osc = load_scene(options.scene)
@@ -71,7 +70,7 @@ def assess_scene(options: argparse.Namespace) -> int:
     if options.within is not None:
         seconds_in(options.within, period=osc.section_interval)
     question = Question(options.mean_time, options.within)
-    source = int(options.source) if options.source and options.source.isdecimal() else options.source
+    source = None if options.source is None else source_of(options.source)
     limit = TIME_LIMIT if options.time_limit is None else options.time_limit
     request = Request.of(
         osc, accuracy=options.accuracy, time_limit=limit or None, methods=options.method, source=source,
@@ -79,21 +78,13 @@ def assess_scene(options: argparse.Namespace) -> int:
     )  # fmt: skip
     if not options.json:
         print(f"{plausibility(osc)}\n", flush=True)
-    last: Assessment | None = None
     with Interrupts() as interrupts:
         with working(True, request.time_limit) as work:
             interrupts.stops(work)
             try:
-                for assessment in improving(osc, request, work, options.known, options.output):
-                    last = assessment
+                last = assessed(osc, request, work, options.known, options.output)
+            finally:
                 interrupts.finishing()
-            except (KeyboardInterrupt, OutOfTime) as stopped:
-                interrupts.finishing()
-                if last is None:
-                    raise
-                finding = Finding.stopped("the assessment", stopped)
-                last = dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
-        assert last is not None  # the first stage yields one, or raises
         _print(options, last, question)
         if options.figure is not None and not interrupts.requested:
             save_figure(last.plot(), options.figure)
@@ -103,11 +94,10 @@ def assess_scene(options: argparse.Namespace) -> int:
     return 0 if last.complete else 1
 
 
-def _print(options: argparse.Namespace, last: Assessment, question: object) -> None:
-    from vibrokit.report.assessment import Question, assessment_data, assessment_text
+def _print(options: argparse.Namespace, last: Assessment, question: Question) -> None:
+    from vibrokit.report.assessment import assessment_data, assessment_text
     from vibrokit.results.record import versions
 
-    assert isinstance(question, Question)
     if options.json:
         found = {"scene": options.scene, **assessment_data(last, question), "versions": versions()}
         print(json.dumps({**found, "seed": options.seed, "seconds": last.seconds}, allow_nan=False))

@@ -6,20 +6,18 @@ import argparse
 import json
 import sys
 
-from vibrokit.errors import StructureError
-
 
 def reconcile_files(options: argparse.Namespace) -> int:
     """Run the command and return its exit status: 1 if methods disagree or a result is incomplete."""
     from vibrokit.comparison.reconcile import reconcile
     from vibrokit.report.data import reconciliation_data
     from vibrokit.report.text import record_text
+    from vibrokit.results.atomic import checked_target
     from vibrokit.results.files import load_result
     from vibrokit.results.record import versions
 
-    if options.output is not None and not options.output.parent.is_dir():
-        folder = options.output.parent
-        raise StructureError(f"the folder {folder} of {options.output} does not exist; make it first.")
+    if options.output is not None:
+        checked_target(options.output)
     found = reconcile(*map(load_result, options.file), level=options.level)
     if options.json:
         files = [str(path) for path in options.file]

@@ -27,8 +27,9 @@ def exit_quantities(result: Result, method: str) -> list[Quantity]:
     """Return the quantities of the exits in one result: for each target, and for all targets of a source together."""
     found = list(_energies(result, method))
     if isinstance(result, RatedResult) and result.rates:
+        standing = _Standing(result)
         for one in _exits(result):
-            times = _log_times(result, *one, method)
+            times = _log_times(result, standing, *one, method)
             found += [*times, *_slopes(times), *_fit(times)]
     if isinstance(result, SGCMResult):
         found += _barriers(result, method)
@@ -79,10 +80,11 @@ def _exits(result: RatedResult) -> list[tuple[int, int | None]]:
     return found
 
 
-def _log_times(result: RatedResult, source: int, target: int | None, method: str) -> list[Quantity]:
+def _log_times(
+    result: RatedResult, standing: _Standing, source: int, target: int | None, method: str
+) -> list[Quantity]:
     """ln τ of one exit at each intensity, descending."""
     own = [rate for rate in result.rates if rate.source == source]
-    standing = _Standing(result)
     found = []
     for intensity in sorted({rate.intensity for rate in own}, reverse=True):
         here = [rate for rate in own if rate.intensity == intensity]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from vibrokit.assessment.answers import Answer
@@ -81,13 +82,8 @@ def trust_text(one: Assessment) -> str:
 
 def assessment_data(one: Assessment, question: Question = Question()) -> dict[str, Any]:
     """Return the answers, verdicts and all numbers behind them as JSON has them."""
-    asked: dict[str, list[Any]] = {"mean_times": _each(one, one.mean_time)}
-    if question.within is not None:
-        within = question.within
-        asked["probabilities_of_leaving"] = _each(one, lambda label: one.probability_of_leaving(label, within))
-    if question.mean_time is not None:
-        wanted = question.mean_time
-        asked["allowed_intensities"] = _each(one, lambda label: one.allowed_intensity(label, wanted))
+    asked = {name: _each(one, answer) for name, answer in _asked(one, question).items()}
+    asked["mean_times"] = _each(one, one.mean_time)
     found = run_data(one.structure, one.results)
     found["findings"] += findings_data("assessment", one.findings, one.names)
     return plain(
@@ -97,14 +93,18 @@ def assessment_data(one: Assessment, question: Question = Question()) -> dict[st
 
 def _questions(one: Assessment, question: Question) -> list[str]:
     """Answers to what was asked, for each state."""
-    asked: list[Callable[[int], Answer]] = []
-    if question.within is not None:
-        within = question.within
-        asked.append(lambda label: one.probability_of_leaving(label, within))
-    if question.mean_time is not None:
-        wanted = question.mean_time
-        asked.append(lambda label: one.allowed_intensity(label, wanted))
+    asked = _asked(one, question).values()
     return ["\n".join(_answered(answer, label) for label in range(len(one.names))) for answer in asked]
+
+
+def _asked(one: Assessment, question: Question) -> dict[str, Callable[[int], Answer]]:
+    """What answers each part of a question for a state, by its name in JSON."""
+    asked: dict[str, Callable[[int], Answer]] = {}
+    if question.within is not None:
+        asked["probabilities_of_leaving"] = partial(one.probability_of_leaving, within=question.within)
+    if question.mean_time is not None:
+        asked["allowed_intensities"] = partial(one.allowed_intensity, mean_time=question.mean_time)
+    return asked
 
 
 def _answered(answer: Callable[[int], Answer], label: int) -> str:
