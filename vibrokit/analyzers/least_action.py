@@ -11,11 +11,12 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.polishing.polish import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.arguments import whole
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import Bound
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.result import Result
-from vibrokit.structure.validation import share, whole
+from vibrokit.structure.validation import share
 
 _MOST_ORBITS = 1000
 

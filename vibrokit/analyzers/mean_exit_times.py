@@ -16,6 +16,7 @@ from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.stages import committor_stages
+from vibrokit.arguments import whole
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
@@ -26,7 +27,7 @@ from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.result import Result
-from vibrokit.structure.validation import intensities, share, whole
+from vibrokit.structure.validation import intensities, share
 from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "Arrhenius fit"

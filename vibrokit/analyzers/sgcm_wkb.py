@@ -18,6 +18,7 @@ from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, res
 from vibrokit.analyzers.sgcm.energies import limit_of
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import DensitySolver
+from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
@@ -25,7 +26,7 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
-from vibrokit.structure.validation import gibibytes, intensities, whole
+from vibrokit.structure.validation import gibibytes, intensities
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate

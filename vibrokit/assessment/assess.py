@@ -119,7 +119,7 @@ def assess(
     osc : Oscillator
     accuracy : float
         Relative error that is wanted of the bounds of ΔU, and of simulated mean times (half of their 95 % interval);
-        above 0 and below 1. The intervals of the answers say what was reached.
+        above 0 and below 1. The intervals of the answers are the accuracy that was reached.
     time_limit : float, optional
         In seconds, 300 by default; None for as long as it takes.
     methods : sequence of str, optional
@@ -134,7 +134,7 @@ def assess(
     checkpoint : path, optional
         A file in which the assessment is saved after each of its stages. If it exists, it is taken as known.
     rng : int
-        Seed of what is random.
+        Seed of the random starts of the search for steady states.
     executor : concurrent.futures.Executor, optional
         As for `Analyzer.run`.
     progress : bool or callable, optional

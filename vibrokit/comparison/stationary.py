@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import logsumexp
 
+from vibrokit.arguments import pair
 from vibrokit.comparison.occupancies import balances, occupancies, shares_text
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import StructureError, shown
@@ -82,7 +82,7 @@ class StationaryDensity(metaclass=Constructed):
                 f"SGCM has no density of {', '.join(absent)}; run it without source=, and see the result's findings."
             )
         weights = np.array([balance.log_probabilities for balance in balances(result)])
-        x, v, parts = _on_one_grid(result, _checked(nodes))
+        x, v, parts = _on_one_grid(result, pair("StationaryDensity.of: nodes", nodes, least=2))
         density = logsumexp(parts + weights[:, :, None, None], axis=1)
         return cls(np.array(known), weights, density, x, v, result.section, occupancies(result))
 
@@ -156,14 +156,6 @@ class StationaryDensity(metaclass=Constructed):
 
     def __str__(self) -> str:
         return shares_text(self.occupancies)
-
-
-def _checked(nodes: Any) -> tuple[int, int]:
-    """Numbers of nodes, checked: the arguments of searches are checked in a room that needs Numba."""
-    pair = tuple(nodes) if isinstance(nodes, tuple | list) else ()
-    if len(pair) != 2 or not all(isinstance(n, Integral) and not isinstance(n, bool) and int(n) >= 2 for n in pair):
-        raise StructureError(f"StationaryDensity.of: nodes must be two whole numbers of 2 or more, got {shown(nodes)}.")
-    return int(pair[0]), int(pair[1])
 
 
 def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Array, Array]:

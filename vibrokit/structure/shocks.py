@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.arguments import whole
 from vibrokit.construction import called
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.named import named_stepper
@@ -21,7 +22,7 @@ from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.shock import ShapeStability, Shock
 from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.validation import check_belongs, check_means, whole
+from vibrokit.structure.validation import check_belongs, check_means
 from vibrokit.symbolic.flow_kind import Flow
 
 _RADII = 64  # sizes along each direction, of which the first fatal one and the one before are a bracket

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.arguments import pair, whole
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
@@ -26,7 +27,7 @@ from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import EQUAL, Orbit, same_point, section_equations, visited
 from vibrokit.structure.regions import search_region
 from vibrokit.structure.scales import states_at, units_of
-from vibrokit.structure.validation import check_means, pair, whole
+from vibrokit.structure.validation import check_means
 from vibrokit.symbolic.flow_kind import Flow
 
 _FINER = 8  # times as many cells on a side as starts, in which turning points of the map are searched for

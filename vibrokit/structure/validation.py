@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vibrokit.arguments import members, real
+from vibrokit.arguments import MOST_CELLS, members, pair, real, whole
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.kernels.named import check_stepper, name_of, named_stepper
 from vibrokit.kernels.stepper import Stepper
@@ -23,7 +23,6 @@ from vibrokit.scene_file import scene_data
 
 DEFAULT_CELLS = (200, 200)
 """Of the finest basin grid."""
-_MOST_CELLS = 10**9
 _MOST_EDGE = 10**12  # sections
 
 
@@ -61,15 +60,15 @@ class Request:
             "settling": settling,
             "refine": whole("refine", self.refine, 0, 10),
             "margin": None if self.margin is None else whole("margin", self.margin, 1, 100),
-            "budget": None if self.budget is None else whole("budget", self.budget, 1, _MOST_CELLS),
+            "budget": None if self.budget is None else whole("budget", self.budget, 1, MOST_CELLS),
             "edge_budget": None if self.edge_budget is None else whole("edge_budget", self.edge_budget, 1, _MOST_EDGE),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
         cells = self.cells or DEFAULT_CELLS
-        if math.prod(cells) * 4**self.refine > _MOST_CELLS:
+        if math.prod(cells) * 4**self.refine > MOST_CELLS:
             raise StructureError(
-                f"refine = {self.refine} makes more than {_MOST_CELLS} cells of {cells}; give a smaller number."
+                f"refine = {self.refine} makes more than {MOST_CELLS} cells of {cells}; give a smaller number."
             )
 
     @property
@@ -102,31 +101,11 @@ def seed_of(rng: int | np.random.Generator) -> int:
     return int(rng) if isinstance(rng, Integral) else int(generator.integers(2**63))
 
 
-def whole(name: str, number: Any, least: int, most: int) -> int:
-    """Return a whole number; a StructureError is raised if it is not one, or out of bounds."""
-    if isinstance(number, bool) or not isinstance(number, Integral) or not least <= int(number) <= most:
-        raise StructureError(f"{name} must be a whole number from {least} to {most}, got {shown(number)}.")
-    return int(number)
-
-
 def share(name: str, number: Any, least: float = 0.0) -> None:
     """Refuse a number that is not a share: above 0, at most 1 and not below `least`."""
     if not max(least, math.ulp(0.0)) <= real(number) <= 1:
         allowed = f"from {least:g} to 1" if least else "above 0 and at most 1"
         raise StructureError(f"{name} must be {allowed}, got {shown(number)}.")
-
-
-def pair(name: str, counts: Any, most: int = _MOST_CELLS, least: int = 1) -> tuple[int, int]:
-    """Return two whole numbers of at least some size, whose product is within bounds; raises StructureError."""
-    try:
-        first, second = (whole(name, count, least, most) for count in counts)
-    except (TypeError, ValueError, StructureError):
-        first = second = most + 1
-    if first * second > most:
-        raise StructureError(
-            f"{name} must be two whole numbers, {least} or more, whose product is at most {most}, got {shown(counts)}."
-        )
-    return first, second
 
 
 def gibibytes(name: str, amount: Any) -> float:

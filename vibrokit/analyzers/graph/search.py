@@ -17,6 +17,7 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.arguments import pair, whole
 from vibrokit.construction import Constructed
 from vibrokit.errors import SceneError, StructureError, counted
 from vibrokit.oscillator import Oscillator
@@ -25,7 +26,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
 from vibrokit.structure.scales import doublings_of
-from vibrokit.structure.validation import gibibytes, pair, whole
+from vibrokit.structure.validation import gibibytes
 from vibrokit.symbolic.flow_kind import Flow
 
 _BYTES_KEPT = 116  # for each node of each phase: V, its ceiling, b, R, predecessor, uphill start, flags

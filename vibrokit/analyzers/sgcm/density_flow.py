@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
@@ -20,7 +21,6 @@ from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.structure.linear_map import linear_map
-from vibrokit.structure.validation import whole
 from vibrokit.symbolic.flow_kind import Flow
 
 # Noise acts at the nodes of Gauss-Legendre quadrature with two nodes. On hertz-0.570 at D = 2e-5 and 340² nodes, ln of

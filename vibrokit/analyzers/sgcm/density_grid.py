@@ -12,11 +12,11 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, map_coordinates
 from scipy.special import logsumexp
 
+from vibrokit.arguments import pair
 from vibrokit.kernels.ensemble import UNBOUNDED
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
-from vibrokit.structure.validation import pair
 
 _FEWEST = 32  # nodes along each side
 _UNRESOLVED = 2.0  # in ln p above the floor: what is cut at 1 above it leaves an edge that is a little higher
@@ -40,7 +40,7 @@ class DensityGrid:
     x, v : array (nx,), (nv,)
     turn : float
         Distance along x after which states are the same, as on a circle; 0 if they are not. Beyond one turn there are
-        some nodes more on both sides, whose cells have no area: the flow brings to them what it brings to their copies.
+        some more nodes on both sides. Each repeats a node a turn away, and its cell has no area.
     """
 
     x: Array

@@ -15,12 +15,11 @@ from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget, growin
 from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.analyzers.shooting.starts import Ring, Starts
-from vibrokit.arguments import real
+from vibrokit.arguments import real, whole
 from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import TRAJECTORIES, stage
-from vibrokit.structure.validation import whole
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_PERIODS = 10**8
