@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.report.report import Report as Report
     from vibrokit.results.codes import Code as Code
     from vibrokit.results.codes import Severity as Severity
     from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
@@ -124,6 +125,7 @@ _MODULES = {
     "CustomSpring": "vibrokit.parts.spring.custom",
     "LinearSpring": "vibrokit.parts.spring.linear",
     "Spring": "vibrokit.parts.spring.spring",
+    "Report": "vibrokit.report.report",
     "ActivationEnergy": "vibrokit.results.energy",
     "Bound": "vibrokit.results.energy",
     "EnergyContinuation": "vibrokit.results.energy_continuation",

@@ -125,6 +125,11 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"save_scene: scene must be an Oscillator, got {shown(scene)}.")
+    write_atomically(path, scene_text(scene).encode("utf-8"))
+
+
+def scene_text(scene: Scene) -> str:
+    """Return the TOML text of a scene file; raises SceneError if the class of a part is not registered."""
     data = scene_data(scene)
     for kind, values in _named_parts(data):
         if ":" in values["name"]:
@@ -132,7 +137,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
                 f"{values['name']} is not registered, so a scene file cannot name it; register the class under the "
                 f"entry-point group {kind.value!r}."
             )
-    write_atomically(path, _toml(data).encode("utf-8"))
+    return _toml(data)
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:

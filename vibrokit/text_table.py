@@ -1,10 +1,13 @@
-"""Tables as text."""
+"""Tables, numbers and units as text."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
+_EXPONENT = re.compile(r"\^\(?([-+]?[0-9]+(?:/[0-9]+)?)\)?")
+_RAISED = str.maketrans("-0123456789/", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ᐟ")
 _LARGEST = 690.0  # logarithm of numbers that a float holds, at most
 
 
@@ -17,6 +20,11 @@ def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
 def number_text(value: float, form: str = ".3g") -> str:
     """Return a number in a format; a dash for NaN."""
     return "–" if math.isnan(value) else format(value, form)
+
+
+def unit_text(unit: str) -> str:
+    """Return a unit such as ``"m^2 s^(-1/2)"`` with raised exponents."""
+    return _EXPONENT.sub(lambda match: match[1].translate(_RAISED), unit)
 
 
 def power_text(logarithm: float) -> str:

@@ -12,7 +12,8 @@ from tests.builders import full_result, rewritten, say
 from vibrokit.cli import main
 from vibrokit.progress import Stats
 from vibrokit.report.data import plain, run_data
-from vibrokit.report.text import energy_table, findings_text, rate_table, record_text, stats_text
+from vibrokit.report.tables import energy_table, rate_table
+from vibrokit.report.text import findings_text, record_text, stats_text
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.exit_rate import ExitRate
@@ -39,7 +40,7 @@ def cells(line):
 
 
 def test_energies_are_told_by_name_with_their_bounds_and_their_ratio_to_the_noise():
-    lines = energy_table(result(), [THERE, BACK, TOUCH]).splitlines()
+    lines = energy_table(result(), [THERE, BACK, TOUCH]).lines
     heads = ["exit", "ΔU", "ΔU/D", "lower", "upper", "bound", "error", "residual", "saddle", "method"]
     assert [cell.strip() for cell in cells(lines[0])] == heads
     assert [cell.strip() for cell in cells(lines[1])] == [
@@ -64,11 +65,11 @@ class WithRates(Result):
 def test_rates_are_told_with_mean_times_of_any_size():
     section = Section(labels=np.zeros((1, 1), dtype=np.int16), bounds=np.zeros((2, 2)), points=(), names=NAMES)
     found = WithRates(energies=(), section=section, scene=SCENE)
-    lines = [[cell.strip() for cell in cells(line)] for line in rate_table(found).splitlines()]
+    lines = [[cell.strip() for cell in cells(line)] for line in rate_table(found).lines]
     assert lines[0] == ["exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method"]
     assert lines[1] == ["clear → hammering", "2e-05", "4", "0.25", "0.03", "commitment", "SGCM"]
     assert lines[2] == ["hammering → exit", "2e-05", "10^868.59", "10^-868.59", "0.5", "contact", "SGCM"]
-    assert rate_table(found) in record_text("scene", found)
+    assert rate_table(found).text in record_text("scene", found)
     (one, other) = run_data(None, {"sgcm": found})["rates"]
     assert (one["exit"], one["value"], one["analyzer"]) == ("clear → hammering", pytest.approx(0.25), "sgcm")
     assert (other["value"], other["log_value"]) == (0.0, -2000.0)
@@ -87,11 +88,11 @@ def test_rates_are_told_with_mean_times_of_any_size():
 )
 def test_an_energy_has_the_digits_that_its_error_leaves(error, shown):
     energy = ActivationEnergy(0, 1, 0.12345678912345, 0.1, 0.2, "graph", Bound.ESTIMATE, error)
-    assert cells(energy_table(result(), [energy]).splitlines()[1])[1].strip() == shown
+    assert cells(energy_table(result(), [energy]).lines[1])[1].strip() == shown
 
 
 def test_a_scene_without_noise_has_no_ratio():
-    assert "–" in energy_table(result(scene={"noise": None}), [THERE])
+    assert "–" in energy_table(result(scene={"noise": None}), [THERE]).rows[0]
 
 
 def test_findings_come_by_severity_with_advice_where_something_is_wrong():

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from vibrokit import __version__
-from vibrokit.cli import assess
+from vibrokit.cli import assess, report
 from vibrokit.errors import VibrokitError
 
 
@@ -116,9 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     reconcile.add_argument("-o", "--output", type=Path, metavar="FILE", help="save the reconciliation (netCDF)")
     reconcile.set_defaults(command=_reconcile)
 
-    report = commands.add_parser("report", help="print what a saved result says")
-    report.add_argument("file", type=Path)
-    report.set_defaults(command=_report)
+    report.add_parser(commands)
 
     equations = commands.add_parser("equations", parents=[scene], help="print the derived equations")
     equations.add_argument("--latex", action="store_true", help="as LaTeX")
@@ -187,14 +185,6 @@ def _reconcile(options: argparse.Namespace) -> int:
     from vibrokit.cli.reconcile import reconcile_files
 
     return reconcile_files(options)
-
-
-def _report(options: argparse.Namespace) -> None:
-    from vibrokit.report.text import record_text
-    from vibrokit.results.files import load_result
-
-    record = load_result(options.file)
-    print(record_text(f"{options.file}: {record.kind}", record))
 
 
 def _trade(options: argparse.Namespace) -> None:

@@ -21,6 +21,7 @@ from vibrokit.results.table import Table
 if TYPE_CHECKING:
     from vibrokit.plots.exit_times import ReconciliationArtists
 
+_DRAWN = ("intensity", "value", "error")  # of a quantity
 _ANY = -3  # in files: the label of leaving at all
 
 
@@ -131,24 +132,26 @@ class Reconciliation(Record):
         ----------
         ax : matplotlib Axes, optional
         """
-        from vibrokit.plots.exit_times import ExitTimes, reconciled_times
+        from vibrokit.plots.exit_times import ArrheniusLine, ExitTimes, reconciled_times
 
         series, methods, lines = list[ExitTimes](), list[str](), []
-        for source, target in self.exits:
+        for index, (source, target) in enumerate(self.exits):
+            place = [start for start, _ in self.exits[:index]].count(source)
             own = [q for q in self.quantities if (q.source, q.target) == (source, target)]
             title = exit_name(self.names, source, target)
             for method in self.methods:
                 times = [q for q in own if q.kind is Kind.LOG_TIME and q.method == method]
                 if times:
-                    numbers = [[getattr(q, name) for q in times] for name in ("intensity", "value", "error")]
-                    series.append(ExitTimes(numbers[0], numbers[1], numbers[2], source, f"{title}, {method}"))
+                    intensity, value, error = ([getattr(q, name) for q in times] for name in _DRAWN)
+                    series.append(ExitTimes(intensity, value, error, source, f"{title}, {method}", place))
                     methods.append(method)
             known = [q for q in own if q.kind is Kind.ENERGY and q.resolved]
             prefactors = [q for q in own if q.kind is Kind.LOG_PREFACTOR and q.resolved]
             if known and prefactors:
                 weakest = min(prefactors, key=lambda q: (q.intensity, q.error))
                 energy = min(known, key=lambda q: q.error)
-                lines.append((source, f"{title}, slope ΔU of {energy.method}", energy.value, weakest.value))
+                words = f"{title}, slope ΔU of {energy.method}"
+                lines.append(ArrheniusLine(energy.value, weakest.value, label=source, title=words, place=place))
         return reconciled_times(series, methods, lines, ax=ax)
 
     def to_dataset(self) -> xarray.Dataset:

@@ -28,15 +28,21 @@ _LABELS = {
 def reconciliation_text(one: Reconciliation) -> str:
     """Return how long each state lasts and whether the methods agree, the verdicts, and a table of each exit."""
     sections = [overview_text(one), verdicts_text(one)]
-    of_exits = [kind for kind in _LABELS if kind not in OF_STATES]
+    sections += ["\n".join([title, *text_table(rows)]) for title, rows in quantity_rows(one)]
+    return "\n\n".join(section for section in sections if section)
+
+
+def quantity_rows(one: Reconciliation) -> list[tuple[str, list[tuple[str, ...]]]]:
+    """Return for each exit and each share of time its name, and rows of its numbers by method under their heading."""
+    of_exits, found = [kind for kind in _LABELS if kind not in OF_STATES], []
     for source, target in one.exits:
         own = (q for q in one.quantities if (q.source, q.target) == (source, target) and q.kind in of_exits)
-        sections.append("\n".join([exit_name(one.names, source, target), *_rows(own, one.methods)]))
+        found.append((exit_name(one.names, source, target), _rows(own, one.methods)))
     for label, name in enumerate(one.names):
         shares = one.shares(label)
         if shares:
-            sections.append("\n".join([f"share of time in {name}", *_rows(shares, one.methods)]))
-    return "\n\n".join(section for section in sections if section)
+            found.append((f"share of time in {name}", _rows(shares, one.methods)))
+    return found
 
 
 def overview_text(one: Reconciliation) -> str:
@@ -76,20 +82,22 @@ def _lasting(one: Reconciliation) -> list[str]:
 
 def verdicts_text(one: Reconciliation) -> str:
     """Return the verdicts, the serious ones first."""
+    return "\n".join(f"{about} [{code}]: {sentence}" for about, code, sentence in verdict_rows(one))
+
+
+def verdict_rows(one: Reconciliation) -> list[tuple[str, str, str]]:
+    """Return what each verdict is about, its code and its sentence, the serious ones first."""
     order = list(Agreement)
     ranked = sorted(one.verdicts, key=lambda verdict: -order.index(verdict.code))
-    lines = [f"{verdict.about(one.names)} [{verdict.code}]: {verdict.sentence()}" for verdict in ranked]
-    return "\n".join(lines)
+    return [(verdict.about(one.names), str(verdict.code), verdict.sentence()) for verdict in ranked]
 
 
-def _rows(quantities: Iterable[Quantity], methods: tuple[str, ...]) -> list[str]:
+def _rows(quantities: Iterable[Quantity], methods: tuple[str, ...]) -> list[tuple[str, ...]]:
     cells: dict[tuple[str, str], dict[str, str]] = {}
     for q in sorted(quantities, key=lambda q: (list(_LABELS).index(q.kind), -q.intensity if q.resolved else 0.0)):
         at = number_text(q.intensity, ".4g")
         cells.setdefault((_LABELS[q.kind], at), {})[q.method] = _cell(q)
-    table = [("", "D", *methods)]
-    table += [(*key, *(row.get(method, "") for method in methods)) for key, row in cells.items()]
-    return text_table(table)
+    return [("", "D", *methods), *((*key, *(row.get(name, "") for name in methods)) for key, row in cells.items())]
 
 
 def _cell(q: Quantity) -> str:

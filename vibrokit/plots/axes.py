@@ -17,6 +17,8 @@ COLOURS = (
     "#3b6ea8", "#c8553d", "#588b5b", "#8e6bb0", "#c9a227", "#7a4b2a", "#d679a8", "#4aa3a2", "#1f3a5f", "#e08e45",
     "#9bbf3b", "#5b2a6e", "#6fb1e0", "#8c1c2f", "#0f6b4f", "#b58bd6", "#d9c56b", "#a66a52", "#e8a0a0", "#2b8fb3",
 )  # fmt: skip
+MARKS = "osD^vP*X"
+DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 _LEAST_SAMPLE = 4.0  # points
 _ROUNDING = 1e-9
 
@@ -33,6 +35,12 @@ def axes_or_new(ax: Axes | None, width: float = 6.0, height: float = 4.2) -> Axe
 def colour(label: int) -> str:
     """Return the colour of an attractor, the same in all pictures."""
     return COLOURS[label % len(COLOURS)]
+
+
+def mark(labels: Sequence[int], index: int) -> tuple[str, Any]:
+    """Return the marker and the dashes of one of several things, which differ for those of the same label."""
+    place = list(labels[:index]).count(labels[index])
+    return MARKS[place % len(MARKS)], DASHES[place % len(DASHES)]
 
 
 def rows(points: ArrayLike) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, rows, span
+from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, mark, named, rows, span
 from vibrokit.plots.basins import SectionArtists, cell_samples, section_portrait
 
 _BEGUN = 1e-4  # of the whole action: before, p₂ and S cannot be told from 0 in a picture
@@ -23,7 +23,6 @@ _DOTS: Mapping[str, Any] = {"markersize": 2.2, "markeredgewidth": 0}
 _LONE_DOTS: Mapping[str, Any] = {
     "linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black",
 }  # fmt: skip
-_DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -124,8 +123,7 @@ def exit_paths(
         whole = bool(curves) and curves[index]
         strands = 1 if whole or not 0 <= source < len(points) else len(rows(points[source]))
         title = titles[index] if titles else f"exit path from {attractor_name(source, names)}"
-        dashes = _DASHES[list(sources[:index]).count(source) % len(_DASHES)]
-        drawn.append(_draw_path(axes, rows(path), strands, index, colour(source), dashes, title))
+        drawn.append(_draw_path(axes, rows(path), strands, index, colour(source), mark(sources, index), title))
         if whole:
             drawn[-1][0][0].set_marker("")
     lines, starts, ends = (tuple(part) for part in zip(*drawn, strict=True)) if drawn else ((), (), ())
@@ -148,14 +146,14 @@ def _add_legend(artists: ExitPathArtists, given: Axes | None, labels: NDArray[An
 
 
 def _draw_path(
-    axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, dashes: Any, title: str
+    axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, look: tuple[str, Any], title: str
 ) -> tuple[tuple[Line2D, ...], Line2D, Line2D]:
     joined = strands <= _MOST_STRANDS
-    style = {**_DOTS, "linestyle": dashes} if joined else _LONE_DOTS
+    style = {**_DOTS, "linestyle": look[1]} if joined else _LONE_DOTS
     lines: list[Line2D] = []
     for first in range(strands if joined else 1):
         some, label = place[first::strands] if joined else place, "_strand" if first else title
-        lines.append(draw(axes, some, color=ink, marker="o", linewidth=0.9, zorder=5, label=label, **style))
+        lines.append(draw(axes, some, color=ink, marker=look[0], linewidth=0.9, zorder=5, label=label, **style))
     ring = {"linestyle": "none", "markersize": 9.5 + 3 * index, "markerfacecolor": "none", "markeredgewidth": 1.1}
     start, end = (
         draw(axes, some, marker=marker, label="_more" if index else word, markeredgecolor=ink, zorder=8, **ring)

@@ -16,8 +16,9 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new, colour, named, span
+from vibrokit.plots.axes import DASHES, axes_or_new, colour, mark, named, span
 
+_FILLS = ("none", "full", "left", "bottom", "right", "top")
 _POINTS: dict[str, Any] = {"marker": "o", "markersize": 4.5, "capsize": 2.5, "linewidth": 1.0}
 
 
@@ -37,6 +38,8 @@ class ExitTimes:
         Of the attractor that is left: chooses the colour.
     title : str
         What the legend calls the exit.
+    place : int
+        Among the exits of one attractor: chooses how markers are filled and lines are dashed.
     """
 
     intensities: ArrayLike
@@ -44,12 +47,24 @@ class ExitTimes:
     errors: ArrayLike
     label: int = 0
     title: str = ""
+    place: int = 0
 
     def in_order(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return 1/D in ascending order, ln τ and its errors."""
         inverse = 1.0 / np.asarray(self.intensities, dtype=float)
         order = np.argsort(inverse)
         return inverse[order], np.asarray(self.log_times, float)[order], np.asarray(self.errors, float)[order]
+
+
+@dataclasses.dataclass(frozen=True)
+class ArrheniusLine:
+    """ln τ = logarithm + energy/D of one exit; label, title and place as of `ExitTimes`."""
+
+    energy: float
+    logarithm: float
+    label: int = 0
+    title: str = ""
+    place: int = 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,10 +133,12 @@ def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTim
     ax : matplotlib Axes, optional
     """
     axes = axes_or_new(ax)
-    points = []
-    for one in exits:
+    labels, points = [one.label for one in exits], []
+    for index, one in enumerate(exits):
         inverse, log_times, errors = one.in_order()
-        points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **_POINTS))
+        marker, dashes = mark(labels, index)
+        style = {**_POINTS, "marker": marker, "linestyle": dashes, "color": colour(one.label)}
+        points.append(axes.errorbar(inverse, log_times, errors, label=one.title, **style))
     _label_times(axes)
     return ExitTimeArtists(axes, tuple(points), _legend(axes, points))
 
@@ -129,7 +146,7 @@ def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTim
 def reconciled_times(
     exits: Sequence[ExitTimes],
     methods: Sequence[str],
-    lines: Sequence[tuple[int, str, float, float]] = (),
+    lines: Sequence[ArrheniusLine] = (),
     *,
     ax: Axes | None = None,
 ) -> ReconciliationArtists:
@@ -140,8 +157,8 @@ def reconciled_times(
     exits : sequence of ExitTimes
     methods : sequence of str
         The method of each, which chooses its marker.
-    lines : sequence of (label, title, energy, logarithm)
-        ln τ = logarithm + energy/D, drawn over all 1/D.
+    lines : sequence of ArrheniusLine
+        Drawn over all 1/D.
     ax : matplotlib Axes, optional
     """
     axes = axes_or_new(ax, width=7.0, height=4.8)
@@ -153,16 +170,16 @@ def reconciled_times(
             **_POINTS,
             "marker": markers[method],
             "linestyle": "none",
-            "markerfacecolor": "none",
+            "fillstyle": _FILLS[one.place % len(_FILLS)],
             "markersize": 6.5,
         }
         points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **style))
         places += inverse.tolist()
     if places:
         across = np.linspace(min(places), max(places), 2)
-        for label, title, energy, logarithm in lines:
-            (line,) = axes.plot(across, logarithm + energy * across, "--", color=colour(label), lw=1.1, label=title)
-            drawn.append(line)
+        for line in lines:
+            style = {"color": colour(line.label), "linestyle": DASHES[line.place % len(DASHES)], "linewidth": 1.1}
+            drawn += axes.plot(across, line.logarithm + line.energy * across, label=line.title, **style)
     _label_times(axes)
     return ReconciliationArtists(axes, tuple(points), tuple(drawn), _legend(axes, [*points, *drawn]))
 

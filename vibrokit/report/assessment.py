@@ -12,13 +12,13 @@ from vibrokit.assessment.answers import Answer
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.comparison.tables import agreement_text, verdicts_text
 from vibrokit.errors import StructureError
+from vibrokit.report.blocks import Table
 from vibrokit.report.data import findings_data, plain, run_data
 from vibrokit.report.text import findings_text
 from vibrokit.results.codes import Severity
 from vibrokit.results.energy import bounds_text
 from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
-from vibrokit.text_table import text_table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,16 +59,22 @@ def states_text(one: Assessment) -> str:
     """Return a line for each state: its share of time, how long it lasts, and its activation energy."""
     if not one.names:
         return "No steady state was found."
-    shares, why = _shares(one)
-    rows: list[tuple[str, ...]] = [
-        ("state", "share of time", "mean time until it is left", "by", "ΔU (m² s⁻³)", "bounds", "to")
-    ]
-    for label, name in enumerate(one.names):
-        rows.append((name, shares[label], *_lasting(one, label), *_barrier(one, label)))
+    return "\n".join([f"At {noise_text(one)}:", *states_table(one).lines, *_shares(one)[1]])
+
+
+def noise_text(one: Assessment) -> str:
+    """Return the noise intensity of the scene, and its spectral density where that has a value."""
     density = one.psd_ratio * one.intensity
     psd = "" if math.isnan(density) else f", a PSD of {density:.4g} (m/s²)²/Hz"
-    head = f"At D = {one.intensity:g} m² s⁻³{psd}:"
-    return "\n".join([head, *text_table(rows), *why])
+    return f"D = {one.intensity:g} m² s⁻³{psd}"
+
+
+def states_table(one: Assessment) -> Table:
+    """Return a row for each state: its share of time, how long it lasts, and its activation energy."""
+    header = ("state", "share of time", "mean time until it is left", "by", "ΔU (m² s⁻³)", "bounds", "to")
+    shares = _shares(one)[0]
+    rows = tuple((name, shares[n], *_lasting(one, n), *_barrier(one, n)) for n, name in enumerate(one.names))
+    return Table("lasting", "How long each state lasts", header, rows)
 
 
 def trust_text(one: Assessment) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.comparison.verdicts import exit_name
-from vibrokit.report.text import noise_intensity
+from vibrokit.report.tables import noise_intensity
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding

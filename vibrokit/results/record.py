@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from vibrokit.oscillator import Oscillator
+    from vibrokit.report.report import Report
 
 _LIBRARIES = ("vibrokit", "numpy", "scipy", "sympy", "numba")
 
@@ -135,6 +136,13 @@ class Record(ABC, metaclass=Constructed):
         # The reader of scenes is in a layer above; it is found by name, as plug-ins are.
         oscillator: Oscillator = load_attribute("vibrokit.scene_file:scene_from_data")(self.scene)
         return oscillator
+
+    @called
+    def report(self, *others: Record, title: str = "Vibro-impact oscillator") -> Report:
+        """Return a page on this record, and on others of the same scene; see `vibrokit.Report`."""
+        # Reports stand above this layer; they are found by name, as plug-ins are.
+        report: Report = load_attribute("vibrokit.report.report:Report").of(self, *others, title=title)
+        return report
 
     @called
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -14,6 +14,7 @@ from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contac
 from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.friction import refuse_friction
+from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.removable import without_removable
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
@@ -288,6 +289,12 @@ class Model:
         present = self._present(self.noise_borders)
         lines += [f"{as_latex(border.gauge)} &{signs[border.relation]} 0" for border in present]
         return r"\begin{aligned}" + r"\\ ".join(lines) + r"\end{aligned}"
+
+    @property
+    def mathml(self) -> tuple[str, ...]:
+        """The equations as elements ``math`` of MathML, and the Hamiltonian of a scene with noise."""
+        lines = [rate_equation(q, rate) for q, rate in self.equations.items()]
+        return (*lines, definition("H", self.hamiltonian)) if self.momenta else tuple(lines)
 
     def _repr_latex_(self) -> str:
         return rf"$\displaystyle {self.latex}$"

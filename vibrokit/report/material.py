@@ -1,0 +1,65 @@
+"""What a report is about: records of one scene, put together as far as they belong together."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from vibrokit.assessment.assessment import Assessment
+from vibrokit.errors import ArgumentError, StructureError, shown
+from vibrokit.results.comparable import check_comparable, differences, noiseless
+from vibrokit.results.record import Record
+from vibrokit.results.result import Result
+from vibrokit.results.section import Section
+from vibrokit.results.structure import Structure
+
+
+def gathered(records: Sequence[Record]) -> list[Record]:
+    """Return the records of a report: a structure and its results become one assessment.
+
+    Raises
+    ------
+    ArgumentError
+        There is no record, or something is no record.
+    StructureError
+        The records are of different scenes, or a result is of other steady states than the structure.
+    """
+    if not records:
+        raise ArgumentError("a report needs a record at least, such as an assessment, a structure or a result.")
+    for one in records:
+        if not isinstance(one, Record):
+            raise ArgumentError(f"a report is made of records, such as an assessment or a result, got {shown(one)}.")
+        changed = differences(noiseless(records[0].scene), noiseless(one.scene))
+        if changed:
+            raise StructureError(f"the records are of different scenes: {changed}. Report one scene at a time.")
+    whole = next((one for one in records if isinstance(one, Assessment)), None)
+    structure = next((one for one in records if isinstance(one, Structure)), whole.structure if whole else None)
+    results = [one for one in records if isinstance(one, Result)]
+    if structure is None or (whole is None and not results):
+        return list(records)
+    others = [one for one in records if not isinstance(one, Assessment | Structure | Result)]
+    return [_assessment(whole, structure, results), *others]
+
+
+def _assessment(whole: Assessment | None, structure: Structure, results: Sequence[Result]) -> Assessment:
+    """An assessment with further results, or one of a structure and results."""
+    named = dict(whole.results) if whole else {}
+    for one in results:
+        check_comparable("a result", one, structure.scene, Section.of(structure))
+        named[_free_name(str(one.settings.get("analyzer") or one.kind), named)] = one
+    if whole is not None:
+        return dataclasses.replace(whole, results=named)
+    return Assessment(
+        structure=structure,
+        results=named,
+        scene=results[0].scene,
+        complete=structure.complete and all(one.complete for one in results),
+        seconds=structure.seconds + sum(one.seconds for one in results),
+        versions=structure.versions,
+    )
+
+
+def _free_name(name: str, taken: dict[str, Result]) -> str:
+    """A name, with a number where it is taken."""
+    count = sum(other == name or other.startswith(f"{name}-") for other in taken)
+    return f"{name}-{count + 1}" if count else name

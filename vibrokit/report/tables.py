@@ -1,0 +1,117 @@
+"""The tables of records: inputs, steady states, saddles, energies, sensitivities and rates."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import unicodedata
+from collections.abc import Iterable
+from typing import Any
+
+from vibrokit.oscillator import Oscillator
+from vibrokit.report.blocks import Table
+from vibrokit.results.basins import ESCAPED
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.labels import goal_name
+from vibrokit.results.record import Record
+from vibrokit.results.result import Result
+from vibrokit.results.structure import Structure
+from vibrokit.text_table import number_text, power_text, unit_text
+
+
+def input_table(osc: Oscillator) -> Table:
+    """Return every parameter of a scene with its symbol in the equations, its value and its unit, a row each."""
+    symbols, rows = osc.model.symbols, []
+    for path, declared, value in osc.entries:
+        unit = "not declared" if declared.unit is None else unit_text(declared.unit) or "1"
+        rows.append((path, symbol_text(str(symbols[path])) if path in symbols else "", number(value), unit))
+    rows += [(f"barriers.{index}.side", "", one.side, "") for index, one in enumerate(osc.barriers)]
+    return Table("inputs", "Inputs", ("parameter", "symbol", "value", "unit"), tuple(rows))
+
+
+def attractor_table(structure: Structure) -> Table:
+    """Return the steady states, a row each."""
+    header = ("attractor", "label", "kind", "period", "stop hits", "basin", "at (x, v)")
+    rows = []
+    for a in structure.attractors:
+        basin = f"{100 * a.basin_fraction:.2f} ± {100 * a.basin_fraction_error:.2f} %"
+        rows.append((a.name, str(a.label), a.kind, str(a.period), f"{a.impacts:.4g}", basin, _place(a.points, 6)))
+    return Table("states", "Steady states", header, tuple(rows))
+
+
+def saddle_table(structure: Structure) -> Table:
+    """Return the saddles, a row each."""
+    rows = []
+    for number, s in enumerate(structure.saddles):
+        sides = " | ".join(
+            goal_name(structure.names, label) if label >= 0 or label == ESCAPED else "–" for label in s.leads_to
+        )
+        kind = f"{s.kind}, in a chaotic set" if s.embedded else s.kind
+        sizes = ", ".join(f"{m.real:.6g}" if m.imag == 0 else f"{m:.4g}" for m in s.multipliers[:2])
+        rows.append((str(number), sides, kind, str(s.period), sizes, _place(s.points, 10)))
+    header = ("saddle", "between", "kind", "period", "multipliers", "at (x, v)")
+    return Table("saddles", "Saddles", header, tuple(rows))
+
+
+def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> Table:
+    """Return activation energies, a row each, also as multiples of the scene's noise intensity."""
+    intensity = noise_intensity(record)
+    header = ("exit", "ΔU", "ΔU/D", "lower", "upper", "bound", "error", "residual", "saddle", "method")
+    rows = []
+    for e in energies:
+        ratio = number_text(e.value / intensity if intensity else math.nan, ".4g")
+        bounds = f"{e.lower:.6g}", "unknown" if math.isinf(e.upper) else f"{e.upper:.6g}", str(e.bound)
+        errors = number_text(e.numerical_error, ".1e"), number_text(e.residual, ".1e")
+        saddle = str(e.saddle) if e.saddle >= 0 else "–"
+        value = f"{e.value:.{_digits(e)}g}"
+        rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, e.method))
+    return Table("energies", "Activation energies (m² s⁻³)", header, tuple(rows))
+
+
+def sensitivity_table(result: Result) -> Table:
+    """Return the derivative of each energy in each parameter, a row for each parameter that has an effect."""
+    known = [energy for energy in result.energies if energy.sensitivity]
+    names = dict.fromkeys(name for energy in known for name, value in energy.sensitivity.items() if value)
+    header = ("parameter", *(energy.exit_between(result.names) for energy in known))
+    rows = [(name, *(number_text(energy.sensitivity.get(name, math.nan), ".5g") for energy in known)) for name in names]
+    return Table("sensitivities", "Change of ΔU per unit of each parameter", header, tuple(rows))
+
+
+def rate_table(result: Result) -> Table:
+    """Return exit rates at finite noise, a row each, with the mean times that are their inverses."""
+    header = ("exit", "D", "mean time (s)", "rate (s⁻¹)", "error of ln", "event", "method")
+    rows = []
+    for rate in result.rates:
+        times = power_text(-rate.log_value), power_text(rate.log_value), f"{rate.log_error:.2g}"
+        rows.append((result.exit_of(rate), f"{rate.intensity:g}", *times, rate.event, rate.method))
+    return Table("rates", "Exit rates at finite noise", header, tuple(rows))
+
+
+def noise_intensity(record: Record) -> float:
+    """Return the noise intensity D of a record's scene (m² s⁻³); 0 without noise."""
+    return float((record.scene.get("noise") or {}).get("intensity", 0.0))
+
+
+def number(value: Any) -> str:
+    """Return the value of a parameter as text."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def symbol_text(name: str) -> str:
+    """Return the name of a symbol with a Greek letter as such: ``"omega_n"`` is ω_n."""
+    stem, *rest = name.split("_")
+    with contextlib.suppress(KeyError):  # no Greek letter has this name
+        stem = unicodedata.lookup(f"GREEK SMALL LETTER {stem}")
+    return "_".join((stem, *rest))
+
+
+def _digits(energy: ActivationEnergy) -> int:
+    """Significant digits of an energy, one more than its numerical error leaves certain."""
+    error = energy.numerical_error
+    if not (error > 0 and energy.value > 0):
+        return 6 if math.isnan(error) else 10
+    return min(10, max(2, 2 + math.floor(math.log10(energy.value / error))))
+
+
+def _place(points: Any, digits: int) -> str:
+    return f"({points[0, 0]:+.{digits}f}, {points[0, 1]:+.{digits}f})"
