@@ -122,7 +122,7 @@ def press(times=1):
 
 
 def test_run_prints_what_was_found_and_saves_it(toys, capsys):
-    assert main([*TOY, "-o", "r.nc"]) == 0
+    assert main([*TOY, "-o", "r.nc", "--verbose"]) == 0
     out = capsys.readouterr().out
     for text in ("left-rest", "equilibrium", "left-rest → right-rest", "ΔU/D", "certified", "A toy wrote this"):
         assert text.lower() in out.lower()
@@ -171,7 +171,7 @@ def test_saddles_are_in_the_json(toys, capsys):
 
 
 def test_a_structure_is_saved_and_drawn(toys, capsys):
-    assert main(["run", "double-well", "-o", "s.nc", "--analyzer"]) == 0
+    assert main(["run", "double-well", "-o", "s.nc", "--verbose", "--analyzer"]) == 0
     out = capsys.readouterr().out
     assert "saddle" in out
     assert "left-rest | right-rest" in out

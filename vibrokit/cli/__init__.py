@@ -95,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--checkpoint", type=Path, metavar="FILE", help="keep what mfet has done in this file, and go on from it"
     )
+    run.add_argument("--verbose", action="store_true", help="print saddles, all paths, sensitivities and all remarks")
     run.add_argument("--json", action="store_true", help="print one JSON object and draw nothing")
     run.add_argument(
         "-o", "--output", type=Path, metavar="FILE",

@@ -212,7 +212,8 @@ def _print_records(outcome: Outcome, options: argparse.Namespace) -> None:
 
     for name, record in outcome.records.items():
         if not options.json and name not in outcome.printed:
-            print(record_text(f"{options.scene}: {name}", record), end="\n\n", flush=True)
+            text = record_text(f"{options.scene}: {name}", record, brief=not options.verbose)
+            print(text, end="\n\n", flush=True)
             outcome.printed.add(name)
 
 

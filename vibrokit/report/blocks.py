@@ -22,6 +22,8 @@ class Table:
     header : tuple of str
     rows : tuple of tuple of str
         Each as long as the header.
+    detail : bool
+        Whether it is left out of a brief text.
     """
 
     kind: ClassVar[str] = "table"
@@ -30,6 +32,7 @@ class Table:
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    detail: bool = False
 
     @property
     def lines(self) -> list[str]:
@@ -57,6 +60,7 @@ class Sentences:
 
     lines: tuple[str, ...]
     listed: bool = False
+    detail: bool = False
 
     @property
     def text(self) -> str:
@@ -72,6 +76,7 @@ class Listing:
 
     title: str
     text: str
+    detail: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

@@ -29,11 +29,16 @@ from vibrokit.results.structure import Structure
 _LEAST_SHARE = 0.01  # of the time: shorter stages are not listed
 
 
-def record_text(title: str, record: Record) -> str:
-    """Return all that a record says: tables, findings, and one line on the work it took."""
+def record_text(title: str, record: Record, *, brief: bool = False) -> str:
+    """Return what a record says: tables, findings, and one line on the work it took.
+
+    A brief text has no tables of detail, and of the findings only warnings and errors.
+    """
     heading = title if record.complete else f"{title} (incomplete)"
-    texts = (block.text for block in blocks_of(record))
-    sections = [heading, *texts, findings_text(record.findings, record.names), stats_text(record)]
+    texts = (block.text for block in blocks_of(record) if not (brief and block.detail))
+    findings = [finding for finding in record.findings if not (brief and finding.severity is Severity.INFO)]
+    work = f"{record.seconds:.1f} s." if brief else stats_text(record)
+    sections = [heading, *texts, findings_text(findings, record.names), work]
     return "\n\n".join(section for section in sections if section)
 
 
@@ -62,7 +67,7 @@ def _reconciliation_blocks(reconciliation: Reconciliation) -> list[Block]:
 def _structure_blocks(structure: Structure) -> list[Block]:
     if not structure.attractors:
         return [Sentences(("No steady state was found.",))]
-    return [attractor_table(structure), saddle_table(structure)]
+    return [attractor_table(structure), dataclasses.replace(saddle_table(structure), detail=True)]
 
 
 @blocks_of.register
@@ -73,10 +78,11 @@ def _result_blocks(result: Result) -> list[Block]:
     if len(result.branches) > len(result.energies):
         ranked = sorted(result.branches, key=lambda branch: (branch.source, branch.target, branch.value))
         title = "All paths, the cheapest of each exit first"
-        found.append(dataclasses.replace(energy_table(result, ranked), name="paths", title=title))
-    found += [sensitivity_table(result), rate_table(result)]
+        found.append(dataclasses.replace(energy_table(result, ranked), name="paths", title=title, detail=True))
+    found += [dataclasses.replace(sensitivity_table(result), detail=True), rate_table(result)]
     if any(energy.target >= 0 for energy in result.energies):
-        found.append(Listing("Transitions", transitions_text(Transitions.of(result), noise_intensity(result))))
+        text = transitions_text(Transitions.of(result), noise_intensity(result))
+        found.append(Listing("Transitions", text, detail=True))
     return found
 
 
