@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
     from vibrokit.parts.spring.spring import Spring as Spring
     from vibrokit.report.report import Report as Report
+    from vibrokit.reproduction.reproduce import reproduce as reproduce
     from vibrokit.results.codes import Code as Code
     from vibrokit.results.codes import Severity as Severity
     from vibrokit.results.energy import ActivationEnergy as ActivationEnergy
@@ -126,6 +127,7 @@ _MODULES = {
     "LinearSpring": "vibrokit.parts.spring.linear",
     "Spring": "vibrokit.parts.spring.spring",
     "Report": "vibrokit.report.report",
+    "reproduce": "vibrokit.reproduction.reproduce",
     "ActivationEnergy": "vibrokit.results.energy",
     "Bound": "vibrokit.results.energy",
     "EnergyContinuation": "vibrokit.results.energy_continuation",

@@ -1,4 +1,4 @@
-"""The command line: vibrokit assess, run, reconcile, report, plot, equations, list, check, trade."""
+"""The command line: vibrokit assess, run, reconcile, report, reproduce, plot, equations, list, check, trade."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from vibrokit import __version__
-from vibrokit.cli import assess, report
+from vibrokit.cli import assess, report, reproduce
 from vibrokit.errors import VibrokitError
 
 
@@ -118,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     reconcile.set_defaults(command=_reconcile)
 
     report.add_parser(commands)
+    reproduce.add_parser(commands)
 
     equations = commands.add_parser("equations", parents=[scene], help="print the derived equations")
     equations.add_argument("--latex", action="store_true", help="as LaTeX")

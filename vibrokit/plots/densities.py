@@ -1,4 +1,4 @@
-"""Pictures of densities: marginals at some times."""
+"""Pictures of densities: marginals, with samples beside them, and densities on the section."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import dataclasses
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new
+from vibrokit.plots.axes import axes_or_new, colour, phase_plane
 
 _LABELS = {
     "x": (r"displacement $x$ (m)", r"density of $x$ (m$^{-1}$)"),
@@ -61,3 +62,76 @@ def marginal_lines(
     ax.set_ylabel(_LABELS[axis][1])
     ax.set_ylim(bottom=0.0)
     return MarginalArtists(ax, tuple(lines), ax.legend(fontsize=8, frameon=False))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DensityArtists(Artists):
+    """A density on the section.
+
+    Attributes
+    ----------
+    ax : Axes
+    image : QuadMesh
+    """
+
+    image: QuadMesh
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SampledArtists(Artists):
+    """A density and a sample.
+
+    Attributes
+    ----------
+    ax : Axes
+    line, dots : Line2D
+    """
+
+    line: Line2D
+    dots: Line2D
+
+
+def sampled_density(
+    places: ArrayLike, density: ArrayLike, sample: ArrayLike, *, ax: Axes | None = None
+) -> SampledArtists:
+    """Draw a density of displacement as a line, and the shares of a sample as dots.
+
+    Parameters
+    ----------
+    places, density : array_like (n,)
+        In m and m⁻¹.
+    sample : array_like (count,)
+        Displacements (m).
+    ax : matplotlib Axes, optional
+    """
+    axes = axes_or_new(ax)
+    shares, edges = np.histogram(np.asarray(sample, dtype=float), 120, density=True)
+    (line,) = axes.plot(places, density, color=colour(0), label="density")
+    (dots,) = axes.plot(
+        (edges[1:] + edges[:-1]) / 2, shares, ".", color=colour(1), markersize=4, label=f"{np.size(sample)} simulations"
+    )
+    axes.set_xlabel(_LABELS["x"][0])
+    axes.set_ylabel(_LABELS["x"][1])
+    axes.set_ylim(bottom=0.0)
+    axes.legend(fontsize=8, frameon=False)
+    return SampledArtists(axes, line, dots)
+
+
+def density_map(x: ArrayLike, v: ArrayLike, density: ArrayLike, *, ax: Axes | None = None) -> DensityArtists:
+    """Draw a density on the section as shades.
+
+    Parameters
+    ----------
+    x, v : array_like (nx,), (nv,)
+        Nodes (m, m s⁻¹).
+    density : array_like (nx, nv)
+        In s m⁻².
+    ax : matplotlib Axes, optional
+    """
+    axes = axes_or_new(ax)
+    image = axes.pcolormesh(x, v, np.transpose(density), cmap="magma_r", shading="nearest", rasterized=True)
+    figure = axes.get_figure(root=True)
+    if figure is not None:
+        figure.colorbar(image, ax=axes, label=r"density $p$ (s m$^{-2}$)")
+    phase_plane(axes)
+    return DensityArtists(axes, image)

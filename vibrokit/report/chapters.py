@@ -36,7 +36,8 @@ def chapters_of(records: Sequence[Record]) -> tuple[Chapter, ...]:
         Chapter(_heading(name), (*blocks_of(part), *pictures_of(part, f"r{number}")))
         for number, (name, part) in enumerate(parts)
     ]
-    found = [*answers, _scene(osc), *evidence, *_agreement(records), _limits(parts, records), _computed(parts, osc)]
+    made = work_chapter(parts, _scene_file(osc))
+    found = [*answers, _scene(osc), *evidence, *_agreement(records), _limits(parts, records), made]
     return tuple(chapter for chapter in found if chapter.blocks)
 
 
@@ -92,23 +93,26 @@ def _limits(parts: Sequence[Named], records: Iterable[Record]) -> Chapter:
     return Chapter("What limits the numbers", tuple(blocks))
 
 
-def _computed(parts: Sequence[Named], osc: Oscillator) -> Chapter:
+def work_chapter(parts: Sequence[Named], *more: Block) -> Chapter:
+    """Return how records were computed: work, versions and settings of each, and more."""
     rows = [
         (name, "yes" if part.complete else "no", "–" if part.seed is None else str(part.seed), stats_text(part))
         for name, part in parts
     ]
     versions = dict.fromkeys(pair for _, part in parts for pair in part.versions.items())
-    settings = [Listing(f"Settings of {name}", _settings_text(part)) for name, part in parts]
     blocks: list[Block] = [
         Table("work", "Work", ("part", "complete", "seed", "time"), tuple(rows)),
         Table("versions", "Versions", ("program", "version"), tuple(versions)),
-        *settings,
+        *(Listing(f"Settings of {name}", _settings_text(part)) for name, part in parts),
     ]
+    return Chapter("How it was computed", (*blocks, *more))
+
+
+def _scene_file(osc: Oscillator) -> Block:
     try:
-        blocks.append(Listing("Scene file, to repeat it", scene_text(osc)))
+        return Listing("Scene file, to repeat it", scene_text(osc))
     except VibrokitError as error:
-        blocks.append(Sentences((f"The scene cannot be written to a file: {error}",)))
-    return Chapter("How it was computed", tuple(blocks))
+        return Sentences((f"The scene cannot be written to a file: {error}",))
 
 
 def _settings_text(record: Record) -> str:

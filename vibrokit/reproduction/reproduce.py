@@ -1,0 +1,121 @@
+"""reproduce: the paper, whole, into a folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from vibrokit.arguments import path_of
+from vibrokit.construction import called
+from vibrokit.errors import FileError, VibrokitError
+from vibrokit.plots.inline_svg import inline_svg
+from vibrokit.progress import Progress, working
+from vibrokit.report.blocks import Chapter, Picture, Sentences, Table
+from vibrokit.report.chapters import work_chapter
+from vibrokit.report.report import Report
+from vibrokit.reproduction.comparison import verdicts
+from vibrokit.reproduction.figures import Figure, figures
+from vibrokit.reproduction.published import STATES
+from vibrokit.reproduction.steps import Step, steps
+from vibrokit.reproduction.verdicts import Match, Verdict
+from vibrokit.reproduction.work import Records, do
+from vibrokit.results.pictures import save_figure
+
+PAGE = "reproduction.html"
+PUBLISHED = "published"
+"""Name of the table of published numbers."""
+
+
+@called
+def reproduce(
+    folder: str | os.PathLike[str], *, quick: bool = False, progress: Progress = None, time_limit: float | None = None
+) -> Report:
+    """Compute the paper's numbers by all methods, draw its figures, and compare: a folder to look at.
+
+    The folder gets each record (netCDF), each figure (PNG), the tables (CSV) and a page, ``reproduction.html``. Work
+    that was stopped goes on from the records that are there, with the same numbers to the last bit.
+
+    Parameters
+    ----------
+    folder : str or path
+        Is made if it is missing.
+    quick : bool
+        Fewer starts, nodes and exits.
+    progress : bool or callable, optional
+        As of `vibrokit.find_structure`.
+    time_limit : float, optional
+        In seconds; the report of what was reached is returned, marked incomplete.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    FileError
+        The folder or a file cannot be written.
+    """
+    target, wanted = made_folder(folder), steps(quick=quick)
+    with working(progress, time_limit):
+        records = do(wanted, target)
+    return publish(records, wanted, target)
+
+
+def made_folder(folder: str | os.PathLike[str]) -> Path:
+    """Return a folder, made if it is missing; raises FileError."""
+    target = path_of(folder)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{target} cannot be made a folder ({error.strerror}); give another one.") from error
+    return target
+
+
+def publish(records: Records, wanted: Sequence[Step], folder: Path) -> Report:
+    """Write figures, tables and the page of the records that are there; return the report."""
+    report = _report(records, complete=sum(map(len, records.values())) == len(wanted), folder=folder)
+    report.save(folder / PAGE)
+    report.save_tables(folder)
+    return report
+
+
+def _report(records: Records, *, complete: bool, folder: Path) -> Report:
+    found = verdicts(records)
+    met = sum(one.match is Match.MET for one in found)
+    summary = (
+        f"{met} of {len(found)} published activation energies are met. I is the state that hits the stops "
+        f"({STATES['I']}), N the one that runs clear ({STATES['N']}).",
+    )
+    pictures = [picture for one in figures(records) for picture in _drawn(one, folder)]
+    parts = [(f"{scene}, {name}", record) for scene, known in records.items() for name, record in known.items()]
+    chapters = (
+        Chapter("Published numbers", (Sentences(summary), verdict_table(found))),
+        Chapter("Figures", tuple(pictures)),
+        work_chapter(parts),
+    )
+    return Report("The paper, reproduced", complete, chapters)
+
+
+def _drawn(one: Figure, folder: Path) -> list[Picture | Sentences]:
+    """A figure for the page, and saved as a picture; a sentence where there is nothing to draw."""
+    title = f"Figure {one.number}, {one.scene}. {one.caption}"
+    try:
+        save_figure(one.draw(), folder / f"{one.name}.png")
+        return [Picture(inline_svg(one.draw, one.name), title)]
+    except VibrokitError as error:
+        return [Sentences((f"{title} It could not be drawn: {error}",))]
+
+
+def verdict_table(found: list[Verdict]) -> Table:
+    """Return a row for each published number: ours beside it, the certified one, and why they differ."""
+    rows = tuple(
+        (
+            one.published.scene, one.published.state, str(one.published.method), f"{one.published.value:.4g}",
+            f"{one.value:.4g} ({one.lower:.4g} to {one.upper:.4g})", f"{one.certified:.6g}", str(one.match),
+            one.sentence,
+        )
+        for one in found
+    )  # fmt: skip
+    header = ("scene", "state", "method", "published", "here", "certified", "verdict", "reason")
+    return Table(PUBLISHED, "Activation energies (m² s⁻³)", header, rows)

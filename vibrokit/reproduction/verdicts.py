@@ -1,0 +1,113 @@
+"""Verdicts: whether a published number is met, and if not, why."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from enum import StrEnum
+
+from vibrokit.reproduction.published import Published
+
+_SAMPLES = 1e9  # the states of a simulation that fills a histogram, at most
+
+
+class Match(StrEnum):
+    """Whether a published number is met; `reason` is a sentence with the fields of a `Verdict`."""
+
+    reason: str
+
+    def __new__(cls, value: str, reason: str) -> Match:
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.reason = reason
+        return member
+
+    MET = "met", "It lies within the interval."
+    RING = (
+        "ring",
+        "A certified path costs {below:.0%} less. Starts on one circle at one phase miss the cheapest path; the circle "
+        "of the paper gives {beside:.4g} here.",
+    )
+    TAILS = (
+        "sampled-tails",
+        "At this noise, {depth:.3g} = ΔU/D; the density at the saddle is below a part in {samples:.0e} of its maximum, "
+        "which no simulation samples.",
+    )
+    REGIME = (
+        "regime-not-reached",
+        "It is a number at finite noise. Here the same method gives {beside:.4g} at that noise, and {certified:.4g} in "
+        "the limit.",
+    )
+    NOT_MET = "not-met", "It lies outside the interval."
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """A published number beside our own.
+
+    Attributes
+    ----------
+    published : Published
+    value, lower, upper : float
+        Our number by the same method, and its interval (m² s⁻³).
+    certified : float
+        The activation energy with the strongest bounds.
+    beside : float
+        What explains the difference, see `Match`; NaN if nothing does.
+    match : Match
+    depth : float
+        ΔU/D at the noise of the published number; NaN where it does not matter.
+    """
+
+    published: Published
+    value: float
+    lower: float
+    upper: float
+    certified: float
+    match: Match
+    beside: float = math.nan
+    depth: float = math.nan
+
+    @property
+    def sentence(self) -> str:
+        """Why the number is met or not."""
+        below = 1 - self.certified / self.published.value
+        return self.match.reason.format(
+            below=below, beside=self.beside, depth=self.depth, samples=_SAMPLES, certified=self.certified
+        )
+
+
+def _within(one: Published, lower: float, upper: float) -> bool:
+    return lower - one.half_digit <= one.value <= upper + one.half_digit
+
+
+def of_action_plot(one: Published, lower: float, upper: float, ring: float) -> Verdict:
+    """Compare an action with certified bounds; `ring` is our own action by starts on the paper's circle."""
+    if _within(one, lower, upper):
+        match = Match.MET
+    else:
+        match = Match.RING if one.value > upper and ring > upper else Match.NOT_MET
+    return Verdict(one, upper, lower, upper, upper, match, beside=ring)
+
+
+def of_density(one: Published, value: float, error: float, certified: float, intensity: float) -> Verdict:
+    """Compare a barrier of the density with our own at the same noise intensity."""
+    depth = certified / intensity
+    if _within(one, value - error, value + error):
+        match = Match.MET
+    elif depth > math.log(_SAMPLES):
+        match = Match.TAILS
+    else:
+        match = Match.NOT_MET
+    return Verdict(one, value, value - error, value + error, certified, match, depth=depth)
+
+
+def of_exit_times(one: Published, slope: float, error: float, certified: float) -> Verdict:
+    """Compare a slope of ln τ with our own; the slope at finite noise need not be that of the limit."""
+    if _within(one, slope - error, slope + error):
+        match = Match.MET
+    elif abs(slope - certified) > error and (one.value - certified) * (slope - certified) > 0:
+        match = Match.REGIME
+    else:
+        match = Match.NOT_MET
+    return Verdict(one, slope, slope - error, slope + error, certified, match, beside=slope)
