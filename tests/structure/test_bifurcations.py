@@ -10,6 +10,7 @@ from vibrokit.kernels.choice import single_stepper
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.parameter_values import parameter_line
 from vibrokit.structure.tracing.following import follow
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -21,13 +22,13 @@ CLEAR, HAMMERING = (0.4666, 0.0026), (0.0236, -0.0491)  # of hertz-0.570
 
 def passed(osc, path, state, target, *, size=(2.0, 2.0), cycle=False):
     """What a motion meets from where the scene stands to the target, and whether it arrives there stable."""
-    stepper, start = single_stepper(osc, Flow.STATE_VARIATIONAL), osc.parameters[path]
+    stepper, start = single_stepper(osc, Flow.STATE_VARIATIONAL), parameter_line("test", osc, path).own
     if cycle:
         orbit = find_cycle(osc, np.array(state), stepper, longest=50.0)
     else:
         orbit = refine_orbit(osc, np.array(state), 1, stepper)
     attractor = describe_orbit(osc, orbit, stepper)
-    return follow(osc, path, attractor, start, target, np.array(size), stepper)
+    return follow(osc, parameter_line("test", osc, path), attractor, start, target, np.array(size), stepper)
 
 
 def only(followed, kind):
@@ -44,6 +45,21 @@ def rayleigh(*, spring="x + v*(v**2 - m)", m=0.2, excitations=(), barriers=()):
         natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(spring, m=m), excitations=excitations,
         barriers=barriers,
     )  # fmt: skip
+
+
+def test_both_gaps_tied_graze_at_the_amplitude_of_the_linear_response():
+    osc = vk.Oscillator(
+        natural_frequency=2.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.7, 2.9),),
+        barriers=(vk.Barrier(vk.Linear(30.0), 0.4, "right"), vk.Barrier(vk.Linear(30.0), -0.8, "left")),
+    )  # fmt: skip
+    response = 0.7 / (4 - 2.9**2 + 2j * 0.05 * 2 * 2.9)
+    state = (response.real, -2.9 * response.imag)
+    for tied, gap in (
+        ({"barriers.0.position": 1.0, "barriers.1.position": -2.0}, abs(response)),
+        ({"barriers.1.position": -1.0, "barriers.0.position": 0.5}, 2 * abs(response)),
+    ):
+        found = only(passed(osc, tied, state, 0.8 * gap), "grazing")
+        assert (found.side, found.value) == ("right", pytest.approx(gap, rel=1e-9))
 
 
 def test_grazing_of_the_clear_state_is_where_the_linear_response_reaches_the_stop():

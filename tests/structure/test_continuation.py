@@ -16,6 +16,7 @@ from vibrokit.structure import continuation as module
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.continuation import continuation
 from vibrokit.structure.orbits import refine_orbit
+from vibrokit.structure.parameter_values import parameter_line
 from vibrokit.structure.tracing.branches import Tracing
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -120,7 +121,7 @@ def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
     for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
         there = osc.replace({FREQUENCY: frequency})
         found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
-    tracing = Tracing(osc, FREQUENCY, [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
+    tracing = Tracing(osc, parameter_line("test", osc, FREQUENCY), [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
     tracing.run()
     assert tracing.numbered() == [[0], [0]]
     doublings = {one.period: one for _, one in tracing.located if one.kind == "period doubling"}
@@ -325,6 +326,22 @@ def test_a_short_path_gives_the_same_record():
 def test_bad_paths_and_values(path, values, words):
     with pytest.raises(ParameterError, match=words):
         continuation(vk.load_scene("duffing"), path, values)
+
+
+@pytest.mark.parametrize(
+    ("tied", "words"),
+    [
+        ({}, "factors"),
+        ({"barriers.0.position": 1.0, FREQUENCY: 1.0}, "cannot be tied"),
+        ({"barriers.0.position": 0.0}, "factor"),
+        ({"barriers.0.position": math.inf}, "factor"),
+        ({"barriers.0.position": "1"}, "factor"),
+        ({"barriers.0.position": 1.0, "barriers.7.position": 1.0}, "barriers.7"),
+    ],
+)
+def test_parameters_that_cannot_be_tied(tied, words):
+    with pytest.raises(ParameterError, match=words):
+        continuation(vk.load_scene("hertz-0.570"), tied, [0.5, 0.6])
 
 
 def test_what_shapes_the_equations_is_refused():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.parameter_values import followed_parameter, ordered_values
+from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.validation import check_means, seed_of
 
 _CALLER = "energy_continuation"
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 @called
 def energy_continuation(
     osc: Oscillator,
-    parameter: str,
+    parameter: str | Mapping[str, float],
     values: Sequence[float],
     *,
     analyzer: LeastAction | None = None,
@@ -60,8 +60,9 @@ def energy_continuation(
     Parameters
     ----------
     osc : Oscillator
-    parameter : str
-        A parameter that does not shape the equations: a key of ``osc.parameters``, or the end of exactly one.
+    parameter : str or dict of str to float
+        A parameter that does not shape the equations: a key of ``osc.parameters``, or the end of exactly one; or the
+        factors of several, as of `continuation`.
     values : sequence of float
         Finite and distinct; they are taken in ascending order.
     analyzer : LeastAction, optional
@@ -97,17 +98,17 @@ def energy_continuation(
     >>> along.energy("clear", "hammering")  # doctest: +SKIP
     """
     check_means(osc, None, None)
-    entry, numbers = followed_parameter(_CALLER, osc, parameter), ordered_values(_CALLER, values)
+    line, numbers = parameter_line(_CALLER, osc, parameter), ordered_values(_CALLER, values)
     chosen = LeastAction() if analyzer is None else analyzer
     if not isinstance(chosen, LeastAction):
         raise StructureError(f"{_CALLER}: analyzer must be a LeastAction, got {shown(analyzer)}.")
     chosen.check(osc)
-    places = _places(numbers, search, float(entry.value))
+    places = _places(numbers, search, line.own)
     seed = seed_of(rng)
     with working(progress, time_limit) as work:
-        run = _Run(osc, entry.path, numbers, chosen, places, seed)
+        run = _Run(osc, line, numbers, chosen, places, seed)
         run.run()
-        declared = entry.declared
+        declared = line.entry.declared
         return run.record(work, symbol=declared.symbol, unit=declared.unit)
 
 
@@ -145,9 +146,9 @@ class _Run:
     """Searches, follows, and keeps what each has found."""
 
     def __init__(
-        self, osc: Oscillator, parameter: str, values: Array, analyzer: LeastAction, places: list[int], seed: int
+        self, osc: Oscillator, line: ParameterLine, values: Array, analyzer: LeastAction, places: list[int], seed: int
     ) -> None:
-        self.osc, self.parameter, self.values, self.analyzer = osc, parameter, values, analyzer
+        self.osc, self.line, self.values, self.analyzer = osc, line, values, analyzer
         self.places, self.seed = places, seed
         self.curves: list[_Curve] = []
         self.findings: list[Finding] = []
@@ -171,7 +172,7 @@ class _Run:
         """Find the paths at a value, and follow those that are not known yet."""
         value = float(self.values[place])
         try:
-            osc = self.osc.replace({self.parameter: value})
+            osc = self.line.at(self.osc, value)
             structure = find_structure(osc, manifolds=False, rng=self.seed)
             for stopped in structure.found(Code.STOPPED):
                 raise stopped.interrupt
@@ -210,7 +211,7 @@ class _Run:
                 here += direction
 
     def _keep(self, curve: _Curve, place: int, path: FollowedPath) -> None:
-        curve.paths[place], curve.slopes[place] = path, path.derivative(self.parameter)
+        curve.paths[place], curve.slopes[place] = path, self.line.derivative(path.derivative)
         try:
             curve.errors[place] = path.error()
         except StructureError:
@@ -253,14 +254,14 @@ class _Run:
         number = self.curves.index(curve)
         self.findings.append(
             Finding.of(
-                Code.PATH_LOST, number, parameter=self.parameter, value=value, next=following, reason=str(error)
+                Code.PATH_LOST, number, parameter=self.line.path, value=value, next=following, reason=str(error)
             )
         )  # fmt: skip
 
     def _step(self, path: FollowedPath, slope: float, change: float, value: float) -> tuple[FollowedPath, float]:
         """The path at another value, and the derivative of its action; StructureError if it may be another path."""
-        ahead = path.at(self.osc.replace({self.parameter: value}))
-        slope_ahead = ahead.derivative(self.parameter)
+        ahead = path.at(self.line.at(self.osc, value))
+        slope_ahead = self.line.derivative(ahead.derivative)
         moved = ahead.found.action - path.found.action
         predicted = change * (slope + slope_ahead) / 2
         allowed = _TRAPEZOID * max(abs(moved), abs(predicted)) + _ROUNDING * path.found.action
@@ -284,14 +285,14 @@ class _Run:
             for curve in self.curves
         )
         settings = {
-            "parameter": self.parameter, "values": self.values.tolist(), "rng": self.seed,
+            "parameter": self.line.argument, "values": self.values.tolist(), "rng": self.seed,
             "search": [float(self.values[place]) for place in self.places], "analyzer": settings_of(self.analyzer),
         }  # fmt: skip
         count = Finding.of(
-            Code.ENERGY_BRANCHES, branches=len(branches), values=len(self.values), parameter=self.parameter
+            Code.ENERGY_BRANCHES, branches=len(branches), values=len(self.values), parameter=self.line.path
         )
         found = EnergyContinuation(
-            parameter=self.parameter,
+            parameter=self.line.path,
             symbol=symbol,
             unit=unit,
             values=self.values,

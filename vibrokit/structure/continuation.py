@@ -5,7 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,6 @@ from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.scene import Entry
 from vibrokit.progress import Progress, Work, advance, put_off, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
@@ -30,7 +29,7 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.parameter_values import followed_parameter, ordered_values
+from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.tracing.branches import (
     Tracing,
@@ -51,7 +50,7 @@ Array = NDArray[np.float64]
 @called
 def continuation(
     osc: Oscillator,
-    parameter: str,
+    parameter: str | Mapping[str, float],
     values: Sequence[float],
     *,
     region: Any = None,
@@ -77,9 +76,10 @@ def continuation(
     Parameters
     ----------
     osc : Oscillator
-    parameter : str
+    parameter : str or dict of str to float
         A parameter that does not shape the equations: a key of ``osc.parameters``, or the end of exactly one, such as
-        ``"frequency"`` for ``"excitations.0.frequency"``. The record has the full path.
+        ``"frequency"`` for ``"excitations.0.frequency"``. The record has the full path. Several parameters are tied by
+        their factors: with ``{"barriers.0.position": 1, "barriers.1.position": -1}`` a value is the gap on both sides.
     values : sequence of float
         Finite and distinct; they are taken in ascending order.
     region : Region or ((x_min, x_max), (v_min, v_max)), optional
@@ -117,10 +117,10 @@ def continuation(
     """
     chosen = stepper_of(stepper)
     check_means(osc, chosen, executor)
-    entry, numbers = followed_parameter("continuation", osc, parameter), ordered_values("continuation", values)
+    line, numbers = parameter_line("continuation", osc, parameter), ordered_values("continuation", values)
     request = Request(region, cells, 0, None, starts, 0.5, None, None, False, False, chosen, seed_of(rng))
     with working(progress, time_limit) as work:
-        run = _Run(osc, entry, numbers.tolist(), request, executor)
+        run = _Run(osc, line, numbers.tolist(), request, executor)
         run.run()
         with put_off():
             return run.record(work)
@@ -144,13 +144,13 @@ class _Run:
     """Goes through the stages and keeps what each has found."""
 
     osc: Oscillator
-    entry: Entry
+    line: ParameterLine
     values: list[float]
     request: Request
     executor: concurrent.futures.Executor | None
 
     def __post_init__(self) -> None:
-        self.path, self.region = self.entry.path, self.request.region
+        self.region = self.request.region
         self.found: list[_Found] = []
         self.cell_findings: dict[float, tuple[Finding, ...]] = {}
         self.stopped: Finding | None = None
@@ -171,16 +171,16 @@ class _Run:
 
     def record(self, work: Work) -> Continuation:
         """Return the record of all that was found."""
-        tracing, declared, request = self.tracing, self.entry.declared, self.request
+        tracing, declared, request = self.tracing, self.line.entry.declared, self.request
         numbered = tracing.numbered()
         bifurcations = bifurcations_of(tracing, numbered)
         states = tuple(self._states(numbered))
         arguments = {name: getattr(request, name) for name in ("region", "cells", "starts", "stepper", "rng")}
-        arguments |= {"parameter": self.path, "values": tuple(self.values)}
+        arguments |= {"parameter": self.line.argument, "values": tuple(self.values)}
         nothing = [finding for at in states for finding in at.findings if finding.code is Code.NOTHING_AT]
         findings = branch_findings(tracing, numbered, bifurcations, len(states))
         return Continuation(
-            parameter=self.path,
+            parameter=self.line.path,
             symbol=declared.symbol,
             unit=declared.unit,
             region=self.region,
@@ -200,7 +200,7 @@ class _Run:
         """Search for the steady states at each value."""
         request = self.request
         given = {"region": request.region, "starts": request.starts, "stepper": request.stepper, "rng": request.rng}
-        tasks = [(self.osc, self.path, value, given) for value in self.values]
+        tasks = [(self.osc, self.line, value, given) for value in self.values]
         with stage("values", unit="values", total=len(tasks)), contextlib.closing(self._each(_search, tasks)) as all_:
             for found in all_:
                 self.found.append(found)
@@ -216,7 +216,7 @@ class _Run:
         size = np.ones(2) if frame is None else np.diff(frame.bounds)[:, 0]
         stepper = self.request.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
         attractors = [[without_fraction(attractor) for attractor in at.attractors] for at in held]
-        return Tracing(self.osc, self.path, [at.value for at in held], attractors, size, stepper)
+        return Tracing(self.osc, self.line, [at.value for at in held], attractors, size, stepper)
 
     def _find_fractions(self) -> None:
         """Find the basin fractions of all attractors at each value."""
@@ -261,9 +261,9 @@ class _Run:
         return (work(*task) for task in tasks) if self.executor is None else carry(work, tasks, self.executor)
 
 
-def _search(osc: Oscillator, path: str, value: float, given: dict[str, Any]) -> _Found:
+def _search(osc: Oscillator, line: ParameterLine, value: float, given: dict[str, Any]) -> _Found:
     try:
-        there = osc.replace({path: value})
+        there = line.at(osc, value)
     except VibrokitError as error:
         return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),), refused=True)
     try:

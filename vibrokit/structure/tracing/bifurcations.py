@@ -128,7 +128,7 @@ def _short_of_touch(family: Family, stop: int) -> Family:
     A family that follows a parameter of the stop itself is returned as it is.
     """
     barrier = family.osc.barriers[stop]
-    if family.path.startswith(f"barriers.{stop}."):
+    if family.line.begins(f"barriers.{stop}."):
         return family
     away = barrier.position + barrier.sign * float(family.sizes[0])
     return dataclasses.replace(family, osc=family.osc.replace({f"barriers.{stop}.position": away}))

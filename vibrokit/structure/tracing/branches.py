@@ -24,6 +24,7 @@ from vibrokit.structure.attractors.names import names_of
 from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.orbits import Orbit, refine_orbit, visited
+from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.tracing.bifurcations import DOUBLING, GRAZING, Located
 from vibrokit.structure.tracing.families import Member
 from vibrokit.structure.tracing.following import follow
@@ -47,7 +48,7 @@ class Tracing:
     """Steady states at each value, the links between neighbouring values, and the bifurcations between."""
 
     osc: Oscillator
-    path: str  # of the parameter
+    line: ParameterLine
     values: list[float]  # those with steady states, ascending
     found: list[list[Attractor]]  # at each; those that the search missed are added, with basin fraction NaN
     size: Array  # (2,), width of the region in x and in v
@@ -61,7 +62,7 @@ class Tracing:
 
     def at(self, value: float) -> Oscillator:
         """Return the scene at a value of the parameter."""
-        return self.osc.replace({self.path: value})
+        return self.line.at(self.osc, value)
 
     def run(self) -> None:
         """Follow every orbit to the next value, those that were not reached back, and pair the others by distance."""
@@ -105,7 +106,7 @@ class Tracing:
         if not attractor.repeats or (attractor.turns and self.osc.autonomous):
             return
         try:
-            followed = follow(self.osc, self.path, attractor, start, target, self.size, self.stepper)
+            followed = follow(self.osc, self.line, attractor, start, target, self.size, self.stepper)
         except VibrokitError:  # it stays unlinked, and a finding says that its branch ends
             return
         self.located += [((at, index), bifurcation) for bifurcation in followed.bifurcations]
@@ -183,7 +184,7 @@ class Tracing:
                 guess = large.points[::period].mean(axis=0)
                 orbit = refine_orbit(self.at(start), guess, period, self.stepper)
                 parent = dataclasses.replace(large, points=orbit.point[None], period=period)
-                passed = follow(self.osc, self.path, parent, start, target, self.size, self.stepper).bifurcations
+                passed = follow(self.osc, self.line, parent, start, target, self.size, self.stepper).bifurcations
             except VibrokitError:
                 return
             self.located += [(many, found) for found in passed if found.kind == DOUBLING]
@@ -257,7 +258,7 @@ def branch_findings(
 ) -> tuple[Finding, ...]:
     """Return findings about the branches at some number of values."""
     count = len({branch for branches in numbered for branch in branches})
-    found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=tracing.path)]
+    found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=tracing.line.path)]
     found += [
         Finding.of(Code.BIFURCATION, one.branch, kind=one.kind, side=one.side, value=one.value, error=one.error)
         for one in bifurcations

@@ -17,6 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.autonomous import cycle_equations, equilibrium_equations, turning_point
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import section_equations
+from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.scales import units_of
 
 _ITERATIONS = 12
@@ -52,7 +53,7 @@ class Family(ABC):
     kind: ClassVar[str]
 
     osc: Oscillator
-    path: str  # of the parameter
+    line: ParameterLine
     period: int  # in forcing periods, for periodic motions
     sizes: Array  # (n,), units of the unknowns
     span: float  # unit of the parameter
@@ -61,7 +62,7 @@ class Family(ABC):
 
     def at(self, value: float) -> Oscillator:
         """Return the scene at a value of the parameter."""
-        return self.osc.replace({self.path: value})
+        return self.line.at(self.osc, value)
 
     def place_of(self, unknowns: Array, value: float) -> Array:
         """Return unknowns and value, each in its unit."""
@@ -98,7 +99,7 @@ class Family(ABC):
         _, (residual,), members = newton(evaluate, guess[None], iterations=_ITERATIONS)
         if not residual <= _CLOSED * float(np.linalg.norm(self.sizes)):
             value = float(guess[-1] * self.span)
-            raise StructureError(f"Newton's method found no {self.kind} motion near {self.path} = {value:g}.")
+            raise StructureError(f"Newton's method found no {self.kind} motion near {self.line.path} = {value:g}.")
         found: Member = members[0]
         return found
 

@@ -12,6 +12,7 @@ from vibrokit.errors import VibrokitError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
+from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
 from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
@@ -36,7 +37,13 @@ class Followed:
 
 
 def follow(
-    osc: Oscillator, path: str, attractor: Attractor, start: float, target: float, size: Array, stepper: Stepper
+    osc: Oscillator,
+    line: ParameterLine,
+    attractor: Attractor,
+    start: float,
+    target: float,
+    size: Array,
+    stepper: Stepper,
 ) -> Followed:
     """Follow the family of an attractor that repeats, until the parameter reaches the target or turns back.
 
@@ -48,7 +55,7 @@ def follow(
     if attractor.kind == "limit cycle":
         unknowns[1] = sizes[1] = attractor.duration
     span, middle = abs(target - start), 0.5 * (start + target)
-    family = FAMILIES[attractor.kind](osc, path, attractor.period, sizes, span, middle, stepper)
+    family = FAMILIES[attractor.kind](osc, line, attractor.period, sizes, span, middle, stepper)
     ahead = np.append(np.zeros(len(unknowns)), math.copysign(1.0, target - start))
     across = np.abs(ahead)
     try:
