@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from vibrokit.assessment.assess import assess as assess
     from vibrokit.assessment.assessment import Assessment as Assessment
     from vibrokit.assessment.plausibility import plausibility as plausibility
+    from vibrokit.assessment.sweep import sweep as sweep
     from vibrokit.comparison.occupancies import occupancies as occupancies
     from vibrokit.comparison.reconcile import reconcile as reconcile
     from vibrokit.comparison.reconciliation import Reconciliation as Reconciliation
@@ -67,6 +68,7 @@ if TYPE_CHECKING:
     from vibrokit.results.record import Record as Record
     from vibrokit.results.result import Result as Result
     from vibrokit.results.structure import Structure as Structure
+    from vibrokit.results.sweep import Sweep as Sweep
     from vibrokit.scene_file import bundled_scenes as bundled_scenes
     from vibrokit.scene_file import load_scene as load_scene
     from vibrokit.scene_file import save_scene as save_scene
@@ -98,6 +100,7 @@ _MODULES = {
     "Shooting": "vibrokit.analyzers.shooting.shooting",
     "assess": "vibrokit.assessment.assess",
     "Assessment": "vibrokit.assessment.assessment",
+    "sweep": "vibrokit.assessment.sweep",
     "plausibility": "vibrokit.assessment.plausibility",
     "occupancies": "vibrokit.comparison.occupancies",
     "reconcile": "vibrokit.comparison.reconcile",
@@ -136,6 +139,7 @@ _MODULES = {
     "Code": "vibrokit.results.codes",
     "Finding": "vibrokit.results.finding",
     "Severity": "vibrokit.results.codes",
+    "Sweep": "vibrokit.results.sweep",
     "Record": "vibrokit.results.record",
     "Result": "vibrokit.results.result",
     "Structure": "vibrokit.results.structure",

@@ -1,4 +1,4 @@
-"""The command line: vibrokit assess, run, reconcile, report, reproduce, plot, equations, list, check, trade."""
+"""The command line: vibrokit assess, sweep, run, reconcile, report, reproduce, plot, equations, list, check, trade."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from vibrokit import __version__
-from vibrokit.cli import assess, report, reproduce
+from vibrokit.cli import assess, report, reproduce, sweep
 from vibrokit.errors import VibrokitError
 
 
@@ -64,6 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     scene.add_argument("scene", help=which)
 
     assess.add_parser(commands, scene)
+    sweep.add_parser(commands, scene)
 
     run = commands.add_parser(
         "run",

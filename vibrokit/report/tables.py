@@ -8,6 +8,9 @@ import unicodedata
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
+from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.report.blocks import Table
 from vibrokit.results.basins import ESCAPED
@@ -16,6 +19,7 @@ from vibrokit.results.labels import goal_name
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
+from vibrokit.results.sweep import Sweep
 from vibrokit.text_table import number_text, power_text, unit_text
 
 
@@ -85,6 +89,31 @@ def rate_table(result: Result) -> Table:
         times = power_text(-rate.log_value), power_text(rate.log_value), f"{rate.log_error:.2g}"
         rows.append((result.exit_of(rate), f"{rate.intensity:g}", *times, rate.event, rate.method))
     return Table("rates", "Exit rates at finite noise", header, tuple(rows))
+
+
+def coexistence_table(sweep: Sweep, unit: str | None = None) -> Table:
+    """Return from where to where each branch of a sweep exists, a row each, in a unit."""
+    scale = sweep.axis(unit)[1]
+    rows = tuple((one.name, f"{one.first / scale:.8g}", one.begins, f"{one.last / scale:.8g}", one.ends)
+                 for one in sweep.coexistence)  # fmt: skip
+    title = f"Steady states along {sweep.parameter} ({unit or unit_text(sweep.unit or '1')})"
+    return Table("coexistence", title, ("state", "from", "begins by", "to", "ends by"), rows)
+
+
+def along_table(sweep: Sweep) -> Table:
+    """Return what each branch of a sweep does at each value, a row each; empty cells where nothing is known."""
+    rows: list[tuple[str, ...]] = []
+    for name in sweep.names:
+        low, high, push = sweep.along(name)
+        energy = time = np.full(len(low), math.nan)
+        with contextlib.suppress(StructureError):
+            energy = sweep.energy(name)
+            time = sweep.log_mean_time(name)[0]
+        for value, *numbers in zip(sweep.values, low, high, push, energy, time, strict=True):
+            if not math.isnan(numbers[0]):
+                rows.append((name, f"{value:.10g}", *("" if math.isnan(n) else f"{n:.8g}" for n in numbers)))
+    header = ("state", sweep.parameter, "least x (m)", "largest x (m)", "push (m s⁻²)", "ΔU (m² s⁻³)", "ln τ (s)")
+    return Table("along", "Along the parameter", header, tuple(rows), detail=True)
 
 
 def noise_intensity(record: Record) -> float:

@@ -12,7 +12,9 @@ from vibrokit.comparison.transitions import Transitions
 from vibrokit.progress import Stats
 from vibrokit.report.blocks import Block, Listing, Sentences, Table
 from vibrokit.report.tables import (
+    along_table,
     attractor_table,
+    coexistence_table,
     energy_table,
     noise_intensity,
     rate_table,
@@ -25,6 +27,7 @@ from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
+from vibrokit.results.sweep import Sweep
 
 _LEAST_SHARE = 0.01  # of the time: shorter stages are not listed
 
@@ -61,6 +64,11 @@ def _reconciliation_blocks(reconciliation: Reconciliation) -> list[Block]:
         for index, (title, rows) in enumerate(quantity_rows(reconciliation))
     ]
     return [Sentences(tuple(overview_text(reconciliation).splitlines())), verdicts, *numbers]
+
+
+@blocks_of.register
+def _sweep_blocks(sweep: Sweep) -> list[Block]:
+    return [coexistence_table(sweep), along_table(sweep)]
 
 
 @blocks_of.register

@@ -7,6 +7,7 @@ from typing import Any
 
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.record import Record
+from vibrokit.text_units import size_of
 
 _GREEK = (
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda",
@@ -39,6 +40,19 @@ class AlongParameter(Record, ABC):
         letter = f"\\{head}" if head in _GREEK else head
         label = f"{self.parameter} ${letter}{f'_{{{index}}}' if index else ''}$"
         return f"{label} ({_unit_in_tex(self.unit)})" if self.unit else label
+
+    def axis(self, unit: str | None = None) -> tuple[str, float]:
+        """Return the label of the parameter's axis in a unit, and the size of that unit in SI.
+
+        Raises
+        ------
+        ParameterError
+            The parameter cannot be shown in this unit.
+        """
+        if unit is None:
+            return self.axis_label, 1.0
+        scale = size_of(unit, self.unit)
+        return f"{self.parameter} ({unit})", scale
 
     def parameter_variables(self) -> dict[str, Any]:
         """Return the arrays that hold the parameter."""

@@ -1,0 +1,156 @@
+"""sweep: which steady states exist along a parameter, and how long each lasts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vibrokit.analyzers.energy_continuation import energy_continuation
+from vibrokit.analyzers.least_action import LeastAction
+from vibrokit.analyzers.mean_exit_times import MFET
+from vibrokit.construction import called
+from vibrokit.errors import StructureError, VibrokitError
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import Progress, advance, stage, working
+from vibrokit.results.codes import Code
+from vibrokit.results.continuation import Continuation
+from vibrokit.results.energy_continuation import EnergyContinuation
+from vibrokit.results.finding import Finding
+from vibrokit.results.rated import RatedResult
+from vibrokit.results.sweep import Prefactor, Sweep
+from vibrokit.scene_file import scene_data
+from vibrokit.structure.continuation import continuation
+from vibrokit.structure.find import find_structure
+from vibrokit.structure.parameter_values import ParameterLine, parameter_line
+from vibrokit.structure.validation import seed_of
+
+_DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
+_ERROR = 0.2  # of a mean time: 25 exits
+
+
+@called
+def sweep(
+    osc: Oscillator,
+    parameter: str | Mapping[str, float],
+    values: Sequence[float],
+    *,
+    source: int | str | None = None,
+    energies: bool = True,
+    search: Sequence[float] | None = None,
+    rng: int = 0,
+    progress: Progress = None,
+    time_limit: float | None = None,
+    **options: Any,
+) -> Sweep:
+    """Follow steady states, activation energies and mean exit times of a scene along values of one parameter.
+
+    The steady states are those of `continuation`, the energies those of `energy_continuation`. The mean time is
+    τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the values at which paths are searched for, at a noise that
+    makes ΔU/D = 5 there, and interpolated between them.
+
+    On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete.
+
+    Parameters
+    ----------
+    osc : Oscillator
+    parameter : str or dict of str to float
+        A parameter, or the factors of several that are tied, as of `continuation`.
+    values : sequence of float
+        In SI base units.
+    source : int or str, optional
+        The state to leave; by default each.
+    energies : bool
+        Whether to compute energies and mean times; a scene without noise has none.
+    search : sequence of float, optional
+        Those of the values at which exit paths are searched for, as of `energy_continuation`.
+    rng : int
+    progress : bool or callable, optional
+        As of `find_structure`.
+    time_limit : float, optional
+        In seconds.
+    **options
+        For `continuation`: ``region``, ``cells``, ``starts``, ``stepper``, ``executor``.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    ParameterError
+        An unknown or ambiguous parameter, one that shapes the equations, or values that are not numbers.
+    """
+    line, seed = parameter_line("sweep", osc, parameter), seed_of(rng)
+    findings: list[Finding] = []
+    paths: EnergyContinuation | None = None
+    prefactors: list[Prefactor] = []
+    with working(progress, time_limit) as work:
+        states = continuation(osc, parameter, values, rng=seed, **options)
+        complete = states.complete
+        if complete and energies and osc.noise is not None:
+            try:
+                paths = energy_continuation(
+                    osc, parameter, values, analyzer=LeastAction(source=source), search=search, rng=seed
+                )
+                complete = paths.complete
+            except StructureError as error:
+                findings.append(Finding.of(Code.REMARK, text=str(error)))
+        if complete and paths is not None:
+            complete = _add_prefactors(osc, line, paths, prefactors, findings)
+    declared = line.entry.declared
+    return Sweep(
+        parameter=line.path, symbol=declared.symbol, unit=declared.unit, states=states, energies=paths,
+        prefactors=tuple(prefactors), scene=scene_data(osc), complete=complete, seed=seed, seconds=work.seconds,
+        stats=work.stats, findings=(*_open(states, paths), *findings),
+        settings={"parameter": line.argument, "values": states.values.tolist(), "source": source, "rng": seed},
+    )  # fmt: skip
+
+
+def _open(states: Continuation, paths: EnergyContinuation | None) -> tuple[Finding, ...]:
+    """What the parts found."""
+    return (*states.findings, *(() if paths is None else paths.findings))
+
+
+def _add_prefactors(
+    osc: Oscillator, line: ParameterLine, paths: EnergyContinuation, found: list[Prefactor], findings: list[Finding]
+) -> bool:
+    """Simulate exits at the searched values; return whether that came to its end."""
+    sources = tuple(dict.fromkeys(branch.source for branch in paths.branches))
+    places = [int(np.argmin(np.abs(paths.values - value))) for value in paths.settings["search"]]
+    try:
+        with stage("mean times", unit="values", total=len(places)):
+            for place in places:
+                there = line.at(osc, float(paths.values[place]))
+                structure = find_structure(there, manifolds=False, saddles=False, rng=int(paths.settings["rng"]))
+                for source in sources:
+                    energy = float(paths.energy(source)[place])
+                    if source in structure.names and energy > 0:
+                        simulated = MFET(source=source, intensities=(energy / _DEPTH,), target_error=_ERROR)
+                        try:
+                            result = simulated.run(there, structure)
+                        except VibrokitError as error:
+                            findings.append(Finding.of(Code.REMARK, text=str(error)))
+                            continue
+                        if not result.complete:
+                            return False
+                        found += _prefactor(result, source, float(paths.values[place]), energy)
+                advance()
+    except KeyboardInterrupt as interrupt:
+        findings.append(Finding.stopped("mean times", interrupt))
+        return False
+    return True
+
+
+def _prefactor(result: Any, source: str, value: float, energy: float) -> list[Prefactor]:
+    """The prefactor of leaving a state at all, if a rate was found."""
+    assert isinstance(result, RatedResult)
+    rates = [rate for rate in result.rates if result.names[rate.source] == source]
+    if not rates:
+        return []
+    logs, errors = np.array([rate.log_value for rate in rates]), np.array([rate.log_error for rate in rates])
+    total = float(np.logaddexp.reduce(logs))
+    error = float(np.linalg.norm(np.exp(logs - total) * errors))
+    return [Prefactor(source, value, -total - energy / rates[0].intensity, max(error, math.ulp(1.0)))]

@@ -1,0 +1,99 @@
+"""vibrokit sweep: which states exist along a parameter, and how long they last."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], scene: argparse.ArgumentParser) -> None:
+    """Add the command to the parser of the command line."""
+    parser = commands.add_parser(
+        "sweep",
+        parents=[scene],
+        help="which states exist along a parameter, and how long they last",
+        epilog="Example: vibrokit sweep tube.toml frequency 42Hz 78Hz --count 37. Ctrl-C, SIGTERM and the time limit "
+        "stop the work; what was found is printed and kept.",
+    )
+    parser.add_argument(
+        "parameter", help="a parameter, or the end of its path; several, tied: gap.path=1,other.path=-1"
+    )
+    parser.add_argument("start", help="first value, with a unit if it is not in SI: 42Hz, 0.2mm")
+    parser.add_argument("stop", help="last value")
+    parser.add_argument("--count", type=int, default=11, help="number of values (default 11)")
+    parser.add_argument("--source", metavar="STATE", help="name or label of the state to leave (default: each)")
+    parser.add_argument("--states-only", action="store_true", help="no energies and mean times")
+    parser.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
+    parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="save the sweep (netCDF)")
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="where to save the figure (default: SCENE-sweep.png)"
+    )
+    parser.set_defaults(command=sweep_scene)
+
+
+def sweep_scene(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    import numpy as np
+
+    from vibrokit.assessment.sweep import sweep
+    from vibrokit.cli.interrupts import Interrupts
+    from vibrokit.cli.run import scene_stem, source_of
+    from vibrokit.errors import ParameterError
+    from vibrokit.progress import working
+    from vibrokit.report.tables import coexistence_table
+    from vibrokit.report.text import findings_text
+    from vibrokit.results.atomic import checked_target
+    from vibrokit.results.codes import Severity
+    from vibrokit.results.pictures import checked_picture, save_figure
+    from vibrokit.scene_file import load_scene
+    from vibrokit.structure.parameter_values import parameter_line
+    from vibrokit.text_units import number_in
+
+    if options.output is not None:
+        checked_target(options.output)
+    picture = checked_picture(options.figure or Path(f"{scene_stem(options.scene)}-sweep.png"))
+    if options.count < 2:
+        raise ParameterError(f"--count must be a whole number, at least 2, got {options.count}.")
+    osc = load_scene(options.scene)
+    line = parameter_line("sweep", osc, _parameter(options.parameter))
+    (first, unit), (last, other) = (number_in(text, line.entry.declared.unit) for text in (options.start, options.stop))
+    if unit != other:
+        raise ParameterError(f"{options.start} and {options.stop} have different units; give both in one unit.")
+    source = None if options.source is None else source_of(options.source)
+    with Interrupts() as interrupts:
+        with working(True, options.time_limit) as work:
+            interrupts.stops(work)
+            found = sweep(
+                osc, line.argument, np.linspace(first, last, options.count).tolist(), source=source,
+                energies=not options.states_only, rng=options.seed,
+            )  # fmt: skip
+        interrupts.finishing()
+        serious = [finding for finding in found.findings if finding.severity is not Severity.INFO]
+        heading = f"{options.scene}: sweep{'' if found.complete else ' (incomplete)'}"
+        parts = (heading, coexistence_table(found, unit).text, findings_text(serious, found.names))
+        print("\n\n".join(part for part in parts if part), f"\n\n{found.seconds:.1f} s.")
+        if options.output is not None:
+            found.save(options.output)
+            print(f"written: {options.output}")
+        save_figure(found.plot(unit=unit), picture)
+        print(f"figure: {picture}")
+        if interrupts.requested:
+            return interrupts.status
+    return 0 if found.complete else 1
+
+
+def _parameter(text: str) -> str | dict[str, float]:
+    """A parameter by name, or the factors of several."""
+    from vibrokit.errors import ParameterError, shown
+
+    if "=" not in text:
+        return text
+    tied = {}
+    for part in text.split(","):
+        name, _, factor = part.partition("=")
+        try:
+            tied[name.strip()] = float(factor)
+        except ValueError:
+            raise ParameterError(f"{shown(part)} ties no parameter; write its name, '=' and a number.") from None
+    return tied

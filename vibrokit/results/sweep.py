@@ -1,0 +1,235 @@
+"""Sweep: steady states, activation energies and mean exit times along values of one parameter."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from vibrokit.construction import called
+from vibrokit.errors import ResultFileError, StructureError
+from vibrokit.results.along_parameter import AlongParameter
+from vibrokit.results.arrays import Arrays
+from vibrokit.results.continuation import Continuation
+from vibrokit.results.energy_continuation import EnergyContinuation
+from vibrokit.results.fields import LARGEST, Number, Word
+from vibrokit.results.nested import nested, records_in
+from vibrokit.results.summary import Summary
+from vibrokit.results.table import Table
+
+if TYPE_CHECKING:
+    from vibrokit.plots.sweeps import SweepArtists
+
+Array = NDArray[np.float64]
+
+_STATES, _ENERGIES = "states", "energies"
+_TIMES = Table(
+    "prefactor",
+    {
+        "source": Word("attractor that is left"),
+        "value": Number("value of the parameter", "", -LARGEST, LARGEST),
+        "logarithm": Number("ln of the prefactor of the mean time (s)", "", -LARGEST, LARGEST),
+        "error": Number("its error", "", 0.0, LARGEST),
+    },
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Prefactor:
+    """ln τ₀ of the mean time τ₀ exp(ΔU/D) until a state is left, at one value of the parameter; τ₀ in s."""
+
+    source: str
+    value: float
+    logarithm: float
+    error: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Existence:
+    """From where to where a branch of steady states exists.
+
+    Attributes
+    ----------
+    name : str
+    first, last : float
+        Of the parameter: located where the branch ends in a bifurcation, otherwise between the last value at which it
+        was found and the next; the ends of the sweep where it goes on there.
+    begins, ends : str
+        The kind of the bifurcation; ``"goes on"`` at an end of the sweep, ``"not located"`` otherwise.
+    """
+
+    name: str
+    first: float
+    last: float
+    begins: str
+    ends: str
+
+
+class Sweep(AlongParameter):
+    """What a parameter does to a scene: which states exist from where to where, and how long they last.
+
+    Attributes
+    ----------
+    states : Continuation
+    energies : EnergyContinuation or None
+        None without noise, or where no exit path was found.
+    prefactors : tuple of Prefactor
+        At the values at which exits were simulated.
+    """
+
+    kind: ClassVar[str] = "sweep"
+
+    states: Continuation
+    energies: EnergyContinuation | None = None
+    prefactors: tuple[Prefactor, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the branches of steady states."""
+        return self.states.branch_names
+
+    @property
+    def values(self) -> Array:
+        """Values of the parameter, ascending."""
+        return self.states.values
+
+    @property
+    def intensity(self) -> float:
+        """Noise intensity D of the scene (m² s⁻³); 0 without noise."""
+        return float((self.scene.get("noise") or {}).get("intensity", 0.0))
+
+    @property
+    def coexistence(self) -> tuple[Existence, ...]:
+        """From where to where each branch exists, in the order of the branches."""
+        return tuple(self._existence(number) for number in range(len(self.names)))
+
+    def _existence(self, number: int) -> Existence:
+        known = np.isin(self.values, [value for value, _ in self.states.branch(number)])
+        places = np.flatnonzero(known)
+        first, begins = self._end(number, int(places[0]), -1)
+        last, ends = self._end(number, int(places[-1]), 1)
+        return Existence(self.names[number], first, last, begins, ends)
+
+    def _end(self, number: int, place: int, direction: int) -> tuple[float, str]:
+        """Where a branch ends beyond a value, and how."""
+        here, beyond = float(self.values[place]), place + direction
+        if not 0 <= beyond < len(self.values):
+            return here, "goes on"
+        there = float(self.values[beyond])
+        low, high = sorted((here, there))
+        met = [one for one in self.states.bifurcations if one.branch == number and low <= one.value <= high]
+        if not met:
+            return 0.5 * (here + there), "not located"
+        last = max(met, key=lambda one: direction * one.value)
+        return last.value, last.kind
+
+    def along(self, name: str) -> tuple[Array, Array, Array]:
+        """Return the least and the largest x (m) and the largest push of a stop (m s⁻²) of a branch at each value.
+
+        NaN where the branch has no steady state.
+
+        Raises
+        ------
+        StructureError
+            There is no such branch.
+        """
+        found = np.full((3, len(self.values)), np.nan)
+        for value, attractor in self.states.branch(name):
+            place = int(np.flatnonzero(self.values == value)[0])
+            push = max(attractor.peak_force.values(), default=0.0)
+            found[:, place] = (*attractor.extent[0], push)
+        return found[0], found[1], found[2]
+
+    @called
+    def energy(self, source: str) -> Array:
+        """Return the least action with which a state is left at each value (m² s⁻³), NaN where it is not known.
+
+        Raises
+        ------
+        StructureError
+            No exit path of this state was found.
+        """
+        if self.energies is None:
+            raise StructureError("the sweep has no exit paths; see its status.")
+        return self.energies.energy(source)
+
+    @called
+    def log_mean_time(self, source: str, intensity: float | None = None) -> tuple[Array, Array]:
+        """Return ln of the mean time (s) until a state is left, at each value, and its error; NaN where not known.
+
+        The prefactor is interpolated between the values at which exits were simulated. The error contains the
+        difference between the neighbouring prefactors.
+
+        Raises
+        ------
+        StructureError
+            No exit path of this state was found, or no prefactor is known.
+        """
+        own = [one for one in self.prefactors if one.source == source]
+        if not own:
+            raise StructureError(f"the sweep has no prefactor of the mean time of {source}; see its status.")
+        own = sorted(own, key=lambda one: one.value)
+        places, logs, errors = (
+            np.array([getattr(one, name) for one in own]) for name in ("value", "logarithm", "error")
+        )
+        strength = self.intensity if intensity is None else intensity
+        prefactor = np.interp(self.values, places, logs)
+        nearest = np.abs(self.values[:, None] - places).argmin(axis=1)
+        error = np.hypot(np.interp(self.values, places, errors), np.abs(prefactor - logs[nearest]))
+        return prefactor + self.energy(source) / strength, error
+
+    @property
+    def summary(self) -> Summary:
+        """From where to where each branch exists."""
+        rows = tuple(
+            (one.name, f"{one.first:.8g} ({one.begins}) to {one.last:.8g} ({one.ends})") for one in self.coexistence
+        )
+        return Summary(f"Sweep of {self.parameter}", rows)
+
+    @called
+    def plot(self, ax: Any = None, unit: str | None = None) -> SweepArtists:
+        """Draw displacements, pushes, energies and mean times along the parameter; see `vibrokit.plots.sweeps.sweep`.
+
+        Parameters
+        ----------
+        ax : array of 4 Axes, optional
+        unit : str, optional
+            ``"Hz"`` for frequencies, ``"mm"`` and ``"µm"`` for lengths; by default that of the parameter, in SI.
+        """
+        from vibrokit.plots.sweeps import Branch, sweep
+
+        label, scale = self.axis(unit)
+        branches = []
+        for number, name in enumerate(self.names):
+            energy = time = np.full(len(self.values), np.nan)
+            if self.energies is not None and any(branch.source == name for branch in self.energies.branches):
+                energy = self.energy(name)
+                if any(one.source == name for one in self.prefactors):
+                    time = self.log_mean_time(name)[0]
+            branches.append(Branch(number, name, *self.along(name), energy=energy, log_time=time))
+        stops = [(one["side"], one["position"]) for one in self.scene.get("barriers", ())]
+        marks = [(one.kind, one.value / scale, one.branch) for one in self.states.bifurcations]
+        return sweep(
+            self.values / scale, branches, stops=stops, marks=marks, intensity=self.intensity, label=label, ax=ax
+        )  # fmt: skip
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays of the parts."""
+        parts = {_STATES: self.states} | ({} if self.energies is None else {_ENERGIES: self.energies})
+        whole = nested(parts)
+        return whole.assign(_TIMES.variables(self.prefactors) | self.parameter_variables())
+
+    @classmethod
+    def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
+        """Make a sweep of its arrays; raises ResultFileError."""
+        records, arrays = records_in(dataset), Arrays(dataset)
+        states, energies = records.get(_STATES), records.get(_ENERGIES)
+        if not isinstance(states, Continuation) or not isinstance(energies, EnergyContinuation | None):
+            raise ResultFileError("its parts are not a continuation and an energy continuation")
+        found = tuple(Prefactor(**row) for row in _TIMES.read(arrays))
+        return cls(
+            **cls.read_parameter(arrays), states=states, energies=energies, prefactors=found, **provenance
+        )  # fmt: skip
