@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,12 @@ from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import colour
 
-_PANELS = 4
+_PANELS: Mapping[str, str] = {
+    "low": "displacement $x$ (m)",
+    "push": r"largest push (m s$^{-2}$)",
+    "energy": r"$\Delta U$ (m$^2$ s$^{-3}$)",
+    "log_time": r"mean time $\ln(\tau / 1\,\mathrm{s})$",
+}
 _LINE: dict[str, Any] = {"marker": "o", "markersize": 2.8, "linewidth": 1.2}
 _DASHED = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "zorder": 0}
 
@@ -58,7 +63,7 @@ class SweepArtists(Artists):
     ax : Axes
         The uppermost.
     axes : tuple of Axes
-        Displacement, push, activation energy, mean time.
+        One for each panel.
     curves : tuple of Line2D
         Those of the displacement, two for each branch.
     marks : tuple of Line2D
@@ -80,7 +85,9 @@ def sweep(
     label: str,
     ax: Any = None,
 ) -> SweepArtists:
-    """Draw four panels over one parameter: displacement with the stops, push of the stops, ΔU with a line at D, ln τ.
+    """Draw panels over one parameter: displacement with the stops, push of the stops, ΔU with a line at D, ln τ.
+
+    A panel for which nothing is known is left out.
 
     Parameters
     ----------
@@ -94,7 +101,8 @@ def sweep(
         D (m² s⁻³); 0 for none.
     label : str
         Of the parameter's axis.
-    ax : array of 4 Axes, optional
+    ax : array of Axes, optional
+        One for each panel.
 
     Returns
     -------
@@ -105,50 +113,48 @@ def sweep(
     VibrokitError
         `ax` has another number of axes.
     """
-    panels = _panels(ax)
-    place, curves = np.asarray(values, dtype=float), list[Line2D]()
+    shown = [
+        name for name in _PANELS if name == "low" or any(np.isfinite(getattr(one, name)).any() for one in branches)
+    ]
+    panels = dict(zip(shown, _panels(ax, len(shown)), strict=True))
+    place, curves, first = np.asarray(values, dtype=float), list[Line2D](), panels["low"]
     for one in branches:
         style = {**_LINE, "color": colour(one.number)}
-        curves += panels[0].plot(place, one.high, label=one.name, **style)
-        curves += panels[0].plot(place, one.low, label=f"_{one.name}", **style)
-        for panel, rows in zip(panels[1:], (one.push, one.energy, one.log_time), strict=True):
-            panel.plot(place, rows, **style)
+        curves += first.plot(place, one.high, label=one.name, **style)
+        for name, panel in panels.items():
+            lines = panel.plot(place, getattr(one, name), label=f"_{one.name}", **style)
+            curves += lines if panel is first else []
     for _, position in stops:
-        panels[0].axhline(position, **_DASHED)
-    if intensity > 0:
-        panels[2].axhline(intensity, **_DASHED)
-        panels[2].annotate("$D$", (1.0, intensity), xycoords=("axes fraction", "data"), fontsize=9, ha="left")
+        first.axhline(position, **_DASHED)
+    if intensity > 0 and "energy" in panels:
+        panels["energy"].axhline(intensity, **_DASHED)
+        panels["energy"].annotate("$D$", (1.01, intensity), xycoords=("axes fraction", "data"), va="center", fontsize=9)
     drawn = [
         line for kind, value, branch in marks
-        for line in panels[0].plot(value, 0.02, "^", transform=panels[0].get_xaxis_transform(), color=colour(branch),
+        for line in first.plot(value, 0.02, "^", transform=first.get_xaxis_transform(), color=colour(branch),
                                    markersize=5, label=f"_{kind}", clip_on=False)
     ]  # fmt: skip
     _label(panels, label)
-    return SweepArtists(panels[0], tuple(panels), tuple(curves), tuple(drawn))
+    first.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn))
 
 
-def _label(panels: NDArray[Any], label: str) -> None:
-    titles = (
-        "displacement $x$ (m)", r"largest push (m s$^{-2}$)", r"$\Delta U$ (m$^2$ s$^{-3}$)",
-        r"mean time $\ln(\tau / 1\,\mathrm{s})$",
-    )  # fmt: skip
-    for panel, title in zip(panels, titles, strict=True):
-        panel.set_ylabel(title, fontsize=9)
+def _label(panels: Mapping[str, Axes], label: str) -> None:
+    for name, panel in panels.items():
+        panel.set_ylabel(_PANELS[name], fontsize=9)
         panel.tick_params(labelsize=8)
-    if panels[2].lines:
-        panels[2].set_yscale("log")
-    for panel in panels[:2]:
-        panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
-    panels[-1].set_xlabel(label)
-    if panels[0].get_legend_handles_labels()[0]:
-        panels[0].legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+        if name == "energy":
+            panel.set_yscale("log")
+        else:
+            panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    list(panels.values())[-1].set_xlabel(label)
 
 
-def _panels(ax: Any) -> NDArray[Any]:
+def _panels(ax: Any, count: int) -> NDArray[Any]:
     if ax is None:
-        figure = Figure(figsize=(7.0, 9.0), layout="constrained")
-        return figure.subplots(_PANELS, 1, sharex=True)
+        figure = Figure(figsize=(8.4, 0.8 + 2.2 * count), layout="constrained")
+        return figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     given = np.asarray(ax, dtype=object).ravel()
-    if given.size != _PANELS:
-        raise VibrokitError(f"sweep: ax has {given.size} axes; give {_PANELS}, or None.")
+    if given.size != count:
+        raise VibrokitError(f"sweep: ax has {given.size} axes; give {count}, one for each panel, or None.")
     return given

@@ -195,7 +195,8 @@ class Sweep(AlongParameter):
 
         Parameters
         ----------
-        ax : array of 4 Axes, optional
+        ax : array of Axes, optional
+            One for each panel.
         unit : str, optional
             ``"Hz"`` for frequencies, ``"mm"`` and ``"µm"`` for lengths; by default that of the parameter, in SI.
         """
