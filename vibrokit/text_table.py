@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 _EXPONENT = re.compile(r"\^\(?([-+]?[0-9]+(?:/[0-9]+)?)\)?")
 _RAISED = str.maketrans("-0123456789/", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ᐟ")
-_LARGEST = 690.0  # logarithm of numbers that a float holds, at most
+_PLAIN = 1e6  # numbers up to a million are written out
+_LARGEST = 50 * math.log(10)  # above it, and below its inverse, powers of ten are written, which are read more easily
 
 
 def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -28,7 +29,12 @@ def unit_text(unit: str) -> str:
 
 
 def power_text(logarithm: float) -> str:
-    """Return a number of any size, given its natural logarithm."""
-    if abs(logarithm) < _LARGEST:
-        return f"{math.exp(logarithm):.4g}"
-    return f"10^{logarithm / math.log(10):.2f}"
+    """Return a number of any size with about three digits, given its natural logarithm."""
+    if math.isnan(logarithm):
+        return "unknown"
+    if math.isinf(logarithm):
+        return "infinite" if logarithm > 0 else "0"
+    if abs(logarithm) > _LARGEST:
+        return f"10^{logarithm / math.log(10):.5g}"
+    number = f"{math.exp(logarithm):.3g}"
+    return f"{float(number):.0f}" if 1000 <= float(number) <= _PLAIN else number

@@ -153,7 +153,12 @@ def test_what_is_known_of_something_else_is_refused(calls, known, words):
         ({"accuracy": 0.0}, ParameterError), ({"accuracy": 1}, ParameterError),
         ({"accuracy": math.nan}, ParameterError), ({"accuracy": "high"}, ParameterError),
         ({"methods": []}, ParameterError), ({"methods": "sgcm"}, ParameterError),
-        ({"methods": ["sgmc"]}, UnknownNameError), ({"time_limit": 0}, StructureError),
+        ({"methods": ["sgmc"]}, UnknownNameError), ({"methods": 5}, ParameterError),
+        ({"time_limit": 0}, StructureError),
+        ({"accuracy": 10**400}, ParameterError), ({"source": 1.5}, ParameterError), ({"source": ""}, ParameterError),
+        ({"source": True}, ParameterError), ({"rng": -1}, ParameterError), ({"rng": "a"}, ParameterError),
+        ({"executor": "pool"}, StructureError), ({"known": 1}, StructureError), ({"known": None}, StructureError),
+        ({"known": "no-such-file.nc"}, VibrokitError),
         ({"source": "nowhere"}, StructureError), ({"checkpoint": "no/such/folder/a.nc"}, VibrokitError),
         ({"exit": "leave-basin"}, StructureError),
     ],
@@ -162,6 +167,22 @@ def test_arguments_that_are_refused(calls, options, error):
     with pytest.raises(error):
         vk.assess(OSC, **options)
     assert not calls[0]
+
+
+@pytest.mark.parametrize("record", [KNOWN, made(vk.LeastAction())])
+def test_a_checkpoint_does_not_replace_another_record(calls, tmp_path, record):
+    path = tmp_path / "kept.nc"
+    record.save(path)
+    with pytest.raises(StructureError, match="another file"):
+        vk.assess(OSC, checkpoint=path)
+    assert type(vk.load_result(path)) is type(record)
+    assert vk.assess(OSC, known=path).complete
+
+
+@pytest.mark.parametrize("scene", [None, "hertz-0.570", 3])
+def test_what_is_no_scene_is_refused(calls, scene):
+    with pytest.raises(SceneError, match="Oscillator"):
+        vk.assess(scene)
 
 
 def test_scenes_without_noise_are_refused(calls):

@@ -12,6 +12,7 @@ import vibrokit as vk
 from tests.builders import PROVENANCE, assert_same, energy, full_structure, rated_result, section
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.errors import ParameterError, StructureError
+from vibrokit.report.assessment import assessment_text
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.merging import merged
 from vibrokit.results.mfet import MFETResult
@@ -76,6 +77,38 @@ def test_probability_of_leaving(assessment):
     assert rare.value == pytest.approx(1.0 / exact((1, 0), 1e-6), rel=1e-6)
 
 
+def test_probability_of_leaving_by_target_is_never_above_the_share_of_the_target(assessment):
+    """Rates k and 3k to two targets: k/(k + 3k) (1 − exp(−4kt))."""
+    times = {(0, 1): np.full(3, math.log(4e4)), (0, -2): np.full(3, math.log(4e4 / 3))}
+    result = rated_result(MFETResult, times, D, 0.02, section=SECTION, scene=SCENE, relaxation=1.0)
+    one = dataclasses.replace(assessment, results={"mfet": result})
+    for time in (100.0, 1e4, 1e6):
+        found = [one.probability_of_leaving(0, time, target) for target in (1, "escape", None)]
+        exact_ones = [share * -math.expm1(-time / 1e4) for share in (0.25, 0.75, 1.0)]
+        assert [each.value for each in found] == pytest.approx(exact_ones, rel=1e-6)
+        assert all(each.lower <= each.value <= each.upper <= 1 for each in found)
+
+
+def test_nothing_is_sure_to_leave_before_it_has_relaxed(assessment):
+    """An exit time that is shifted by up to ten relaxations and exponential after them is in the interval."""
+    slow = dataclasses.replace(
+        assessment,
+        results={
+            "mfet": dataclasses.replace(
+                rated(), data=rated().data.assign(relaxation_time=lambda d: 60.0 * d.relaxation_time)
+            )
+        },
+    )
+    mean = slow.mean_time(0).value
+    for time in (100.0, 600.0, 3000.0, 2e4, 1e5):
+        found = slow.probability_of_leaving(0, time)
+        for delay in (0.0, 300.0, 600.0):
+            late = -math.expm1(-max(time - delay, 0.0) / (mean - delay))
+            assert found.lower <= late <= found.upper
+    assert slow.probability_of_leaving(0, 600.0).lower == 0.0
+    assert slow.probability_of_leaving(0, "1 yr").lower == pytest.approx(1.0)
+
+
 def test_allowed_intensity_is_the_inverse_of_the_mean_time(assessment):
     for wanted in ("8 h", "1 yr", "1000 yr"):
         found = assessment.allowed_intensity(0, wanted)
@@ -93,6 +126,24 @@ def test_occupancies_balance_the_rates(assessment):
         assert shares.values == pytest.approx(np.array(ways) / sum(ways), rel=1e-6)
         assert np.all(shares["lower"] <= shares)
         assert np.all(shares <= shares["upper"])
+
+
+@pytest.mark.parametrize("slower", [10.0, 1e16])
+def test_occupancies_until_a_rare_escape(assessment, slower):
+    """Each state escapes so many times more rarely than it is left for the other one: at 10, in one of eleven cases."""
+    ways = BARRIERS | {(0, -2): BARRIERS[0, 1], (1, -2): BARRIERS[1, 0]}
+    times = {way: math.log(PREFACTOR) + b / D + math.log(slower) * (way[1] < 0) for way, b in ways.items()}
+    result = rated_result(MFETResult, times, D, 0.02, section=SECTION, scene=SCENE, relaxation=1.0)
+    leaky = dataclasses.replace(assessment, results={**assessment.results, "mfet": result, "sgcm": result})
+    shares, exits = leaky.occupancy(intensity=2e-5), [1 / exact(way, 2e-5) for way in BARRIERS]
+    chain = np.array([[-exits[0], exits[0]], [exits[1], -exits[1]]]) - np.diag(exits) / slower
+    values, vectors = np.linalg.eig(chain.T)
+    slowest = np.argmax(values)
+    assert shares.values == pytest.approx(vectors[:, slowest] / vectors[:, slowest].sum(), rel=1e-6)
+    assert float(shares["log_escape_time"]) == pytest.approx(math.log(slower / (shares.values @ exits)))
+    assert "time before motion escapes" in assessment_text("leaky", leaky)
+    assert vk.occupancies(result).sel(intensity=2e-5).values == pytest.approx(shares.values)
+    assert (vk.occupancies(result)["log_escape_time"] < math.inf).all()
 
 
 def test_methods_are_reconciled(assessment):

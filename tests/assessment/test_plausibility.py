@@ -58,6 +58,13 @@ def test_rows_of_the_tube_are_closed_forms():
     assert "nan" not in str(found)
 
 
+def test_the_tube_grazes_its_stops_where_its_amplitude_is_the_gap():
+    """F/√((ω_n² − ω²)² + (2ζω_nω)²) = gap at 57.69 Hz."""
+    for hz, touches in ((57.68, True), (57.70, False)):
+        osc = TUBE.replace({"excitations.0.frequency": 2 * math.pi * hz})
+        assert (plausibility(osc).value(Measure.AMPLITUDE_OVER_GAP, "right") > 1) is touches
+
+
 @pytest.mark.parametrize(("power", "law"), [(1.0, vk.Linear(40.0)), (1.5, vk.Hertz(40.0)), (2.0, None), (0.5, None)])
 def test_contact_times_of_power_laws(power, law):
     """T = 2 (d/v) ∫₀¹ du/√(1 − u^(n+1)), d = ((n+1) v²/2k)^(1/(n+1))."""
@@ -96,6 +103,12 @@ def test_the_response_is_that_of_integration(spring, tones):
     assert found.rest + found.right == pytest.approx(path.x.max(), rel=1e-4)
     assert found.rest - found.left == pytest.approx(path.x.min(), rel=1e-4)
     assert found.speed == pytest.approx(np.abs(path.v).max(), rel=1e-4)
+
+
+def test_excitations_of_one_frequency_add_up():
+    tones = (vk.Harmonic(0.3, 1.3), vk.Harmonic(0.1, 1.3))
+    found = linear_response(vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=tones))
+    assert found.right == pytest.approx(0.4 / math.hypot(1 - 1.3**2, 0.2 * 1.3), rel=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -7,30 +7,38 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from scipy import integrate
-from scipy.linalg import null_space
+from scipy.linalg import eig, null_space
 
 import vibrokit as vk
-from vibrokit.comparison.occupancies import Balance, log_stationary, shares_text
+from vibrokit.comparison.markov_chain import log_loss, log_stationary
+from vibrokit.comparison.occupancies import Balance, shares_text
 from vibrokit.results.codes import Code
 
 NAMES = ("a", "b", "c", "d")
 
 
-def balance(rates, errors=0.0, relaxations=1e-3, held=None, unknown=()):
+def balance(rates, errors=0.0, relaxations=1e-3, held=None, unknown=(), escapes=0.0):
     """A balance of rates with errors of ln of them; `unknown` are (from, to) of which nothing is known."""
     count = len(rates)
     with np.errstate(divide="ignore"):
-        logs = np.log(np.array(rates, dtype=float))
+        logs, escapes = np.log(np.array(rates, dtype=float)), np.log(np.broadcast_to(escapes, count))
     lower, upper = logs - errors, logs + errors
     for place in unknown:
         lower[place], upper[place] = -np.inf, np.inf
     shares = np.full((count, count), np.nan) if held is None else np.array(held)
-    return Balance(NAMES[:count], logs, lower, upper, np.broadcast_to(relaxations, count), shares)
+    return Balance(NAMES[:count], logs, lower, upper, np.broadcast_to(relaxations, count), shares, escapes)
 
 
 def exact(rates):
     null = null_space((rates - np.diag(rates.sum(axis=1))).T)[:, 0]
     return null / null.sum()
+
+
+def remaining(rates, escapes):
+    """Shares of what has not escaped, in the long run, and the rate at which it escapes: the slowest left mode."""
+    values, vectors = eig((rates - np.diag(rates.sum(axis=1) + escapes)).T)
+    slowest = np.argmax(values.real)
+    return vectors[:, slowest].real / vectors[:, slowest].real.sum(), -values[slowest].real
 
 
 RATES = np.random.default_rng(3).uniform(0.1, 2.0, (4, 4)) * (1 - np.eye(4))
@@ -48,6 +56,16 @@ def test_rates_too_small_for_floating_point_balance():
     rates = np.array([[-np.inf, -2000.0], [-1500.0, -np.inf]])
     found = log_stationary(rates, NAMES)
     assert found[1] - found[0] == pytest.approx(-500.0)
+
+
+@pytest.mark.parametrize("weak", [1e3, 1e6, 1e12])
+def test_shares_at_noise_of_any_weakness(weak):
+    """ΔU/D of so many thousands: the states are not alike because no float holds their rates."""
+    one = Balance(
+        NAMES[:2], *[weak * np.array([[-np.inf, -20.0], [-19.0, -np.inf]])] * 3, np.full(2, 1e-3),
+        np.full((2, 2), np.nan), np.full(2, -np.inf),
+    )  # fmt: skip
+    np.testing.assert_allclose(one.shares, [[1.0, 0.0]] * 3, atol=1e-300)
 
 
 def test_a_state_that_is_never_left_is_refused_by_name():
@@ -141,6 +159,52 @@ def test_the_order_of_the_attractors_does_not_matter(seed):
     heads = [np.unique(each.hosts) for each in (found, mirrored)]
     np.testing.assert_array_equal(heads[0], 3 - heads[1][::-1])
     np.testing.assert_allclose(found.shares, np.array(mirrored.shares)[:, ::-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_shares_are_of_what_has_not_escaped(seed):
+    rng = np.random.default_rng(seed)
+    rates = np.exp(rng.uniform(-3, 0, (4, 4))) * (1 - np.eye(4))
+    escapes = rng.uniform(0, 0.004, 4) * [1, 1, 0, 1]
+    found, (shares, rate) = balance(rates, escapes=escapes), remaining(rates, escapes)
+    np.testing.assert_allclose(found.shares[0], shares, rtol=1e-9)
+    assert found.log_escape_time == pytest.approx(-math.log(rate))
+
+
+def test_an_escape_once_in_a_thousand_million_years_leaves_shares_as_they_are():
+    found, rare = balance(RATES), balance(RATES, escapes=[0.0, 3e-17, 1e-300, 0.0])
+    np.testing.assert_allclose(rare.shares, found.shares, rtol=1e-12)
+    assert rare.log_escape_time == pytest.approx(-math.log(3e-17 * exact(RATES)[1]))
+    quick = balance([[0.0, 2.0], [3.0, 0.0]], relaxations=1.0, escapes=1e-17)
+    np.testing.assert_allclose(quick.shares[0], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("rates", "escapes"),
+    [
+        ([[0.0, 1.0], [1.0, 0.0]], [0.0, 0.2]),  # in one of six cases
+        ([[0.0, 1.0], [1e-9, 0.0]], [1e-8, 1e-8]),
+        ([[0.0, 1e-9], [1.0, 0.0]], [1e-8, 0.0]),  # b is as good as never reached
+        ([[0.0, 1.0, 0.0], [1.0, 0.0, 1e-9], [1e-12, 0.0, 0.0]], [1e-6, 0.0, 0.0]),  # nor is c, and c never escapes
+        ([[0.0, 0.0], [0.0, 0.0]], [1e-9, 1e-9]),  # as of a first contact
+        ([[0.0]], [1e-9]),
+    ],
+)
+def test_escape_within_the_times_of_exchange_leaves_no_shares(rates, escapes):
+    with pytest.raises(vk.errors.StructureError, match="does not come back"):
+        _ = balance(rates, escapes=escapes).shares
+
+
+def test_what_is_lost_on_the_way_is_that_of_the_chain():
+    """Against the solution of the linear equations for the probability of absorption."""
+    rng = np.random.default_rng(5)
+    rates = np.exp(rng.uniform(-4, 0, (4, 5)))
+    generator = rates[:, :4] * (1 - np.eye(4))
+    left = generator.sum(axis=1) + rates[:, 4]
+    for start, end in itertools.permutations(range(4), 2):
+        others = [label for label in range(4) if label != end]
+        lost = np.linalg.solve((np.diag(left) - generator)[np.ix_(others, others)], rates[others, 4])
+        assert log_loss(np.log(rates), start, end) == pytest.approx(math.log(lost[others.index(start)]))
 
 
 # --- whole scenes

@@ -41,21 +41,45 @@ def test_what_has_no_sensitivities_is_refused():
         sensitivities(power_law(), PARAMETERS, tied={"x": ("aa",)})
 
 
+PAIR = ("barriers.0.position", "barriers.1.position")
+
+
+def least(osc, source, points=2000):
+    structure = vk.find_structure(osc, cells=(60, 60), starts=(8, 8), manifolds=False)
+    quick = vk.LeastAction(source=source, graph=None, shooting=vk.Shooting(points=points, rounds=6))
+    return min(quick.run(osc, structure).energies, key=lambda energy: energy.value)
+
+
+def scaled(osc, names, factor):
+    return osc.replace({name: factor * osc.parameters[name] for name in names})
+
+
 @pytest.mark.slow
 def test_both_gaps_of_the_paper():
     """The stops moved by 0.1 % to either side, and the energies solved for anew: at 1 % the power is 0.6 % off."""
     osc = vk.load_scene("hertz-0.570")
-    pair = ("barriers.0.position", "barriers.1.position")
+    energy = least(osc, "clear")
+    found = {one.parameter: one for one in sensitivities(energy, osc.parameters, tied={"gaps": PAIR})}
+    moved = [least(scaled(osc, PAIR, factor), "clear").value for factor in (1.001, 0.999)]
+    assert found["gaps"].energy == pytest.approx(math.log(moved[0] / moved[1]) / math.log(1.001 / 0.999), rel=5e-4)
 
-    def least(scene):
-        structure = vk.find_structure(scene, cells=(60, 60), starts=(8, 8), manifolds=False)
-        quick = vk.LeastAction(source="clear", graph=None, shooting=vk.Shooting(points=2000, rounds=6))
-        return min(quick.run(scene, structure).energies, key=lambda energy: energy.value)
 
-    def moved(factor):
-        return least(osc.replace({name: factor * osc.parameters[name] for name in pair})).value
-
-    energy = least(osc)
-    found = {one.parameter: one for one in sensitivities(energy, osc.parameters, tied={"gaps": pair})}
-    exponent = math.log(moved(1.001) / moved(0.999)) / math.log(1.001 / 0.999)
-    assert found["gaps"].energy == pytest.approx(exponent, rel=5e-4)
+@pytest.mark.slow
+@pytest.mark.long
+def test_gaps_of_a_heat_exchanger_tube():
+    """ΔU goes like gap^5.9. It also goes like the square of a length by which gaps and forces are scaled together."""
+    stops = [vk.Barrier(vk.Linear(2e6 / 0.35), sign * 2.5e-4, side) for sign, side in ((1, "right"), (-1, "left"))]
+    osc = vk.Oscillator(
+        natural_frequency=math.sqrt(22e3 / 0.35), damping_ratio=0.008, barriers=stops,
+        excitations=(vk.Harmonic(6 / 0.35, 2 * math.pi * 65),), noise=vk.WhiteNoise(1e-3 / 0.35**2 / 2),
+    )  # fmt: skip
+    energy = least(osc, "clear")
+    assert energy.value == pytest.approx(2.1725e-3, rel=1e-4)
+    tied = {"gaps": PAIR, "lengths": (*PAIR, "excitations.0.amplitude")}
+    found = {one.parameter: one for one in sensitivities(energy, osc.parameters, osc.noise.intensity, tied=tied)}
+    assert found["lengths"].energy == pytest.approx(2.0, abs=2 * found["lengths"].energy_error)
+    assert found["lengths"].energy_error < 0.02
+    moved = [least(scaled(osc, PAIR, factor), "clear").value for factor in (1.02, 0.98)]
+    power = math.log(moved[0] / moved[1]) / math.log(1.02 / 0.98)
+    assert power == pytest.approx(5.9, abs=0.05)
+    assert found["gaps"].energy == pytest.approx(power, abs=0.02 + found["gaps"].energy_error)

@@ -6,6 +6,8 @@ import dataclasses
 import math
 
 from vibrokit.assessment.durations import interval_text
+from vibrokit.comparison.mean_times import LogTime
+from vibrokit.results.rated import METASTABLE
 
 _READABLE = math.log(1e6)  # ln of numbers of periods up to which they are written
 _LARGEST = 709.0  # exponent of the largest floating-point number
@@ -70,6 +72,16 @@ class MeanTime(Answer):
     period: float
     metastable: bool
 
+    @classmethod
+    def of(cls, question: str, time: LogTime, period: float, relaxation: float) -> MeanTime:
+        """Make it of ln of a time, the period and the relaxation time of the state (s; NaN where not known)."""
+        return cls(
+            question=question, value=exponential(time.value), lower=exponential(time.lower),
+            upper=exponential(time.upper), unit="s", intensity=time.intensity, methods=time.methods,
+            extrapolated=time.extrapolated, log_value=time.value, log_lower=time.lower, log_upper=time.upper,
+            period=period, metastable=not (relaxation > 0 and time.value < math.log(METASTABLE * relaxation)),
+        )  # fmt: skip
+
     @property
     def number(self) -> str:
         """The time with its interval in the unit that reads best, and as a number of periods where that is readable."""
@@ -102,6 +114,32 @@ class AllowedIntensity(Answer):
         if math.isnan(value):
             return super().number
         return f"{super().number}, a PSD of {value:.3g} ({lower:.3g} to {upper:.3g}) (m/s²)²/Hz"
+
+
+def probability_within(time: float, leaving: LogTime, goal: LogTime, relaxation: float) -> tuple[float, float, float]:
+    """Return the probability that a state is left for a target within a time (s), and its interval.
+
+    Parameters
+    ----------
+    time : float
+    leaving : LogTime
+        Until the state is left at all.
+    goal : LogTime
+        The inverse of the rate to the target; the same as `leaving` if that is the only one, or any.
+    relaxation : float
+        Relaxation time of the state (s); NaN where it is not known.
+    """
+    delay = METASTABLE * relaxation if relaxation > 0 else 0.0
+
+    def within(seconds: float, log_leaving: float, log_goal: float) -> float:
+        gone = -math.expm1(-exponential(math.log(seconds) - log_leaving)) if seconds > 0 else 0.0
+        return gone if goal is leaving else min(1.0, exponential(log_leaving - log_goal)) * gone
+
+    # The mean time includes the delay: after it, motion leaves at the rate 1/(τ − delay).
+    part = delay * exponential(-leaving.lower)
+    soon = leaving.lower + (math.log1p(-part) if part < 1.0 else -math.inf)
+    value = within(time, leaving.value, goal.value)
+    return value, within(time - delay, leaving.upper, goal.upper), max(value, within(time, soon, goal.lower))
 
 
 def exponential(logarithm: float) -> float:

@@ -5,24 +5,27 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
+from numbers import Integral
 from typing import Any
 
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
+from vibrokit.arguments import members, real
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known
 from vibrokit.assessment.ladder import fitted, ladder
 from vibrokit.construction import called
-from vibrokit.errors import OutOfTime, ParameterError, SceneError, VibrokitError, shown
+from vibrokit.errors import OutOfTime, ParameterError, SceneError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
 from vibrokit.registry import Group, load
 from vibrokit.results.atomic import checked_target
 from vibrokit.results.codes import Code
+from vibrokit.results.files import load_result
 from vibrokit.results.finding import Finding
 from vibrokit.results.merging import merged, part_of
 from vibrokit.results.rated import RatedResult
@@ -30,7 +33,7 @@ from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.validation import check_belongs
+from vibrokit.structure.validation import check_belongs, check_means, seed_of
 
 METHODS = ("least-action", "mfet", "sgcm")
 """Analyzers that an assessment runs, in this order, by their registered names."""
@@ -77,19 +80,23 @@ class Request:
         executor: Executor | None,
     ) -> Request:
         """Check arguments; raises a VibrokitError."""
-        if isinstance(accuracy, bool) or not isinstance(accuracy, int | float) or not 0 < accuracy < 1:
+        check_means(osc, None, executor)
+        if not 0 < real(accuracy) < 1:
             raise ParameterError(f"accuracy must be above 0 and below 1, got {shown(accuracy)}.")
-        if isinstance(methods, str) or (methods is not None and not methods):
+        names = METHODS if methods is None else members(methods)
+        if not names:
             raise ParameterError(f"methods must be names of analyzers, such as {METHODS!r}, got {shown(methods)}.")
         if osc.noise is not None and not osc.noise.intensity > 0:
             raise SceneError("the noise of the scene has the intensity 0, so nothing is left; give it a positive one.")
+        if source is not None and (not isinstance(source, str | Integral) or isinstance(source, bool) or source == ""):
+            raise ParameterError(f"source must be the label or the name of a state, got {shown(source)}.")
         analyzers = {}
-        for name in methods or METHODS:
+        for name in names:
             analyzers[name] = dataclasses.replace(fitted(load(Group.ANALYZERS, name, Analyzer)(), accuracy), exit=exit)
             analyzers[name].check(osc)
         return cls(
             accuracy=float(accuracy), time_limit=checked_time_limit(time_limit), analyzers=analyzers, source=source,
-            rng=rng, executor=executor,
+            rng=seed_of(rng), executor=executor,
         )  # fmt: skip
 
 
@@ -102,7 +109,7 @@ def assess(
     methods: Sequence[str] | None = None,
     source: int | str | None = None,
     exit: Exit | None = None,  # noqa: A002 - the name that analyzers use
-    known: Iterable[Any] = (),
+    known: Any = (),
     checkpoint: str | os.PathLike[str] | None = None,
     rng: int = 0,
     executor: Executor | None = None,
@@ -128,11 +135,12 @@ def assess(
         Label or name of the state to leave; by default all.
     exit : Exit, optional
         What counts as leaving; by default `LeaveBasin`.
-    known : iterable of Record or path, optional
+    known : Record, path, or iterable of these, optional
         A structure, results or assessments of this scene and this exit, as objects or as files. Those that are complete
         are not computed again. Results of an assessment of less accuracy count as incomplete.
     checkpoint : path, optional
-        A file in which the assessment is saved after each of its stages. If it exists, it is taken as known.
+        A file in which the assessment is saved after each of its stages. If it exists, it must hold an assessment, and
+        is taken as known.
     rng : int
         Seed of the random starts of the search for steady states.
     executor : concurrent.futures.Executor, optional
@@ -146,11 +154,11 @@ def assess(
     Raises
     ------
     ParameterError
-        The accuracy or the methods are not allowed.
+        The accuracy, the methods, the source or the seed are not allowed.
     SceneError
         The scene has no noise.
     StructureError
-        No state can be left in this way, or a known record is of another scene.
+        No state can be left in this way, a known record is of another scene, or the checkpoint holds another record.
     OutOfTime
         The time limit was reached before the steady states were found.
     """
@@ -166,7 +174,7 @@ def assessed(
     osc: Oscillator,
     request: Request,
     work: Work,
-    known: Iterable[Any] = (),
+    known: Any = (),
     checkpoint: str | os.PathLike[str] | None = None,
 ) -> Assessment:
     """Return the last assessment that was reached, and save it after each stage.
@@ -174,7 +182,16 @@ def assessed(
     `work` is the work under way. If it is stopped before there is an assessment, its KeyboardInterrupt is raised.
     """
     kept = None if checkpoint is None else checked_target(checkpoint)
-    given = [*known, *([kept] if kept is not None and kept.exists() else [])]
+    listed = members(known)
+    given = (known,) if listed is None else listed
+    if kept is not None and kept.exists():
+        before = load_result(kept)
+        if not isinstance(before, Assessment):
+            raise StructureError(
+                f"{kept} holds a record of kind {before.kind!r}, which an assessment would replace; give another file "
+                "as the checkpoint, and this one as known."
+            )
+        given = (*given, before)
     last: Assessment | None = None
     try:
         for assessment in _Road(osc, request, work, given).stages():
@@ -200,6 +217,7 @@ class _Road:
         self.left: list[Finding] = []
         self.complete = False
         self.known = Known.of(known, request.accuracy)
+        self.known.check(osc, next(iter(request.analyzers.values())).exit)
         for one in self.known.structures:
             check_belongs(osc, one)
             self.structure = one

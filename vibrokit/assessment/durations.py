@@ -7,7 +7,9 @@ import re
 from collections.abc import Mapping
 from numbers import Real
 
-from vibrokit.errors import ParameterError, nearest, shown
+from vibrokit.arguments import real
+from vibrokit.errors import ParameterError, StructureError, nearest, shown
+from vibrokit.text_table import power_text
 
 _MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
 _YEAR = 365.25 * _DAY
@@ -22,7 +24,6 @@ _UNITS: Mapping[str, float] = {
 _PERIODS = ("period", "periods")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)\s*")
 _SHOWN = (("years", _YEAR, 2.0), ("days", _DAY, 2.0), ("hours", _HOUR, 2.0), ("minutes", _MINUTE, 2.0))
-_PLAIN = math.log(1e6)  # numbers up to a million, and down to its inverse, are written out
 
 
 def seconds_in(text: object, period: float | None = None) -> float:
@@ -42,7 +43,7 @@ def seconds_in(text: object, period: float | None = None) -> float:
     """
     example = "give a number of seconds, or a number with a unit, such as '8 h' or '1 yr'"
     if isinstance(text, Real) and not isinstance(text, bool):
-        number, unit = float(text), "s"
+        number, unit = real(text), "s"
     else:
         match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
         if match is None:
@@ -63,47 +64,34 @@ def seconds_in(text: object, period: float | None = None) -> float:
     return number * scale
 
 
-def duration_text(seconds: float, period: float | None = None) -> str:
-    """Return a duration (s) in the unit that reads best, and in periods (s each) if there are any."""
-    if not seconds > 0:
-        return "0 s" if seconds == 0 else "unknown"
-    return "infinite" if math.isinf(seconds) else log_duration_text(math.log(seconds), period)
+def required_time(mean_time: float | str, period: float) -> float:
+    """Return a mean time that a state has to last (s); raises StructureError if it is shorter than a period."""
+    time = seconds_in(mean_time, period=period)
+    if time < period:
+        raise StructureError(
+            f"mean_time must be a period at least ({period:g} s), for exits are counted once in a period, got "
+            f"{shown(mean_time)}."
+        )
+    return time
 
 
-def log_duration_text(log_seconds: float, period: float | None = None) -> str:
-    """Return the same, given ln of the duration in seconds: it may exceed the largest float."""
-    if math.isnan(log_seconds):
-        return "unknown"
-    if math.isinf(log_seconds):
-        return "infinite" if log_seconds > 0 else "0 s"
+def duration_text(log_seconds: float) -> str:
+    """Return a duration in the unit that reads best, given ln of it in seconds: it may exceed the largest float."""
+    if not math.isfinite(log_seconds):
+        return "0 s" if log_seconds < 0 else power_text(log_seconds)
     name, scale = _unit_of(log_seconds)
-    text = f"{_number(log_seconds - math.log(scale))} {name}"
-    return text if period is None else f"{text} ({_number(log_seconds - math.log(period))} periods)"
+    return f"{power_text(log_seconds - math.log(scale))} {name}"
 
 
 def interval_text(log_seconds: float, log_lower: float, log_upper: float) -> str:
     """Return a duration with its interval in one unit, such as ``"0.24 s (0.22 to 0.27)"``, from ln of each (s)."""
     if not math.isfinite(log_seconds):
-        return log_duration_text(log_seconds)
+        return duration_text(log_seconds)
     name, scale = _unit_of(log_seconds)
-    value, lower, upper = (_number(each - math.log(scale)) for each in (log_seconds, log_lower, log_upper))
+    value, lower, upper = (power_text(each - math.log(scale)) for each in (log_seconds, log_lower, log_upper))
     return f"{value} {name} ({lower} to {upper})"
 
 
 def _unit_of(log_seconds: float) -> tuple[str, float]:
     found = ((name, scale) for name, scale, least in _SHOWN if log_seconds >= math.log(least * scale))
     return next(found, ("s", 1.0))
-
-
-def _number(logarithm: float) -> str:
-    """A number of any size, given its natural logarithm."""
-    if math.isnan(logarithm):
-        return "unknown"
-    if math.isinf(logarithm):
-        return "infinite" if logarithm > 0 else "0"
-    if abs(logarithm) <= _PLAIN:
-        number = float(f"{math.exp(logarithm):.3g}")
-        return f"{number:.0f}" if number >= 1000 else f"{number:.3g}"
-    if abs(logarithm) < 50 * math.log(10):
-        return f"{math.exp(logarithm):.3g}"
-    return f"10^{logarithm / math.log(10):.0f}"

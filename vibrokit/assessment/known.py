@@ -13,7 +13,7 @@ from vibrokit.analyzers.settings import exit_data
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.errors import StructureError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.comparable import check_comparable, differences
+from vibrokit.results.comparable import check_comparable, check_scene, differences
 from vibrokit.results.files import load_result
 from vibrokit.results.merging import part_of
 from vibrokit.results.record import Record
@@ -54,9 +54,18 @@ class Known:
                 case _:
                     raise StructureError(
                         "what is known must be a structure, a result or an assessment, or the file of one, got "
-                        f"{f'a {type(record).__name__}' if isinstance(record, Record) else shown(record)}."
+                        f"{f'a record of kind {record.kind!r}' if isinstance(record, Record) else shown(record)}."
                     )
         return cls(tuple(structures), tuple(results))
+
+    def check(self, osc: Oscillator, exit: Exit) -> None:  # noqa: A002 - the name that analyzers use
+        """Raise StructureError for a record of another scene, or a result of another exit."""
+        for structure in self.structures:
+            check_scene("the known structure", structure, scene_data(osc))
+        for known in self.results:
+            name = str(known.settings.get("analyzer") or known.kind)
+            check_scene(f"the known result of {name}", known, scene_data(osc))
+            _check_exit(name, known, exit)
 
     def parts(self, osc: Oscillator, structure: Structure, exit: Exit) -> dict[tuple[str, int], Result]:  # noqa: A002
         """Return the results by analyzer and label; raises StructureError for those of another scene, states or exit.

@@ -13,12 +13,12 @@ from scipy.linalg import solve_continuous_lyapunov
 from vibrokit.errors import NoSectionError
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.roots import bracketed_roots
+from vibrokit.structure.tones import Tone, tones
 from vibrokit.symbolic.numeric import amplitude_at, drift_at, excitation_of, jacobian_of
 
 _PLACES = np.geomspace(1e-12, 1e12, 24 * 32 + 1)  # distances from x = 0 (m) at which forces at rest are compared with 0
-_SAMPLES = 128  # of a period of an excitation
+_TONES, _LEAST_TONE = 63, 1e-9  # of each excitation, and the least of them, of the largest
 _PER_WAVE = 512  # of the shortest wave: the parabola through the highest sample has an error of 5e-10
-_LEAST_TONE = 1e-9  # of the largest: smaller ones are rounding
 _UNDAMPED = 1e-12  # of a rate: damping of that size is rounding
 _MOST_WAVES = 1024  # in a common period: above it the tones are taken to meet in phase
 
@@ -57,7 +57,7 @@ def linear_response(osc: Oscillator) -> LinearResponse | None:
 
     Rests that are clear of the stops come first.
     """
-    tones, mean = _tones(osc)
+    found, mean = _tones(osc)
     drift, extra = drift_at(osc.model), len(osc.model.state) - 2
 
     def force(x: float) -> float:
@@ -79,46 +79,37 @@ def linear_response(osc: Oscillator) -> LinearResponse | None:
             continue
         rates = np.linalg.eigvals(matrix)
         if rates.real.max() <= _UNDAMPED * np.abs(rates).max():
-            left, right, speed = _forced(osc, tones, float(-matrix[1, 0]), float(-matrix[1, 1]))
+            left, right, speed = _forced(osc, found, float(-matrix[1, 0]), float(-matrix[1, 1]))
             noise = _noise(osc, matrix, state)
             return LinearResponse(rest, float(-matrix[1, 0]), float(-matrix[1, 1]), left, right, speed, noise)
     return None
 
 
-def _tones(osc: Oscillator) -> tuple[list[tuple[float, complex]], float]:
-    """Angular frequencies and complex amplitudes of the excitations, and the sum of their means without constants."""
-    tones, mean = list[tuple[float, complex]](), 0.0
+def _tones(osc: Oscillator) -> tuple[list[Tone], float]:
+    """Tones of the excitations, and the sum of their means without constants."""
+    found, mean = list[Tone](), 0.0
     for index, part in enumerate(osc.excitations):
-        if part.period is None or not math.isfinite(part.period):
-            continue
-        force = excitation_of(osc.model, index)
-        series = np.fft.rfft([force(part.period * k / _SAMPLES) for k in range(_SAMPLES)]) * (2 / _SAMPLES)
-        least = _LEAST_TONE * np.abs(series).max()
-        mean += float(series[0].real) / 2 if abs(series[0]) > least else 0.0
-        tones += [
-            (2 * math.pi * order / part.period, complex(series[order]))
-            for order in range(1, _SAMPLES // 2)
-            if abs(series[order]) > least
-        ]
-    return tones, mean
+        if part.period is not None and math.isfinite(part.period):
+            own, more = tones(excitation_of(osc.model, index), part.period, _TONES, _LEAST_TONE)
+            found, mean = found + more, mean + own
+    return found, mean
 
 
-def _forced(
-    osc: Oscillator, tones: list[tuple[float, complex]], stiffness: float, damping: float
-) -> tuple[float, float, float]:
+def _forced(osc: Oscillator, found: list[Tone], stiffness: float, damping: float) -> tuple[float, float, float]:
     """Largest displacements to the left and the right, and largest speed, of the response to all tones."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        waves = [(w, np.complex128(f) / (stiffness - w * w + 1j * w * damping)) for w, f in tones]
+        waves = [(w, np.complex128(f) / (stiffness - w * w + 1j * w * damping)) for w, f in found]
     if not waves:
         return 0.0, 0.0, 0.0
     try:
         period = osc.period or math.inf
     except NoSectionError:
         period = math.inf
-    if not period * max(tones)[0] <= 2 * math.pi * _MOST_WAVES or not all(cmath.isfinite(a) for _, a in waves):
+    most = period * max(w for w, _ in waves) / (2 * math.pi)
+    if not most <= _MOST_WAVES or not all(cmath.isfinite(a) for _, a in waves):
         reach = float(sum(abs(a) for _, a in waves))
         return reach, reach, float(sum(w * abs(a) for w, a in waves))
-    count = math.ceil(period * max(tones)[0] / (2 * math.pi) * _PER_WAVE)
+    count = math.ceil(most * _PER_WAVE)
     phases = 2j * np.pi * np.arange(count) / count
     turns = [np.exp(phases * round(w * period / (2 * math.pi))) for w, _ in waves]
     x = sum((a * turn).real for (_, a), turn in zip(waves, turns, strict=True))

@@ -48,8 +48,7 @@ def assess_scene(options: argparse.Namespace) -> int:
     from vibrokit.analyzers.exits import LeaveBasin
     from vibrokit.analyzers.settings import named_exit
     from vibrokit.assessment.assess import TIME_LIMIT, Request, assessed
-    from vibrokit.assessment.assessment import required_time
-    from vibrokit.assessment.durations import seconds_in
+    from vibrokit.assessment.durations import required_time, seconds_in
     from vibrokit.assessment.plausibility import plausibility
     from vibrokit.cli.interrupts import Interrupts
     from vibrokit.cli.run import source_of

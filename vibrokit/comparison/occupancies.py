@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -13,17 +14,16 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit, logsumexp
 
+from vibrokit.comparison.markov_chain import log_loss, log_stationary
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, shown
-from vibrokit.results.arrays import Arrays
-from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.labels import exit_between
 from vibrokit.results.rated import HELD, METASTABLE, RatedResult
-from vibrokit.text_table import text_table
+from vibrokit.text_table import power_text, text_table
 
 _NAMED = 0.1  # of the exits of an attractor that is divided: states that fewer lead to are not named with it
 _ROUNDING = 1e-9  # of parts of an attractor
-_FARTHEST = 1e4  # of ln of rates, in place of infinity: no rate of any unit is as small or as large
+_RETURNS = 12  # of motion that escapes: each reduces what is left of its effect by the share that escapes, a tenth
+_FARTHEST = 1e4  # of ln of rates and of odds, in place of infinity: so far beyond those that are known
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,25 +39,28 @@ def occupancies(result: RatedResult) -> xarray.DataArray:
     exchange within that time are one state. What is left so soon for other states counts with these, in parts, as its
     exits or its core lead there, and its own probability is NaN.
 
+    Motion that escapes does not come back. If all states are reached far more often than that happens, probabilities
+    are conditional on not having escaped.
+
     Returns
     -------
     xarray.DataArray
         Its coordinate ``state`` over (intensity, attractor) names the attractor that each one counts with, itself if
         it is a state of its own; several, joined by "and", if it is divided between them. Its coordinates ``lower`` and
         ``upper`` are bounds that include the errors of all rates, rates that were not resolved, and all of the
-        attractors that are divided.
+        attractors that are divided. Its coordinate ``log_escape_time`` over intensity is ln of the mean time until
+        motion escapes (s), infinite where it never does.
 
     Raises
     ------
     StructureError
-        The result has no rates, or none of the exits of some state at some intensity; or motion leaves some state for
-        good: then no state has a share of time in the long run.
+        The result has no rates, or none of the exits of some state at some intensity; or motion escapes from some state
+        before it has reached all others, in more than one of ten cases.
     """
     if not isinstance(result, RatedResult):
         raise StructureError(f"occupancies needs a result with rates, as of SGCM or MFET, got {shown(result)}.")
     if not result.rates:
         raise StructureError("the result has no rates; see its findings.")
-    check_returns(result.rates, result.names)
     return shares_over(result.intensities, balances(result))
 
 
@@ -75,6 +78,7 @@ def shares_over(intensities: Sequence[float], known: Sequence[Balance]) -> xarra
     coordinates = {
         "intensity": intensities, "attractor": names,
         "state": (both, np.array(states)), "lower": (both, lower), "upper": (both, upper),
+        "log_escape_time": ("intensity", [balance.log_escape_time for balance in known]),
     }  # fmt: skip
     return xarray.DataArray(values, coordinates, both, "occupancy")
 
@@ -86,7 +90,9 @@ def shares_text(shares: xarray.DataArray) -> str:
     for one in shares:
         cells = zip(one.values, one["lower"].values, one["upper"].values, one["state"].values, names, strict=True)
         rows.append([f"{float(one['intensity']):g}", *(_cell(*cell) for cell in cells)])
-    return "\n".join(text_table(rows))
+    escapes = [power_text(time) for time in shares["log_escape_time"].values if math.isfinite(time)]
+    until = f"Shares are of the time before motion escapes, after {', '.join(escapes)} s on average."
+    return "\n".join([*text_table(rows), *([until] if escapes else [])])
 
 
 def _cell(share: float, lower: float, upper: float, state: str, name: str) -> str:
@@ -106,6 +112,8 @@ class Balance:
         Relaxation times of the attractors (s).
     core_shares : array (count, count)
         Share of the core of row that lies in the basin of column; NaN where it is not known.
+    log_escapes : array (count,)
+        ln of the rates (s⁻¹) at which the attractors are left for good; −∞ where motion does not escape.
     """
 
     names: tuple[str, ...]
@@ -114,6 +122,7 @@ class Balance:
     upper: Array
     relaxations: Array
     core_shares: Array
+    log_escapes: Array
 
     @cached_property
     def held(self) -> Mask:
@@ -127,6 +136,11 @@ class Balance:
         found = np.full(len(self.names), -np.inf)
         found[self.held] = self._balanced(self.log_rates)
         return found
+
+    @cached_property
+    def log_escape_time(self) -> float:
+        """ln of the mean time until motion escapes (s), once it has forgotten its start; infinite if it never does."""
+        return -float(logsumexp((self.log_probabilities + self.log_escapes)[self.held]))
 
     @cached_property
     def hosts(self) -> NDArray[np.int64]:
@@ -172,6 +186,7 @@ class Balance:
     @cached_property
     def shares(self) -> tuple[Array, Array, Array]:
         """Probabilities of the states, in the order of the labels of their hosts, and lower and upper bounds."""
+        self._check_stays()
         parts = self._parts.T
         for members in parts > 0 if len(parts) > 1 else ():
             if not np.isfinite(self.log_rates[np.ix_(members, ~members)]).any():
@@ -204,12 +219,37 @@ class Balance:
         return quick
 
     def _balanced(self, log_rates: Array) -> Array:
+        """ln of the probabilities of those that are held; of motion that has not escaped.
+
+        Motion that escapes is put back where the other motion is: that leaves the distribution of the latter as it is.
+        """
         held = np.flatnonzero(self.held)
-        return log_stationary(log_rates[np.ix_(held, held)], [self.names[label] for label in held])
+        names, between = [self.names[label] for label in held], log_rates[np.ix_(held, held)]
+        escapes, found = self.log_escapes[held, None], np.zeros(len(held)) - math.log(max(len(held), 1))
+        for _ in range(_RETURNS if np.isfinite(escapes).any() else 1):
+            found = log_stationary(np.logaddexp(between, escapes + found), names)
+        return found
+
+    def _check_stays(self) -> None:
+        """Raise StructureError if motion escapes from some state before it has reached all others."""
+        if not np.isfinite(self.log_escapes[self.held]).any():
+            return
+        labels = self._heads if len(self._heads) > 1 else np.flatnonzero(self.held)
+        rates = np.where(self.held, np.column_stack([self.log_rates, self.log_escapes]).T, -np.inf).T
+        lost = {way: math.exp(log_loss(rates, *way)) for way in itertools.permutations(labels.tolist(), 2)}
+        start, end = max(lost, key=lambda way: lost[way]) if lost else (labels[0], None)
+        if end is None or lost[start, end] * METASTABLE > 1.0:
+            often = "" if end is None else f", in {lost[start, end]:.0%} of the cases before it is at {self.names[end]}"
+            raise StructureError(
+                f"motion that leaves {self.names[start]} does not come back{often}, so that no state has a share of "
+                "time in the long run; ask how long each lasts."
+            )
 
     def _log_odds(self, parts: Array, log_rates: Array) -> Array:
         """ln of the odds of each state, given how much of each attractor counts with it, shape (states, count)."""
-        likely = self._balanced(np.clip(log_rates, -_FARTHEST, _FARTHEST))
+        known = log_rates[np.isfinite(log_rates)]
+        ends = known.min(initial=0.0) - _FARTHEST, known.max(initial=0.0) + _FARTHEST
+        likely = self._balanced(np.clip(log_rates, *ends))
         with np.errstate(divide="ignore"):
             inside, outside = (
                 logsumexp(likely + np.log(np.clip(each[:, self.held], 0.0, 1.0)), axis=1) for each in (parts, 1 - parts)
@@ -218,33 +258,22 @@ class Balance:
         return odds
 
 
-def check_returns(rates: Iterable[ExitRate], names: Sequence[str]) -> None:
-    """Raise StructureError if motion leaves some attractor for good: then nothing balances in the long run."""
-    ends = sorted({(rate.source, rate.target) for rate in rates if rate.target < 0})
-    if ends:
-        listed = ", ".join(exit_between(names, *way) for way in ends)
-        raise StructureError(
-            f"motion that leaves does not come back ({listed}), so that no state has a share of time in the long run; "
-            "ask how long each lasts."
-        )
-
-
 def balances(result: RatedResult) -> list[Balance]:
     """Return the balance at each intensity; raises StructureError where a state has no exit that is known."""
-    if "relaxation_time" not in result.data:
+    names, relaxations = result.names, result.relaxations
+    if np.isnan(relaxations).any():
         raise StructureError("the result does not say how fast its attractors relax; run the analyzer again.")
-    names, count = result.names, len(result.names)
-    data = result.data.transpose("source", "intensity_index", "core_source", "core_label", ...)
-    labels, arrays = data["source"].values, Arrays(data)
-    intensities = arrays.numbers("rate_intensity", (len(labels), None), finite=False)
-    relaxations = arrays.numbers("relaxation_time", (len(labels), count))[0]
-    shares = arrays.numbers("core_share", (*intensities.shape, count, count), finite=False)
-    bounds = [np.where(np.eye(count, dtype=bool), -np.inf, ends.values) for ends in result.log_rate_bounds]
+    bounds = [np.where(np.eye(len(names), dtype=bool), -np.inf, ends.values) for ends in result.log_rate_bounds]
+    analyzed = {rate.source for rate in result.rates}
     found = []
     for number, (intensity, known) in enumerate(zip(result.intensities, result.log_rates.values, strict=True)):
-        place = tuple(np.argwhere(intensities == intensity)[0])
-        one = Balance(names, known, bounds[0][number], bounds[1][number], relaxations, shares[place])
-        missing = [name for label, name in enumerate(names) if one.held[label] and label not in labels]
+        escapes = np.full(len(names), -np.inf)
+        for rate in result.rates:
+            if rate.target < 0 and rate.intensity == intensity:
+                escapes[rate.source] = np.logaddexp(escapes[rate.source], rate.log_value)
+        shares = result.core_shares(intensity)
+        one = Balance(names, known, bounds[0][number], bounds[1][number], relaxations, shares, escapes)
+        missing = [name for label, name in enumerate(names) if one.held[label] and label not in analyzed]
         if missing:
             raise StructureError(
                 f"the result has no rate out of {', '.join(missing)}; run the analyzer without source=, and see the "
@@ -252,26 +281,3 @@ def balances(result: RatedResult) -> list[Balance]:
             )
         found.append(one)
     return found
-
-
-def log_stationary(log_rates: Array, names: Sequence[str]) -> Array:
-    """Return ln of the stationary probabilities of a Markov chain, from ln of its rates, shape (n, n).
-
-    By elimination without subtractions (Grassmann, Taksar & Heyman, Oper. Res. 33, 1107, 1985), in logarithms: rates of
-    1e-400 are as good as any. Raises StructureError if a state is never left.
-    """
-    rates = np.array(log_rates, dtype=float)
-    np.fill_diagonal(rates, -np.inf)
-    count = len(rates)
-    left = np.full(count, -np.inf)
-    for k in range(count - 1, 0, -1):
-        left[k] = logsumexp(rates[k, :k])
-        if not np.isfinite(left[k]):
-            raise StructureError(f"no exit from {names[k]} was resolved, so that its probability is not known.")
-        through = rates[:k, k, None] + rates[None, k, :k] - left[k]
-        rates[:k, :k] = np.logaddexp(rates[:k, :k], through)
-    found = np.zeros(count)
-    for k in range(1, count):
-        found[k] = logsumexp(found[:k] + rates[:k, k]) - left[k]
-    stationary: Array = found - logsumexp(found)
-    return stationary

@@ -14,7 +14,6 @@ from scipy.special import logsumexp
 from vibrokit.comparison.mean_times import log_sum
 from vibrokit.comparison.quantities import Kind, Quantity
 from vibrokit.errors import StructureError
-from vibrokit.results.arrays import Arrays
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
@@ -27,9 +26,8 @@ def exit_quantities(result: Result, method: str) -> list[Quantity]:
     """Return the quantities of the exits in one result: for each target, and for all targets of a source together."""
     found = list(_energies(result, method))
     if isinstance(result, RatedResult) and result.rates:
-        standing = _Standing(result)
         for one in _exits(result):
-            times = _log_times(result, standing, *one, method)
+            times = _log_times(result, *one, method)
             found += [*times, *_slopes(times), *_fit(times)]
     if isinstance(result, SGCMResult):
         found += _barriers(result, method)
@@ -80,10 +78,9 @@ def _exits(result: RatedResult) -> list[tuple[int, int | None]]:
     return found
 
 
-def _log_times(
-    result: RatedResult, standing: _Standing, source: int, target: int | None, method: str
-) -> list[Quantity]:
+def _log_times(result: RatedResult, source: int, target: int | None, method: str) -> list[Quantity]:
     """ln τ of one exit at each intensity, descending."""
+    relaxation = float(result.relaxations[source])
     own = [rate for rate in result.rates if rate.source == source]
     found = []
     for intensity in sorted({rate.intensity for rate in own}, reverse=True):
@@ -91,47 +88,21 @@ def _log_times(
         chosen = [rate for rate in here if target in (None, rate.target)]
         if chosen:
             log_rate, lower, upper = log_sum(chosen)
-            left = logsumexp([rate.log_value for rate in here])
+            left = float(logsumexp([rate.log_value for rate in here]))
             found.append(
                 Quantity(
                     Kind.LOG_TIME, source, target, method, intensity, -log_rate, -upper, -lower, chosen[0].event,
-                    standing.relaxations(source, float(left)), standing.core_share(source, target, intensity),
+                    math.exp(min(700.0, -left)) / relaxation, _core_share(result, source, target, intensity),
                 )
             )  # fmt: skip
     return found
 
 
-class _Standing:
-    """Relaxation times and core shares in a result, which decide whether its attractors are metastable."""
-
-    def __init__(self, result: RatedResult) -> None:
-        self.known = "relaxation_time" in result.data
-        if not self.known:
-            return
-        data = result.data.transpose("source", "intensity_index", "core_source", "core_label", ...)
-        arrays = Arrays(data)
-        self.labels = data["source"].values.tolist()
-        count = len(result.names)
-        self.intensities = arrays.numbers("rate_intensity", (len(self.labels), None), finite=False)
-        self.times = arrays.numbers("relaxation_time", (len(self.labels), count), finite=False)
-        shape = (*self.intensities.shape, count, count)
-        self.shares = arrays.numbers("core_share", shape, finite=False)
-
-    def relaxations(self, source: int, log_rate: float) -> float:
-        """Mean time until the source is left, in its relaxation times."""
-        if not self.known:
-            return math.nan
-        return math.exp(min(700.0, -log_rate)) / float(self.times[self.labels.index(source), source])
-
-    def core_share(self, source: int, target: int | None, intensity: float) -> float:
-        """Smaller share of the cores of source and target in their own basins; NaN where neither is known."""
-        if not self.known:
-            return math.nan
-        row = self.labels.index(source)
-        places = np.flatnonzero(self.intensities[row] == intensity)
-        own = np.diagonal(self.shares[row, places[0]])
-        both = [own[label] for label in (source, target) if label is not None and label >= 0]
-        return float(np.nanmin(both)) if np.isfinite(both).any() else math.nan
+def _core_share(result: RatedResult, source: int, target: int | None, intensity: float) -> float:
+    """Smaller share of the cores of source and target in their own basins; NaN where neither is known."""
+    own = np.diagonal(result.core_shares(intensity))
+    both = [own[label] for label in (source, target) if label is not None and label >= 0]
+    return float(np.nanmin(both)) if np.isfinite(both).any() else math.nan
 
 
 def _slopes(times: Sequence[Quantity]) -> list[Quantity]:

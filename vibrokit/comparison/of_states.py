@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from vibrokit.comparison.occupancies import balances, check_returns
+from vibrokit.comparison.occupancies import balances
 from vibrokit.comparison.quantities import Kind, Quantity
 from vibrokit.comparison.stationary import StationaryDensity
 from vibrokit.comparison.transitions import Transitions
@@ -32,15 +32,14 @@ def state_quantities(result: Result, method: str) -> list[Quantity]:
 def _shares(result: RatedResult, method: str) -> list[Quantity]:
     found = []
     try:
-        check_returns(result.rates, result.names)
         known = balances(result)
-    except StructureError:  # not every state was analyzed, or one is left for good
+    except StructureError:  # not every state was analyzed
         return []
     for intensity, balance in zip(result.intensities, known, strict=True):
         try:
             with np.errstate(invalid="ignore"):  # where no attractor is a state of its own
                 shares, heads = np.array(balance.shares), np.unique(balance.hosts)
-        except StructureError:  # an exit is not known at this intensity
+        except StructureError:  # an exit is not known at this intensity, or motion escapes
             continue
         for label, ends in zip(heads.tolist(), shares.T.tolist(), strict=True):
             if not any(map(math.isnan, ends)):

@@ -7,9 +7,9 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Sequence
-from numbers import Real
 from typing import Any
 
+from vibrokit.arguments import real
 from vibrokit.comparison.of_exits import exit_quantities, with_prefactors
 from vibrokit.comparison.of_states import state_quantities
 from vibrokit.comparison.pairs import Side, verdict_of, verdict_of_shares
@@ -52,7 +52,7 @@ def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
         structures, or have no exit in common.
     """
     begun = time.monotonic()
-    if isinstance(level, bool) or not isinstance(level, Real) or not 0.0 < level < 1.0:
+    if not 0.0 < real(level) < 1.0:
         raise ParameterError(f"level must be a probability above 0 and below 1, got {shown(level)}.")
     _check(results)
     methods = _method_names(results)
@@ -91,7 +91,7 @@ def _check(results: Sequence[Any]) -> None:
         if not isinstance(result, Result):
             raise StructureError(
                 "reconcile takes results with energies or rates, as of LeastAction, SGCM or MFET, got "
-                f"{f'a {type(result).__name__}' if isinstance(result, Record) else shown(result)}."
+                f"{f'a record of kind {result.kind!r}' if isinstance(result, Record) else shown(result)}."
             )
     if len(results) < 2:
         raise StructureError(f"reconcile needs two results or more to compare, got {len(results)}.")

@@ -6,7 +6,8 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
-from vibrokit.errors import StructureError, nearest
+from vibrokit.arguments import members
+from vibrokit.errors import ParameterError, StructureError, nearest, shown
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.text_table import number_text, text_table
 
@@ -56,24 +57,33 @@ def sensitivities(
 
     Raises
     ------
+    ParameterError
+        `tied` is not such a mapping.
     StructureError
         The energy has no sensitivities or is 0, or a name in `tied` is not one of its parameters.
     """
     if not energy.sensitivity or not energy.value > 0:
         raise StructureError("the energy has no sensitivities; those of LeastAction with a polished path have them.")
-    groups = {name: (name,) for name in energy.sensitivity} | {name: tuple(each) for name, each in (tied or {}).items()}
+    groups: dict[str, tuple[str, ...]] = {name: (name,) for name in energy.sensitivity}
+    if not isinstance(tied, Mapping | None):
+        raise ParameterError(f"tied must be a mapping of a name to names of parameters, got {shown(tied)}.")
+    for name, each in (tied or {}).items():
+        own = members(each)
+        if not own:
+            raise ParameterError(f"tied: {shown(name)} must be a sequence of names of parameters, got {shown(each)}.")
+        groups[name] = own
     for name in {one for each in groups.values() for one in each}:
         if name not in energy.sensitivity or name not in parameters:
             raise StructureError(f"the energy has no sensitivity in {name!r}{nearest(name, energy.sensitivity)}")
     depth = energy.value / intensity if intensity else math.nan
     found = []
-    for name, members in groups.items():
-        power = sum(_scaled(energy.sensitivity, parameters, one) for one in members) / energy.value
-        error = sum(abs(_scaled(energy.sensitivity_error, parameters, one)) for one in members) / energy.value
-        per_cent = 0.01 * power - (1 - 1 / 1.01 if _INTENSITY in members else 0.0)
+    for name, listed in groups.items():
+        power = sum(_scaled(energy.sensitivity, parameters, one) for one in listed) / energy.value
+        error = sum(abs(_scaled(energy.sensitivity_error, parameters, one)) for one in listed) / energy.value
+        per_cent = 0.01 * power - (1 - 1 / 1.01 if _INTENSITY in listed else 0.0)
         time = _growth(depth * per_cent)
         time_error = (100 + time) * abs(depth) * 0.01 * error
-        if power or _INTENSITY in members:
+        if power or _INTENSITY in listed:
             found.append(Sensitivity(name, power, error, time, time_error))
     return tuple(sorted(found, key=lambda one: -abs(one.energy)))
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from vibrokit.assessment.answers import Answer
 from vibrokit.assessment.assessment import Assessment
+from vibrokit.assessment.durations import duration_text
 from vibrokit.comparison.tables import agreement_text, verdicts_text
 from vibrokit.errors import StructureError
 from vibrokit.report.blocks import Table
@@ -121,7 +122,7 @@ def _answered(answer: Callable[[int], Answer], label: int) -> str:
 
 
 def _shares(one: Assessment) -> tuple[list[str], list[str]]:
-    """The share of time of each state, and why there is none."""
+    """The share of time of each state, and what limits it or why there is none."""
     try:
         found = one.occupancy()
     except StructureError as error:
@@ -131,7 +132,9 @@ def _shares(one: Assessment) -> tuple[list[str], list[str]]:
         state = str(share["state"].item())
         interval = f"({float(share['lower']):.2g} to {float(share['upper']):.2g})"
         texts.append(f"{float(share):.3g} {interval}" if state == name else f"with {state}")
-    return texts, []
+    time = float(found["log_escape_time"])
+    until = f"Shares are of the time before motion escapes, after {duration_text(time)} on average."
+    return texts, [until] if math.isfinite(time) else []
 
 
 def _lasting(one: Assessment, label: int) -> Sequence[str]:
@@ -167,7 +170,7 @@ def _share_data(one: Assessment) -> list[dict[str, Any]]:
         found = one.occupancy()
     except StructureError:
         return []
-    names = ("state", "lower", "upper")
+    names = ("state", "lower", "upper", "log_escape_time")
     return [
         {"attractor": name, "value": float(share), **{key: share[key].item() for key in names}}
         for share, name in zip(found, one.names, strict=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vibrokit.errors import StructureError, shown
+from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
 
@@ -15,14 +16,19 @@ _SAME_POINT = 0.01  # of the extent of the region: two searches find one orbit t
 _LARGEST_PERIOD = 64  # points: an orbit has fewer, a sample of chaotic motion more, which no two searches share
 
 
-def check_comparable(which: str, result: Result, scene: Any, section: Section) -> None:
-    """Refuse, with a StructureError, a result of another scene or of other steady states; `which` names it.
+def check_scene(which: str, record: Record, scene: Any) -> None:
+    """Refuse, with a StructureError, a record of another scene; `which` names it.
 
     The noise intensity may differ: each rate has its own.
     """
-    changed = differences(noiseless(scene), noiseless(result.scene))
+    changed = differences(noiseless(scene), noiseless(record.scene))
     if changed:
         raise StructureError(f"{which} is of another scene: {changed}. Use results of one scene.")
+
+
+def check_comparable(which: str, result: Result, scene: Any, section: Section) -> None:
+    """Refuse, with a StructureError, a result of another scene or of other steady states; `which` names it."""
+    check_scene(which, result, scene)
     if result.names != section.names or len(result.section.points) != len(section.points):
         raise StructureError(
             f"{which} has the attractors {', '.join(result.names) or 'none'}, and {', '.join(section.names) or 'none'} "

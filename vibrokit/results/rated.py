@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from vibrokit.construction import called
 from vibrokit.errors import StructureError
@@ -25,6 +26,8 @@ METASTABLE = 10.0
 """Relaxations in a mean exit time: with fewer the state is left before it has formed."""
 HELD = 0.5
 """Share of an attractor's core that lies in its own basin, at least: most of it."""
+
+Array = NDArray[np.float64]
 
 _DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
 
@@ -112,6 +115,30 @@ class RatedResult(Result):
         coordinates = {"intensity": known, "source": list(self.names), "target": list(self.names)}
         lower, upper = (xarray.DataArray(ends, coordinates, dims) for ends in bounds)
         return lower.rename("lower"), upper.rename("upper")
+
+    @property
+    def relaxations(self) -> Array:
+        """Relaxation times of all attractors (s), shape (attractors,); NaN where they are not known."""
+        count, found = len(self.names), np.empty((0, len(self.names)))
+        if "relaxation_time" in self.data:
+            arrays = Arrays(self.data.transpose("source", "core_source", ...))
+            found = arrays.numbers("relaxation_time", (None, count), finite=False)
+        known = found[np.isfinite(found).all(axis=1)]  # the same for each source that has rates
+        return known[0] if len(known) else np.full(count, np.nan)
+
+    def core_shares(self, intensity: float) -> Array:
+        """Return the share of each attractor's core in the basin of each, shape (attractors, attractors).
+
+        It is that at the computed intensity nearest to the given one; NaN where it is not known.
+        """
+        count = len(self.names)
+        if "core_share" not in self.data or not self.intensities:
+            return np.full((count, count), np.nan)
+        arrays = Arrays(self.data.transpose("source", "intensity_index", "core_source", "core_label", ...))
+        places = arrays.numbers("rate_intensity", (None, None), finite=False)
+        shares: Array = arrays.numbers("core_share", (*places.shape, count, count), finite=False)
+        nearest = np.nanargmin(np.abs(np.log(places / intensity)))
+        return shares.reshape(-1, count, count)[nearest]
 
     def arrhenius(self, source: int | str, target: int | str | None = None) -> ArrheniusFit:
         """Fit the Arrhenius law to the rates of one exit.

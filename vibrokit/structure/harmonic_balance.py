@@ -6,6 +6,7 @@ import cmath
 import functools
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,23 +16,16 @@ from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.borders import intervals_within
 from vibrokit.structure.roots import bracketed_roots
+from vibrokit.structure.tones import SAMPLES, Tone, tones
 
 _AMPLITUDES, _PHASES = 200, 128  # of the trial motions
 _LEAST_SWING, _MOST_SWING = 1e-3, 1e3  # of the deflection: range of amplitudes, where the damping does not bound it
 _BEYOND = 2.0  # times the amplitude that the damping allows, so that the curve of needed force turns back before it
 _PLACES, _FARTHEST, _MOST_RESTS = 513, 4.0, 5  # within so many lengths of x = 0, where rests are searched for
-_SAMPLES, _TONES, _LEAST_TONE = 512, 8, 1e-3  # of a period; its tones, and the least of them, of the largest
+_TONES, _LEAST_TONE = 8, 1e-3  # of each excitation, and the least of them, of the largest
 _CENTRINGS = 4  # Newton steps for the centre of a motion, from that of the amplitude before
 
 Array = NDArray[np.float64]
-
-
-class Tone(NamedTuple):
-    """The part F cos(ωt + φ) of a periodic force."""
-
-    force: float
-    frequency: float
-    phase: float
 
 
 class Balance(NamedTuple):
@@ -51,17 +45,10 @@ class Balance(NamedTuple):
 
 def tones_of(osc: Oscillator, count: int = _TONES) -> list[Tone]:
     """Return the tones of the periodic excitations, the lowest of each, without those that are far weaker."""
-    field, found = VectorField(osc), list[Tone]()
-    for index, part in enumerate(osc.excitations):
-        if part.period is None or not math.isfinite(part.period):
-            continue
-        times = part.period / _SAMPLES * np.arange(_SAMPLES)
-        series = 2 * np.fft.rfft([field.excitation(index, time) for time in times]) / _SAMPLES
-        sizes = np.abs(series[1 : count + 1])
-        for order in 1 + np.flatnonzero(sizes > _LEAST_TONE * sizes.max(initial=0.0)):
-            value = complex(series[order])
-            found.append(Tone(abs(value), 2 * math.pi * float(order) / part.period, cmath.phase(value)))
-    return found
+    force = VectorField(osc).excitation
+    periods = {index: part.period for index, part in enumerate(osc.excitations) if part.period is not None}
+    known = {index: period for index, period in periods.items() if math.isfinite(period)}
+    return [tone for i, period in known.items() for tone in tones(partial(force, i), period, count, _LEAST_TONE)[1]]
 
 
 class SteadyForce:
@@ -75,7 +62,7 @@ class SteadyForce:
         self._periodic = now - sum(self._mean(*each) for each in periods.items() if math.isfinite(each[1]))
 
     def _mean(self, index: int, period: float) -> float:
-        return float(np.mean([self.field.excitation(index, period * k / _SAMPLES) for k in range(_SAMPLES)]))
+        return float(np.mean([self.field.excitation(index, period * k / SAMPLES) for k in range(SAMPLES)]))
 
     def __call__(self, states: Array) -> Array:
         """Return the force at states (…, 2)."""

@@ -44,7 +44,7 @@ def _responses(osc: Oscillator, steady: SteadyForce, rest: float) -> list[tuple[
         inertia = -(tone.frequency**2) - slope[0] - 1j * tone.frequency * slope[1]
         if not inertia:
             return []
-        waves = tone.force * np.exp(1j * (tone.frequency * times + tone.phase)) / inertia
+        waves = tone.amplitude * np.exp(1j * tone.frequency * times) / inertia
         motion += np.stack([waves.real, (1j * tone.frequency * waves).real], axis=1)
     if not np.isfinite(motion).all():
         return []
