@@ -103,6 +103,25 @@ class Stats:
     newton_iterations: int = 0
     seconds: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
+    def __add__(self, other: Stats) -> Stats:
+        """The work of two results together."""
+        stages = {
+            name: self.seconds.get(name, 0.0) + other.seconds.get(name, 0.0)
+            for name in {**self.seconds, **other.seconds}
+        }
+        return Stats(**{name: getattr(self, name) + getattr(other, name) for name in _COUNTED}, seconds=stages)
+
+    def part(self, number: int, count: int) -> Stats:
+        """One of some equal parts, up to whole numbers: all parts together are the whole."""
+        counts = {
+            name: (number + 1) * getattr(self, name) // count - number * getattr(self, name) // count
+            for name in _COUNTED
+        }
+        return Stats(**counts, seconds={name: seconds / count for name, seconds in self.seconds.items()})
+
+
+_COUNTED = tuple(field.name for field in dataclasses.fields(Stats) if field.name != "seconds")
+
 
 class _Stage:
     """One stage under way."""
@@ -150,8 +169,7 @@ class Work:
     @property
     def stats(self) -> Stats:
         """What was counted so far."""
-        names = [field.name for field in dataclasses.fields(Stats) if field.name != "seconds"]
-        return Stats(**{name: self.counts[name] for name in names}, seconds=dict(self.spent))
+        return Stats(**{name: self.counts[name] for name in _COUNTED}, seconds=dict(self.spent))
 
     @property
     def inside(self) -> _Stage | None:

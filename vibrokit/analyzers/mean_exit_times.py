@@ -34,7 +34,6 @@ METHOD = "Arrhenius fit"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's, as SGCM has them
 _SMALLEST_ERROR = 1e-3  # a million exits
 _MOST_STAGES = 64  # of an importance function in a section interval: a tenth of a radian, where it may be interpolated
-_DEVIATIONS = 2.0  # standard errors on each side of an energy
 
 
 class MFET(Analyzer):
@@ -79,7 +78,8 @@ class MFET(Analyzer):
     the rate.
 
     An activation energy is the slope of ln τ against 1/D. It is given only if the slope does not change with D by more
-    than the errors of the rates allow.
+    than the errors of the rates allow. It has bounds if there are three intensities or more: two do not show how the
+    prefactor depends on D.
     """
 
     result: ClassVar[type[Result]] = MFETResult
@@ -210,12 +210,11 @@ def _energies(
             continue
         if not fit.slope > 0:
             continue
-        # A prefactor proportional to a power of D, such as D at weak damping, shifts the slope by about D.
-        error = _DEVIATIONS * fit.slope_error + float(fit.intensities.mean())
-        bounds = max(fit.slope - error, 0.0), fit.slope + error
+        lower, upper = fit.interval
         energies.append(
             ActivationEnergy(
-                problem.source, target, fit.slope, *bounds, METHOD, Bound.ESTIMATE, numerical_error=fit.slope_error
+                problem.source, target, fit.slope, max(lower, 0.0), upper, METHOD, Bound.ESTIMATE,
+                numerical_error=fit.slope_error,
             )
-        )
+        )  # fmt: skip
     return tuple(energies), tuple(findings)

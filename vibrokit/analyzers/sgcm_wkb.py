@@ -79,8 +79,9 @@ class SGCM(Analyzer):
     the attractors are not metastable. This is no error, because cores are defined; a finding reports it.
 
     An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more.
-    Its interval allows for a prefactor that is proportional to D or 1/D, for more if three or more intensities show
-    that, and for the change by cores 1.5 times as large. Intensities that the nodes cannot resolve are left out, with a
+    It has bounds if there are three: two do not show how the prefactor depends on D. Its interval allows for a
+    prefactor that is proportional to D or 1/D, for the power of D that the intensities show, and for the change by
+    cores 1.5 times as large. Intensities that the nodes cannot resolve are left out, with a
     finding.
 
     The transition over one period is that of stochastic generalized cell mapping (Sun & Hsu, J. Appl. Mech. 57, 1018,
@@ -179,7 +180,7 @@ def _energies(
                 upper=upper,
                 method=METHOD,
                 bound=Bound.ESTIMATE,
-                numerical_error=error,
+                numerical_error=error if math.isfinite(error) else math.nan,
             )
         )
     return tuple(found), tuple(findings)

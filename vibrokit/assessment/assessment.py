@@ -25,7 +25,7 @@ from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.labels import goal_of, label_of
-from vibrokit.results.merging import part_of
+from vibrokit.results.merging import analyzed_labels, part_of
 from vibrokit.results.nested import nested, records_in
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -277,10 +277,9 @@ class Assessment(Record):
         """What one result says of each attractor that was analyzed; complete where its analysis came to its end."""
         whole = self.results[name]
         finished = self.settings.get("finished", {}).get(name, [])
-        source = whole.settings.get("source")
-        labels = range(len(self.names)) if source is None else [label_of(source, self.names)]
         return [
-            dataclasses.replace(part_of(whole, label), complete=whole.complete or label in finished) for label in labels
+            dataclasses.replace(part_of(whole, label), complete=whole.complete or label in finished)
+            for label in analyzed_labels(whole)
         ]
 
     def _labels(self, source: int | str, target: int | str | None) -> tuple[int, int | None]:

@@ -15,7 +15,7 @@ from vibrokit.errors import StructureError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.comparable import check_comparable, check_scene, differences
 from vibrokit.results.files import load_result
-from vibrokit.results.merging import part_of
+from vibrokit.results.merging import analyzed_labels, part_of
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
@@ -77,8 +77,7 @@ class Known:
             name = str(known.settings.get("analyzer") or known.kind)
             check_comparable(f"the known result of {name}", known, scene_data(osc), Section.of(structure))
             _check_exit(name, known, exit)
-            source = known.settings.get("source")
-            for label in range(len(structure.names)) if source is None else [structure.attractor(source).label]:
+            for label in analyzed_labels(known):
                 part = part_of(known, label)
                 keys = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
                 key = next(one for one in keys if (one, label) not in parts or _same(parts[one, label], part))

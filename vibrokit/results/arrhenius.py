@@ -35,7 +35,8 @@ class ArrheniusFit:
         Of ln τ against 1/D (m⁴ s⁻⁶), by a parabola; NaN with fewer than three intensities.
     systematic : float
         How far the slope may be from ΔU because the prefactor depends on D (m² s⁻³): what a prefactor proportional to D
-        or 1/D changes, or, if the slope drifts and that is more, the power of D that fits the rates.
+        or 1/D changes, or, if that is more, a prefactor with the power of D that fits the rates. Infinite with two
+        intensities: they do not show this power.
     limit, limit_error : float
         The slope at D = 0 if the prefactor is a power of D, fitted too, and its standard error; NaN with fewer than
         three intensities.
@@ -69,15 +70,15 @@ class ArrheniusFit:
         places, powers = 1 / intensities, np.log(intensities)
         line, spread = _fitted([places**0, places], log_times, errors)
         curvature, curvature_error = math.nan, math.nan
-        systematic = abs(float(_fitted([places**0, places], powers, errors)[0][1]))
-        limit, limit_error = math.nan, math.nan
+        systematic, limit, limit_error = math.inf, math.nan, math.nan
         if len(known) > 2:
             parabola, around = _fitted([places**0, places, places**2], log_times, errors)
             curvature, curvature_error = 2 * float(parabola[2]), 2 * float(around[2])
-            of_power, power_errors = _fitted([places**0, places, powers], log_times, errors)
-            limit, limit_error = float(of_power[1]), float(power_errors[1])
-            if abs(curvature) > _DEVIATIONS * curvature_error:
-                systematic = max(systematic, abs(limit - float(line[1])))
+            straight, straight_errors = _fitted([places**0, places, powers], log_times, errors)
+            limit, limit_error = float(straight[1]), float(straight_errors[1])
+            of_one = abs(float(_fitted([places**0, places], powers, errors)[0][1]))  # what the first power changes
+            of_power = math.sqrt(max(limit_error**2 - float(spread[1]) ** 2, 0.0))  # without that of the slope
+            systematic = max(of_one, _power_bound(limit - float(line[1]), of_power, of_one))
         return cls(
             float(line[1]), float(spread[1]), float(line[0]), float(spread[0]),
             intensities, log_times, errors, curvature, curvature_error, systematic,
@@ -100,6 +101,17 @@ class ArrheniusFit:
         """Slopes between neighbouring intensities, and their standard errors, shape (count − 1,)."""
         steps = np.diff(1 / self.intensities)
         return np.diff(self.log_times) / steps, np.hypot(self.errors[1:], self.errors[:-1]) / steps
+
+
+def _power_bound(change: float, error: float, of_one: float) -> float:
+    """Largest change of a slope by the power of D that its prefactor has, at 95 %.
+
+    `change` and its standard error are what a fit of the power shows; `of_one` is what the first power changes. Where
+    the rates do not show the power, it is taken as normal with the mean 0 and the standard deviation 1: Kramers' rate
+    has −1 at weak damping and 0 elsewhere, and 1/2 if the force is periodic.
+    """
+    weight = of_one**2 / (of_one**2 + error**2)
+    return abs(weight * change) + _DEVIATIONS * math.sqrt(weight) * error
 
 
 def _fitted(terms: Sequence[Array], values: Array, errors: Array) -> tuple[Array, Array]:

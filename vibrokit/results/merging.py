@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import operator
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -12,6 +14,7 @@ import xarray
 from vibrokit.errors import StructureError
 from vibrokit.results.comparable import noiseless
 from vibrokit.results.data import joined
+from vibrokit.results.labels import label_of
 from vibrokit.results.result import Result
 
 R = TypeVar("R", bound=Result)
@@ -46,7 +49,7 @@ def merged(results: Sequence[R]) -> R:
         scene=first.scene,
         settings={key: None if key in ("source", "intensities") else value for key, value in first.settings.items()},
         findings=tuple(finding for one in results for finding in one.findings),
-        stats=first.stats,
+        stats=functools.reduce(operator.add, (one.stats for one in results)),
         complete=all(one.complete for one in results),
         seed=first.seed,
         seconds=float(np.sum([one.seconds for one in results])),
@@ -58,21 +61,29 @@ def merged(results: Sequence[R]) -> R:
 
 
 def part_of(result: R, label: int) -> R:
-    """Return what a result says of one of its attractors, with its share of the time."""
-    sources = _sources(result)
-    some = [label] if label in sources else []
+    """Return what a result says of one of its attractors, with an equal share of the time and the work."""
+    sources, analyzed = _sources(result), analyzed_labels(result)
+    number, count = analyzed.index(label), len(analyzed)
     general = (None, label) if label == min([*sources, label]) else (label,)  # what is of no attractor is told once
-    data = result.data.isel(source=[sources.index(label)]) if some else xarray.Dataset()
+    data = result.data.isel(source=[sources.index(label)]) if label in sources else xarray.Dataset()
     return dataclasses.replace(
         result,
         settings={**result.settings, "source": label},
         findings=tuple(finding for finding in result.findings if finding.source in general),
         energies=tuple(energy for energy in result.energies if energy.source == label),
         branches=tuple(energy for energy in result.branches if energy.source == label),
-        seconds=result.seconds / max(1, len(sources)),
+        stats=result.stats.part(number, count),
+        seconds=result.seconds / count,
         data=data,
     )
 
 
+def analyzed_labels(result: Result) -> list[int]:
+    """Return the labels of the attractors that were to be analyzed."""
+    source = result.settings.get("source")
+    return list(range(len(result.names))) if source is None else [label_of(source, result.names)]
+
+
 def _sources(result: Result) -> list[int]:
+    """Labels of the attractors that have arrays."""
     return result.data["source"].values.tolist() if "source" in result.data else []

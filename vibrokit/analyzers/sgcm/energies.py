@@ -20,13 +20,14 @@ def limit_of(
     """Return the limit of D ln τ as D → 0, and its error estimate.
 
     The value is that of ln τ = ΔU/D + c through the two least intensities. How a prefactor depends on D is not known.
-    So the error estimate is the largest change by one of these, plus what the errors of ln τ are:
+    So the error estimate is infinite with two intensities. With more it is the largest change by one of these, plus
+    what the errors of ln τ are:
 
     - a prefactor proportional to D or 1/D. Kramers' rate has 1/D at weak damping, and √D if the force is periodic and
       not weak (Lehmann, Reimann & Hänggi, Phys. Rev. Lett. 84, 1639, 2000);
     - a correction D/ΔU to the prefactor, as in the next order of Kramers' formula;
-    - with a third intensity, the power of D that it shows, and twice the correction of first order in D that it shows,
-      since terms of higher order are not known.
+    - the power of D that the third intensity shows, and twice the correction of first order in D that it shows, since
+      terms of higher order are not known.
 
     Parameters
     ----------
@@ -42,13 +43,15 @@ def limit_of(
     """
     d, times = np.array(intensities), np.array(log_times)
     value = _limit(d[-2:], times[-2:])
+    if len(d) < 3:
+        return value, math.inf
     powers = -np.log(d)
-    of_prefactor = [_limit(d[-2:], powers[-2:]), d[-2] * d[-1] / max(abs(value), d[-1])]
-    if len(d) > 2:
-        of_prefactor += [
-            _limit(d[-3:], times[-3:], powers[-3:]) - value,
-            2.0 * (_limit(d[-3:], times[-3:], d[-3:]) - value),
-        ]
+    of_prefactor = [
+        _limit(d[-2:], powers[-2:]),
+        d[-2] * d[-1] / max(abs(value), d[-1]),
+        _limit(d[-3:], times[-3:], powers[-3:]) - value,
+        2.0 * (_limit(d[-3:], times[-3:], d[-3:]) - value),
+    ]
     propagated = math.hypot(d[-1] * errors[-1] * d[-2], d[-2] * errors[-2] * d[-1]) / (d[-2] - d[-1])
     systematic = sum(max(abs(_limit(d[-2:], each[-2:])), abs(d[-1] * each[-1])) for each in np.array(changes))
     return value, float(np.max(np.abs(of_prefactor))) + propagated + float(systematic)
