@@ -297,6 +297,14 @@ def _advice(stepper: Stepper) -> str:
     return f"check the signs of the forces, or choose a finer stepper than {stepper}."
 
 
+def check_oscillator(osc: Any) -> None:
+    """Raise SceneError unless a value is an oscillator."""
+    if not isinstance(osc, Oscillator):
+        raise SceneError(
+            f"the scene must be an Oscillator, got {shown(osc)}; compose one, or load a bundled one with load_scene."
+        )
+
+
 def seed_from(rng: int | np.random.Generator) -> int:
     """Return the seed of a family of random streams, one per trajectory."""
     return int(generator_from(rng).integers(2**63))

@@ -103,7 +103,7 @@ def _read(path: Path) -> dict[str, Any]:
     if len(content) > _LARGEST_FILE:
         raise SceneError(f"{path} is too large for a scene; at most {_LARGEST_FILE} bytes are allowed.")
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8-sig"))  # editors on Windows may begin a file with a mark
     except UnicodeDecodeError as error:
         raise SceneError(f"{path} is not UTF-8 text (byte {error.start}); give a TOML file.") from error
     except RecursionError as error:

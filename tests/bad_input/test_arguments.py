@@ -1,13 +1,15 @@
 """Classes, functions and methods called with arguments that they do not take, and abstract classes."""
 
 import inspect
+import math
 import pickle
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.errors import ArgumentError, VibrokitError
+from vibrokit.errors import ArgumentError, DerivationError, VibrokitError
+from vibrokit.parts.functions import sin
 
 SCENE = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
 
@@ -71,6 +73,28 @@ def test_an_abstract_class_says_what_it_lacks(kind, missing):
         kind()
 
 
+class Sweep(vk.Excitation):
+    """A sine whose author gives the period."""
+
+    frequency: float = vk.parameter("f", "s^-1", above=0)
+    length: float = vk.parameter("T", "s", above=0)
+    period = property(lambda self: self.length)
+
+    def force(self, t):
+        return sin(2 * math.pi * self.frequency * t) * (1 + sin(math.pi * self.frequency * t))
+
+
+@pytest.mark.parametrize("length", [0.5, 0.75, 2.0 * math.pi, 1.001])  # right: 1
+def test_a_period_after_which_the_force_does_not_repeat_is_refused(length):
+    with pytest.raises(DerivationError, match=r"Sweep\.period is .*, but its force changes by .*\.$"):
+        _ = SCENE.replace(excitations=(Sweep(frequency=2.0, length=length),)).model.excitations
+
+
+@pytest.mark.parametrize("length", [1.0, 3.0, 1.0 + 1e-8])
+def test_a_period_may_be_a_multiple_and_have_rounding_errors(length):
+    assert SCENE.replace(excitations=(Sweep(frequency=2.0, length=length),)).model.excitations
+
+
 class Faulty(vk.Shooting):
     def __post_init__(self):
         raise TypeError("of the class itself")
@@ -106,6 +130,8 @@ WRONG_TYPES = [
     lambda: vk.evolve_density(SCENE.replace(noise=vk.WhiteNoise(1.0)), ((-1, 1), (-1, 1)), np.array(3.0) * np.nan),
     lambda: vk.evolve_density(SCENE.replace(noise=vk.WhiteNoise(1.0)), ((-1, 1), (-1, 1)), phase=HUGE),
     lambda: vk.unstable_orbits(SCENE, 1, classifier="basins"),
+    lambda: vk.plausibility(3),
+    lambda: vk.plausibility("hertz-0.570"),
     lambda: vk.occupancies(3),
     lambda: vk.Transitions.of("result"),
     lambda: vk.Transitions(3, 1, 1, 1),

@@ -45,8 +45,9 @@ def changed(old, new):
     return GOOD.replace(old, new)
 
 
-def test_the_good_one_is_good(tmp_path):
-    (tmp_path / "scene.toml").write_text(GOOD)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_the_good_one_is_good(tmp_path, encoding):
+    (tmp_path / "scene.toml").write_text(GOOD, encoding)
     assert vk.load_scene(tmp_path / "scene.toml").parameters["barriers.0.law.stiffness"] == 50.0
 
 

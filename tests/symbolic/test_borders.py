@@ -100,7 +100,9 @@ def test_intervals_follow_the_parameters():
     assert intervals("tan(x)", low=-4.0, high=2.0) == [
         pytest.approx(each) for each in ((-4.0, -half), (-half, half), (half, 2.0))
     ]
-    assert intervals("x/(exp(x) - 3)", low=-9.0, high=9.0)[0][1] == pytest.approx(math.log(3.0), rel=1e-14)
+    place = intervals("x/(exp(x) - 3)", low=-9.0, high=9.0)[0][1]
+    assert place == pytest.approx(math.log(3.0), rel=1e-14)
+    assert intervals("x/(exp(x) - 3)", low=-1.0, high=place) == [(-1.0, place)]  # as a region that ends at it
 
 
 def test_the_interval_around_a_place():

@@ -11,7 +11,7 @@ from vibrokit.assessment.contact_times import contact_time
 from vibrokit.assessment.linear_response import LinearResponse, departure, linear_response
 from vibrokit.assessment.oddities import Oddity, OddityCode
 from vibrokit.construction import called
-from vibrokit.oscillator import Oscillator
+from vibrokit.oscillator import Oscillator, check_oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.numeric import amplitude_at
 from vibrokit.text_table import text_table
@@ -104,6 +104,7 @@ def plausibility(osc: Oscillator) -> Plausibility:
     The response is that of the scene without stops, linearized about its position of rest nearest to x = 0. It is not
     compared with the gap to a stop if the forces up to that stop depart from linear ones by more than a tenth.
     """
+    check_oscillator(osc)
     response = linear_response(osc)
     found: list[Row | Oddity] = [*_frequencies(osc, response), *_noise(osc, response)]
     if response is not None:

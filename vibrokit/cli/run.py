@@ -129,7 +129,8 @@ def planned(options: argparse.Namespace) -> Plan:
         keeping = [name for name, kind in kinds.items() if kind.keeps_checkpoints]
         if len(keeping) != 1:
             raise VibrokitError(
-                f"--checkpoint is for one of the analyzers that write one, such as mfet; got {len(keeping)}."
+                f"--checkpoint is for one analyzer that writes checkpoints, such as mfet; {len(keeping)} of "
+                f"{', '.join(kinds) or 'none'} do; choose one with --analyzer."
             )
     analyzers = {name: configured(kind, settings) for name, kind in kinds.items()}
     for name, analyzer in analyzers.items():

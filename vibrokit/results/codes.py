@@ -211,7 +211,7 @@ class Code(StrEnum):
         "least-path-changes", INFO,
         "Below {parameter} = {value:.8g} the path {state} has the least action, and above it the path {goal}.",
     )  # fmt: skip
-    NOTHING_AT = "nothing-at", WARNING, "At {value:g} no steady state was found: {reason}", _SEE_REASON
+    NOTHING_AT = "nothing-at", WARNING, "At {value:g} nothing was found: {reason}", _SEE_REASON
 
     # Energies
     AT_EXIT = "at-exit", INFO, "{state} already satisfies the exit condition: ΔU = 0."

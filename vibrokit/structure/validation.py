@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibrokit.arguments import MOST_CELLS, members, pair, real, whole
-from vibrokit.errors import SceneError, StructureError, shown
+from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.named import check_stepper, name_of, named_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import check_executor
-from vibrokit.oscillator import Oscillator, generator_from
+from vibrokit.oscillator import Oscillator, check_oscillator, generator_from
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
@@ -129,10 +129,7 @@ def intensities(caller: str, given: Any) -> tuple[float, ...]:
 
 def check_means(osc: Any, stepper: Any, executor: Any) -> None:
     """Refuse a wrong oscillator, stepper or executor with a SceneError, StepperError or StructureError."""
-    if not isinstance(osc, Oscillator):
-        raise SceneError(
-            f"the scene must be an Oscillator, got {shown(osc)}; compose one, or load a bundled one with load_scene."
-        )
+    check_oscillator(osc)
     check_stepper(stepper)
     check_executor(executor)
 

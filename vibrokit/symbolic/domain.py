@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import sympy
 from numpy.typing import NDArray
-from scipy.optimize import bisect
 
 from vibrokit.symbolic.borders import Border
 
@@ -135,7 +134,11 @@ def _changes_of_sign(gauge: Callable[[Array], Array], low: float, high: float) -
 
 
 def _last_inside(gauge: Callable[[Array], Array], low: float, high: float) -> float:
-    """Where a gauge stops or begins to be positive between two places; NaN, beyond a domain, is not positive."""
-    return float(
-        bisect(lambda x: 0.5 if gauge(np.array([x]))[0] > 0 else -0.5, low, high, xtol=1e-15 * abs(high - low))
-    )
+    """Where a gauge stops or begins to be positive between two places; NaN, beyond a domain, is not positive.
+
+    The result is exact to the last bit, so that it is the same from all pairs of places.
+    """
+    inside = gauge(np.array([low]))[0] > 0
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if (gauge(np.array([middle]))[0] > 0) == inside else (low, middle)
+    return low if inside else high

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -18,6 +19,9 @@ from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.removable import without_removable
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
+
+_SHARES = (0.0341, 0.2163, 0.4527, 0.6194, 0.8812)  # of a period, where a pulse seldom begins or ends
+_SAME = 1e-6  # of the largest force: a period with seven digits repeats
 
 
 class Model:
@@ -90,7 +94,23 @@ class Model:
                     f"{type(part).__name__}.period is None, which means a constant, but its force depends on time; "
                     "return the period, or math.inf if it never repeats."
                 )
+            if part.period is not None and math.isfinite(part.period):
+                self._check_repeats(type(part).__name__, part.period, forces[-1])
         return tuple(forces)
+
+    def _check_repeats(self, name: str, period: float, force: sympy.Expr) -> None:
+        """Refuse an excitation that does not repeat after its period, as with 1/f where 2π/ω is meant."""
+        force = force.subs(self.numbers)
+
+        def at(share: float) -> complex:
+            return complex(force.subs(self.time, period * share))
+
+        change = max(abs(at(share + 1) - at(share)) for share in _SHARES)
+        if change > _SAME * max(abs(at(share)) for share in _SHARES):
+            raise DerivationError(
+                f"{name}.period is {period:.10g}, but its force changes by {change:.3g} from one "
+                "period to the next; return a period of the force, or math.inf if it never repeats."
+            )
 
     @cached_property
     def forcing(self) -> sympy.Expr:
