@@ -69,6 +69,21 @@ def test_recorded_states_are_those_of_the_ensemble():
     np.testing.assert_allclose(recorded[1:], ends, rtol=1e-12)  # the forcing of later periods is rounded differently
 
 
+@pytest.mark.parametrize(("power", "error"), [(0.5, 2.2e-5), (1.5, 4.5e-9), (3.0, 2.2e-12)])
+def test_the_power_of_the_depth_at_first_touch_sets_the_order_of_rk4(power, error):
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.6, 0.8),),
+        barriers=(vk.Barrier(vk.CustomLaw("k*depth**n", k=20.0, n=power), 0.5, "right"),),
+    )  # fmt: skip
+    starts = np.random.default_rng(0).uniform(-1, 1, (1000, 2))
+    fine = osc.section_map(starts, stepper=vk.Order8(1e-13))
+    coarse, small = (
+        np.median(np.abs(osc.section_map(starts, stepper=vk.RK4(steps)) - fine).max(axis=1)) for steps in (512, 8192)
+    )
+    assert np.log2(coarse / small) / 4 == pytest.approx(min(1 + power, 4.0), abs=0.1)
+    assert small == pytest.approx(error, rel=0.1)
+
+
 @pytest.mark.parametrize(("law", "order"), [(vk.Hertz(50.0), 2.5), (vk.Linear(50.0), 2.0)], ids=["hertz", "linear"])
 def test_contacts_that_are_crossed_cost_order(law, order):
     osc = vk.Oscillator(

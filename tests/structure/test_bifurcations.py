@@ -95,6 +95,63 @@ def test_an_equilibrium_grazes_where_the_spring_balances_the_force_at_the_stop()
     assert followed.stable
 
 
+def pressed(law, *, side="right", damping=0.1, amplitude=0.7, frequency=1.5):
+    """A mass that a constant force 1 presses against a stop at 0."""
+    push = 1.0 if side == "right" else -1.0
+    return vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=damping, barriers=(vk.Barrier(law, 0.0, side),),
+        excitations=(vk.Harmonic(push * amplitude, frequency), vk.Constant(push)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("stiffness", "side"), [(9.0, "right"), (9.0, "left"), (1e4, "left")])
+def test_a_preloaded_orbit_grazes_where_its_amplitude_is_the_static_depth(stiffness, side):
+    frequency = 1.5
+    lift_off = math.hypot(1 + stiffness - frequency**2, 0.2 * frequency) / (1 + stiffness)
+    osc = pressed(vk.Linear(stiffness), side=side, amplitude=0.99 * lift_off)
+    response = 0.99 * lift_off / (1 + stiffness - frequency**2 + 0.2j * frequency)
+    state = np.array([1 / (1 + stiffness) + response.real, -frequency * response.imag])
+    sign, size = (1, 2.0) if side == "right" else (-1, 2.0)
+    followed = passed(osc, AMPLITUDE, sign * state, sign * 1.001 * lift_off, size=(size, size))
+    touches = [one for one in followed.bifurcations if one.kind == "grazing"]
+    nearest = min(touches, key=lambda one: abs(one.value - sign * lift_off))
+    assert nearest.value == pytest.approx(sign * lift_off, abs=1e-10)
+    assert (nearest.side, nearest.bracketed) == (side, False)
+
+
+@pytest.mark.parametrize(
+    ("law", "force"),
+    [
+        (vk.Hertz(20.0), lambda depth: 20 * depth**1.5),
+        (vk.CustomLaw("k*depth**3", k=5.0), lambda depth: 5 * depth**3),
+        (vk.CustomLaw("k*depth**n", k=5.0, n=0.5), lambda depth: 5 * math.sqrt(depth)),
+    ],
+)
+def test_a_preloaded_orbit_grazes_where_an_independent_integration_touches_zero(law, force):
+    found = only(passed(pressed(law, damping=0.5, frequency=0.8), AMPLITUDE, (0.3, 0.0), 1.0), "grazing")
+
+    def rates(t, y):
+        push = 1.0 + found.value * math.cos(0.8 * t) - force(max(y[0], 0.0))
+        return [y[1], push - y[1] - y[0]]
+
+    def turns(t, y):
+        return y[1]
+
+    turns.direction = 1
+    period = 2 * math.pi / 0.8
+    path = solve_ivp(rates, (0, period), found.point, method="DOP853", rtol=1e-12, atol=1e-14, events=turns)
+    np.testing.assert_allclose(path.y[:, -1], found.point, atol=1e-8)
+    assert path.y_events[0][:, 0].min() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_limit_cycle_in_contact_grazes_where_an_independent_integration_lifts_off():
+    stop = vk.Barrier(vk.Linear(3.0), 0.0, "right")
+    osc = rayleigh(excitations=(vk.Constant(1.0),), barriers=(stop,), m=0.25)
+    found = only(passed(osc, "spring.m", (0.4, 0.0), 0.32, cycle=True), "grazing")
+    # Least x of the cycle of x″ + 0.1 x′ + x + x′(x′² − m) + 3 max(x, 0) = 1 by DOP853 (1e-11), its root in m by Brent.
+    assert found.value == pytest.approx(0.2872094587296512, abs=1e-9)
+
+
 def hertz_map(state, frequency):
     """Image and derivative over one period of the scene hertz-0.570 at another frequency, by SciPy."""
 

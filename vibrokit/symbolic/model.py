@@ -18,6 +18,7 @@ from vibrokit.symbolic.friction import refuse_friction
 from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.removable import without_removable
+from vibrokit.symbolic.roughness import refuse_rough
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
 
 _SHARES = (0.0341, 0.2163, 0.4527, 0.6194, 0.8812)  # of a period, where a pulse seldom begins or ends
@@ -74,14 +75,23 @@ class Model:
         """Acceleration without stops and without time-dependent excitations."""
         x, v, *extra = self.state
         omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
-        spring = omega**2 * x
-        if self.scene.spring is not None:
-            symbols = self._symbols_of("spring")
-            spring = without_removable(derived_formula(self.scene.spring, "force", symbols, (x, v)), (x, v))
-            refuse_friction(self.scene.spring, spring, v, symbols, self.scene.natural_frequency)
+        spring = omega**2 * x if self.scene.spring is None else self._spring_force
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = derived_formula(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
         return -2 * zeta * omega * v - spring + constant + push
+
+    @cached_property
+    def _spring_force(self) -> sympy.Expr:
+        """Force of the spring that is given."""
+        spring, symbols, (x, v) = self.scene.spring, self._symbols_of("spring"), self.state[:2]
+        force = without_removable(derived_formula(spring, "force", symbols, (x, v)), (x, v))
+        refuse_friction(spring, force, v, symbols, self.scene.natural_frequency)
+        return force
+
+    def check_derivatives(self) -> None:
+        """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under the spring."""
+        for variable in self.state[:2] if self.scene.spring is not None else ():
+            refuse_rough(self.scene.spring, self._spring_force, variable, self._symbols_of("spring"))
 
     @cached_property
     def excitations(self) -> tuple[sympy.Expr, ...]:

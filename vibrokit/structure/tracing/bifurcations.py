@@ -5,25 +5,20 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from vibrokit.errors import VibrokitError
-from vibrokit.kernels.single import record
-from vibrokit.parts.barrier import Barrier
 from vibrokit.structure.tracing.families import Family, Member
-from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.structure.tracing.turns import NEXT_TO, Surface, surfaces_of, turns_at
 
 FOLD, CROSSING = "fold", "pitchfork or transcritical"
 DOUBLING, TORUS, HOPF, GRAZING = "period doubling", "Neimark–Sacker", "Hopf", "grazing"
 
-_SAMPLES = 256  # in a forcing period or 2π/ω_n, whichever is shorter
-_FINER = 64  # samples of the stretch around a turn next to a stop, which is integrated again
-_NEXT_TO = 1e-2  # depth, relative to the size of x, within which a turn counts as next to a stop
-_TOUCHES = 1e-6  # the same, within which an orbit at a supposed grazing must touch
+_TOUCHES = 1e-6  # distance, relative to the extent of the motion, within which it must touch at a supposed grazing
 _BACK = 1e-3  # in units of the span: how far back an extrapolation begins
 _JUST_AHEAD = 1e-3  # the same: how far ahead it may end
 _CLOSER = 0.9  # fraction of the distance to grazing that one step takes
@@ -42,7 +37,7 @@ class Stage:
     slope: Array  # (n,), derivative of its defect in the parameter
     tangent: Array  # (n + 1,), of the family, in the direction of travel
     tests: dict[str, float]  # functions that change their sign at the bifurcation they are named after
-    depths: tuple[Array, ...]  # for each stop, at the turns towards it, the deepest first; negative short of it
+    reaches: Mapping[Surface, Array]  # at the turns towards each surface, the farthest first; negative short of it
     stable: bool
 
 
@@ -68,9 +63,10 @@ def stage(family: Family, member: Member, ahead: Array) -> Stage:
     slope = family.slope(member)
     rates = _rates(family, member)
     stable = bool((rates.real < 0).all() if family.kind == "equilibrium" else (np.abs(rates) < 1).all())
-    depths = tuple(turning_depths(family, member, barrier) for barrier in family.at(member.value).barriers)
+    osc = family.at(member.value)
+    reaches = turns_at(family, member, osc, surfaces_of(osc))
     return Stage(
-        member, slope, family.tangent(member, slope, ahead), _tests(family, member, rates), depths, stable
+        member, slope, family.tangent(member, slope, ahead), _tests(family, member, rates), reaches, stable
     )  # fmt: skip
 
 
@@ -82,56 +78,54 @@ def bifurcations_between(family: Family, before: Stage, after: Stage) -> list[Lo
     for name, value in before.tests.items():
         if value * after.tests[name] < 0:
             found.append(interval.located(name, _test(name)))
-    barriers = family.at(before.member.value).barriers
-    for stop, (left, right) in enumerate(zip(before.depths, after.depths, strict=True)):
-        counts = sorted((int(np.sum(left > 0)), int(np.sum(right > 0))))
-        found += [_grazing_between(interval, stop, turn, barriers[stop].side) for turn in range(*counts)]
+    for surface in before.reaches:
+        counts = sorted(int(np.sum(each.reaches[surface] > 0)) for each in (before, after))
+        found += [_grazing_between(interval, surface, turn) for turn in range(*counts)]
     return [bifurcation for bifurcation in found if bifurcation is not None]
 
 
-def _grazing_between(interval: _Interval, stop: int, turn: int, side: str) -> Located | None:
-    """Locate where a turn of a motion touches a stop between two members; None if it is no grazing."""
-    family, depth = interval.family, _depth(interval.family, stop, turn)
-    if turn:
-        return interval.located(GRAZING, depth, side)
-    short = _short_of_touch(family, stop)
-    found = dataclasses.replace(interval, family=short).located(GRAZING, depth, side)
+def _grazing_between(interval: _Interval, surface: Surface, turn: int) -> Located | None:
+    """Locate where a turn of a motion is tangent to a surface between two members; None if it is no grazing."""
+    family = interval.family
+    reach, side = _reach(family, surface, turn), family.osc.barriers[surface.stop].side
+    short = _short_of_touch(family, surface, turn)
+    found = dataclasses.replace(interval, family=short).located(GRAZING, reach, side)
     if found is None or not found.bracketed or short is family:
         return found
-    clear = min(interval.before, interval.after, key=lambda each: float(each.depths[stop].max()))
+    clear = min(interval.before, interval.after, key=lambda each: float(each.reaches[surface].max()))
     towards = clear if clear is interval.before else dataclasses.replace(clear, tangent=-clear.tangent)
-    return _passed(short, towards, depth, side) or found
+    return _passed(short, towards, reach, side) or found
 
 
 def grazing_ahead(family: Family, here: Stage) -> list[Located]:
     """Locate grazing just beyond the last stage that a family could be followed to.
 
     Beyond grazing with a stiff stop an orbit may no longer exist, or turn back too soon to be followed; short of it,
-    the family is smooth. An orbit that does not touch the stop is followed through it; of one that touches it at other
-    turns, the depth is extrapolated to 0, from members ever closer to it.
+    the family is smooth. An orbit that does not touch the stop is followed through it; of any other, the reach is
+    extrapolated to 0, from members ever closer to it.
     """
     found = []
     if not here.stable:
         return []
-    for stop, barrier in enumerate(family.at(here.member.value).barriers):
-        turn = int(np.sum(here.depths[stop] > 0))
-        if turn < len(here.depths[stop]) and here.depths[stop][turn] > -_NEXT_TO * family.sizes[0]:
-            short = family if turn else _short_of_touch(family, stop)
+    for surface, reaches in here.reaches.items():
+        turn = int(np.sum(reaches > 0))
+        if turn < len(reaches) and reaches[turn] > -NEXT_TO:
+            short = _short_of_touch(family, surface, turn)
             locate = _extrapolated if short is family else _passed
-            found.append(locate(short, here, _depth(family, stop, turn), barrier.side))
+            found.append(locate(short, here, _reach(family, surface, turn), family.osc.barriers[surface.stop].side))
     return [grazing for grazing in found if grazing is not None]
 
 
-def _short_of_touch(family: Family, stop: int) -> Family:
+def _short_of_touch(family: Family, surface: Surface, turn: int) -> Family:
     """Return the family with a stop out of its way: the same one short of the first touch, and smooth beyond it.
 
-    A family that follows a parameter of the stop itself is returned as it is.
+    A family that touches the stop at other turns, or follows a parameter of the stop itself, is returned as it is.
     """
-    barrier = family.osc.barriers[stop]
-    if family.line.begins(f"barriers.{stop}."):
+    barrier = family.osc.barriers[surface.stop]
+    if turn or surface.leaving or family.line.begins(f"barriers.{surface.stop}."):
         return family
     away = barrier.position + barrier.sign * float(family.sizes[0])
-    return dataclasses.replace(family, osc=family.osc.replace({f"barriers.{stop}.position": away}))
+    return dataclasses.replace(family, osc=family.osc.replace({f"barriers.{surface.stop}.position": away}))
 
 
 def _passed(family: Family, here: Stage, depth: Callable[[Family, Member], float], side: str) -> Located | None:
@@ -201,50 +195,14 @@ def _test(name: str) -> Callable[[Family, Member], float]:
     return lambda family, member: _tests(family, member, _rates(family, member))[name]
 
 
-def _depth(owner: Family, stop: int, turn: int) -> Callable[[Family, Member], float]:
-    """Return the depth of a member at one of its turns in a stop where that is in the scenes of the owner."""
+def _reach(owner: Family, surface: Surface, turn: int) -> Callable[[Family, Member], float]:
+    """Return the reach of a member at one of its turns, for a surface where it is in the scenes of the owner."""
 
-    def depth(family: Family, member: Member) -> float:
-        depths = turning_depths(family, member, owner.at(member.value).barriers[stop])
-        return float(depths[turn]) if turn < len(depths) else -float(family.sizes[0])
+    def reach(family: Family, member: Member) -> float:
+        reaches = turns_at(family, member, owner.at(member.value), [surface])[surface]
+        return float(reaches[turn]) if turn < len(reaches) else -1.0
 
-    return depth
-
-
-def turning_depths(family: Family, member: Member, barrier: Barrier) -> Array:
-    """Return how deep a motion is in a stop at each of its turns towards it, the deepest first."""
-    if family.kind == "equilibrium":
-        return np.array([barrier.sign * (member.point[0] - barrier.position)])
-    osc = family.at(member.value)
-    unit = min(osc.section_interval, 2 * math.pi / osc.natural_frequency)
-    count = _SAMPLES * math.ceil(member.duration / unit - 1e-9)
-    spacing = member.duration / count
-    # A sample more, for a turn at the section itself.
-    path = record(osc, Flow.STATE, family.stepper, member.point, 0.0, spacing, count + 1)
-    depths: list[float] = []
-    for index, depth in _turns(path, spacing, barrier):
-        if index == count and depths and _turns(path[:2], spacing, barrier):
-            continue
-        if abs(depth) < _NEXT_TO * family.sizes[0]:
-            finer = spacing / _FINER
-            closer = record(osc, Flow.STATE, family.stepper, path[index], index * spacing, finer, _FINER)
-            depth = max((found for _, found in _turns(closer, finer, barrier)), default=depth)
-        depths.append(depth)
-    return np.sort(depths)[::-1]
-
-
-def _turns(path: Array, spacing: float, barrier: Barrier) -> list[tuple[int, float]]:
-    """Where a path turns back from a stop: the sample before, and the depth by the cubic through both samples."""
-    depth, rate = barrier.sign * (path[:, 0] - barrier.position), barrier.sign * path[:, 1]
-    found = []
-    for index in np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0)):
-        rise, before, after = depth[index + 1] - depth[index], spacing * rate[index], spacing * rate[index + 1]
-        # Depth along the step is the cubic d + before·s + bend·s² + twist·s³; it is stationary at the root in (0, 1].
-        bend, twist = 3 * rise - 2 * before - after, before + after - 2 * rise
-        root = before / (math.sqrt(max(bend * bend - 3 * twist * before, 0.0)) - bend)
-        root = min(max(root, 0.0), 1.0) if math.isfinite(root) else 0.5
-        found.append((int(index), float(depth[index] + root * (before + root * (bend + root * twist)))))
-    return found
+    return reach
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -298,4 +256,4 @@ def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family,
     """Whether a test vanishes for another reason: two real rates of opposite sign, or a turn that came or went."""
     if kind in (TORUS, HOPF):
         return not (np.abs(_rates(family, member).imag) > 1e-9).any()
-    return kind == GRAZING and not abs(test(family, member)) < _TOUCHES * family.sizes[0]
+    return kind == GRAZING and not abs(test(family, member)) < _TOUCHES
