@@ -81,7 +81,7 @@ def test_inner_work_counts_for_itself():
     assert current() is not outer
 
 
-def test_a_time_limit_is_raised_once_also_in_inner_work(clock):
+def test_a_time_limit_is_raised_once_at_a_time_also_in_inner_work(clock):
     with working(time_limit=10), working(), stage("graph"):
         advance()
         clock.now += 11
@@ -117,7 +117,7 @@ def test_limits_can_be_put_off_but_not_forgotten(clock):
             advance()
 
 
-def test_an_interrupt_is_raised_once_at_the_next_report():
+def test_an_interrupt_is_raised_once_at_a_time_at_the_next_report():
     with working() as work, working(), stage("graph"):
         work.interrupt()
         with pytest.raises(KeyboardInterrupt) as raised:

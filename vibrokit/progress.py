@@ -25,8 +25,11 @@ from vibrokit.registry import load_attribute
 TRAJECTORIES = "trajectories"
 """Unit of stages that integrate many starts: `run_ensemble` advances them."""
 
-AFTERWARDS = 10.0
-"""Seconds in which work that was stopped may still make use of what it has found."""
+AFTERWARDS = 1.0
+"""Seconds in which work that was stopped may still make use of what it has found; then it is stopped again.
+
+A call with a time limit so returns within two seconds of it.
+"""
 
 _SETTLED = 1.0  # seconds of a stage after which its pace is known well enough to estimate the time left
 
@@ -157,6 +160,8 @@ class Work:
         self.began = time.perf_counter()
         self.deadline = math.inf if time_limit is None else self.began + time_limit
         self.interrupted = self.held = False
+        self._stopped = False
+        self._reason: type[KeyboardInterrupt] = Deadline  # what is raised after the deadline
         self.counts: Counter[str] = Counter()
         self.spent: defaultdict[str, float] = defaultdict(float)  # s, by stage
         self.stages: list[_Stage] = []
@@ -176,6 +181,19 @@ class Work:
         """The innermost stage, of this work or of that around it."""
         return self.stages[-1] if self.stages else self.outer.inside if self.outer else None
 
+    @property
+    def over(self) -> bool:
+        """Whether the work was stopped, or is to be at its next report."""
+        own = self._stopped or self.interrupted or time.perf_counter() > self.deadline
+        return own or (self.outer is not None and self.outer.over)
+
+    def stop_again(self) -> None:
+        """Raise again what has stopped this work while work inside it was under way, which kept what it had found."""
+        if self._stopped:
+            raise self._reason
+        if self.outer is not None:
+            self.outer.stop_again()
+
     def interrupt(self) -> None:
         """Ask the work to stop: KeyboardInterrupt is raised at its next report, where nothing is lost."""
         self.interrupted = True
@@ -188,17 +206,28 @@ class Work:
             self.check()
 
     def check(self) -> None:
-        """Raise Deadline after a time limit, and interrupts that were asked for; each once, so that all is kept."""
+        """Raise Deadline after a time limit, and interrupts that were asked for; again `AFTERWARDS` later."""
         if self.held:
             return
         if self.interrupted:
             self.interrupted = False
+            self.wind_up(KeyboardInterrupt())
             raise KeyboardInterrupt
-        if time.perf_counter() > self.deadline:
-            self.deadline = math.inf
-            raise Deadline
+        now = time.perf_counter()
+        if now > self.deadline:
+            self.deadline, self._stopped = now + AFTERWARDS, True
+            raise self._reason
         if self.outer is not None:
             self.outer.check()
+
+    def wind_up(self, reason: BaseException) -> None:
+        """Leave the work, and that around it, a short time after Ctrl-C; a time limit has its own work do that."""
+        if isinstance(reason, Deadline | OutOfTime):
+            return
+        self._stopped, self._reason = True, KeyboardInterrupt
+        self.deadline = min(self.deadline, time.perf_counter() + AFTERWARDS)
+        if self.outer is not None:
+            self.outer.wind_up(reason)
 
     def close(self) -> None:
         """Add what was counted to the work around this one."""

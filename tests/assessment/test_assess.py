@@ -11,6 +11,7 @@ from tests.builders import energy
 from tests.klein_kramers import double_well_rate
 from vibrokit.analyzers.settings import settings_of
 from vibrokit.errors import ParameterError, SceneError, StructureError, UnknownNameError, VibrokitError
+from vibrokit.progress import current
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.section import Section
@@ -36,15 +37,18 @@ def made(analyzer, kind=None, **changes):
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Which analyzers ran, with source and intensities; all return made-up results, and `stop` some incomplete."""
+    """Which analyzers ran, with source and intensities; all return made-up results.
+
+    One is stopped by Ctrl-C if its number is in `stop`, and is incomplete by itself if minus that number is.
+    """
     ran = []
 
     def stub(name, kind):
         def run(self, osc, structure, **options):
             ran.append((name, self.source, getattr(self, "intensities", None)))
-            if stop == [len(ran)]:
-                return made(self, kind, complete=False)
-            return made(self, kind)
+            if len(ran) in stop:
+                current().wind_up(KeyboardInterrupt())
+            return made(self, kind, complete=not {len(ran), -len(ran)} & set(stop))
 
         return run
 
@@ -120,6 +124,38 @@ def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     )
     vk.assess(OSC, known=[third], accuracy=0.05)
     assert which(ran) == [PATHS, *BOTH]
+
+
+@pytest.mark.parametrize("number", [1, 2, 5])
+def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
+    ran, stop = calls
+    stop.append(-number)
+    first = vk.assess(OSC, checkpoint=tmp_path / "a.nc", time_limit=None)
+    assert which(ran) == [PATHS, *BOTH]
+    assert not first.complete
+    ran.clear()
+    stop.clear()
+    assert vk.assess(OSC, checkpoint=tmp_path / "a.nc").complete
+    assert which(ran) == [[PATHS, *BOTH][number - 1]]
+
+
+@pytest.mark.parametrize("number", [1, 2, 4])
+def test_a_finer_assessment_that_was_stopped_keeps_the_coarser_one(calls, tmp_path, number):
+    ran, stop = calls
+    path = tmp_path / "a.nc"
+    vk.assess(OSC, accuracy=0.1, checkpoint=path)
+    ran.clear()
+    stop.append(number)
+    finer = vk.assess(OSC, accuracy=0.05, checkpoint=path, time_limit=None)
+    assert not finer.complete
+    assert which(ran) == [PATHS, *BOTH][:number]
+    stop.clear()
+    ran.clear()
+    assert vk.assess(OSC, accuracy=0.1, known=[path]).complete
+    assert not ran
+    again = vk.assess(OSC, accuracy=0.05, checkpoint=path)
+    assert again.complete
+    assert which(ran) == [PATHS, *BOTH][number - 1 :]
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,11 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import AFTERWARDS, working
 from vibrokit.results.action_graph import ActionGraphResult
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
-from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
+from vibrokit.results.stoppable import Stoppable
 
 
 class ActionGraph(GraphSearch, Analyzer):
@@ -40,17 +39,12 @@ class ActionGraph(GraphSearch, Analyzer):
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.ESTIMATE)
         found: GraphSolution | None = None
-        stopped: tuple[Finding, ...] = ()
-        try:
+        with Stoppable("graph", problem.source) as work:
             for found in self.solutions(problem):  # noqa: B007 - the last one counts
                 pass
-        except KeyboardInterrupt as interrupt:
-            if found is None:
-                raise
-            stopped = (Finding.stopped("graph", interrupt, problem.source),)
-        assert found is not None
-        with working(time_limit=AFTERWARDS if stopped else None):
-            found = found.bounded(problem)
-        findings = (*found.findings, *stopped)
+        if found is None:
+            return Analysis(findings=work.findings, complete=False)
+        found = found.bounded(problem)
+        findings = (*found.findings, *work.findings)
         complete = all(finding.code is not Code.STOPPED for finding in findings)
         return Analysis(found.estimates, found.dataset(), findings, found.energies, complete)

@@ -35,9 +35,6 @@ class ActionPlot(Shooting, Analyzer):
         if problem.at_exit:
             return at_exit(problem, FINDER, Bound.UPPER)
         found = self.search(problem)
-        try:
-            estimates = found.estimates
-        except KeyboardInterrupt as interrupt:  # the paths are known; only their errors are not
-            found = found.stopped(interrupt)
-            estimates = found.estimates
-        return Analysis(estimates, found.shots.dataset(), found.findings, found.energies, found.complete)
+        estimates, errors = found.rated
+        findings, complete = (*found.findings, *errors.findings), found.complete and not errors.stopped
+        return Analysis(estimates, found.shots.dataset(), findings, found.energies, complete)

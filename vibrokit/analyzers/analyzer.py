@@ -22,7 +22,7 @@ from vibrokit.construction import Constructed, called
 from vibrokit.errors import SceneError, StepperError, StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, stage, working
+from vibrokit.progress import Progress, put_off, stage, working
 from vibrokit.results.atomic import checked_target
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
@@ -31,6 +31,7 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding, check_findings
 from vibrokit.results.record import versions
 from vibrokit.results.result import Result
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.validation import check_belongs, check_means
@@ -258,19 +259,19 @@ class Analyzer(ABC, metaclass=Constructed):
     ) -> list[Finding]:
         """Analyze all attractors, then see what those found later change of the earlier ones; note an interrupt."""
         problems: dict[int, ExitProblem] = {}
-        try:
+        with Stoppable(type(self).__name__) as work:
             for attractor in sources:
+                work.source = attractor.label
                 problem = problems[attractor.label] = problem_of(attractor)
-                with stage(type(self).__name__, subject=attractor.name):
+                with stage(work.doing, subject=attractor.name):
                     analyses[attractor.label] = self._analyzed(problem)
                 if not analyses[attractor.label].complete:
                     return []
             for attractor in sources[:-1]:  # the last one knew the others
-                with stage(type(self).__name__, subject=attractor.name):
+                work.source = attractor.label
+                with stage(work.doing, subject=attractor.name):
                     analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
-        except KeyboardInterrupt as interrupt:
-            return [Finding.stopped(type(self).__name__, interrupt, attractor.label)]
-        return []
+        return list(work.findings)
 
     def _analyzed(self, problem: ExitProblem) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""
@@ -281,7 +282,8 @@ class Analyzer(ABC, metaclass=Constructed):
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
         self._check_returned(found, problem)
-        data, limits = metastability(problem, found.data)
+        with put_off():  # what was found is kept
+            data, limits = metastability(problem, found.data)
         return dataclasses.replace(found, data=data, findings=(*found.findings, *limits))
 
     def _revisited(self, problem: ExitProblem, analyses: Mapping[int, Analysis]) -> Analysis:

@@ -16,12 +16,13 @@ from vibrokit.analyzers.settings import settings_of
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, Work, advance, stage, working
+from vibrokit.progress import Progress, Work, advance, current, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation
 from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
@@ -152,19 +153,16 @@ class _Run:
         self.places, self.seed = places, seed
         self.curves: list[_Curve] = []
         self.findings: list[Finding] = []
-        self.complete = True
+        self.work = Stoppable("searched values")
 
     def run(self) -> None:
         """Search at each of the places, and follow what is new from there."""
-        try:
-            with stage("searched values", unit="values", total=len(self.places)):
-                for place in self.places:
-                    self._search(place)
-                    advance()
-        except KeyboardInterrupt as interrupt:
-            self.findings.append(Finding.stopped("searched values", interrupt))
-            self.complete = False
-        if not self.curves and self.complete:
+        with self.work as work, stage("searched values", unit="values", total=len(self.places)):
+            for place in self.places:
+                self._search(place)
+                advance()
+        self.findings += work.findings
+        if not (self.curves or work.stopped):
             reasons = [str(finding) for finding in self.findings] or ["all paths lead from sets that are no orbits."]
             raise StructureError(f"{_CALLER}: no exit path was found at any searched value. {reasons[0]}")
 
@@ -174,8 +172,7 @@ class _Run:
         try:
             osc = self.line.at(self.osc, value)
             structure = find_structure(osc, manifolds=False, rng=self.seed)
-            for stopped in structure.found(Code.STOPPED):
-                raise stopped.interrupt
+            current().stop_again()
             result = self.analyzer.run(osc, structure)
         except VibrokitError as error:
             self.findings.append(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)))
@@ -188,8 +185,7 @@ class _Run:
                     problem = ExitProblem(osc, structure, attractor, self.analyzer.exit, self.analyzer.stepper)
                     self._add(place, problem, branch, follow=result.complete)
                 advance()
-        for stopped in result.found(Code.STOPPED):
-            raise stopped.interrupt
+        current().stop_again()
 
     def _add(self, place: int, problem: ExitProblem, branch: ActivationEnergy, *, follow: bool) -> None:
         """Add the curve of a path, unless it is known, and follow it unless there is no time left."""
@@ -297,7 +293,7 @@ class _Run:
             unit=unit,
             values=self.values,
             branches=branches,
-            complete=self.complete,
+            complete=not self.work.stopped,
             scene=scene_data(self.osc),
             settings=settings,
             findings=(count, *self.findings),

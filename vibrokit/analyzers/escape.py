@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.kernels.ensemble import UNBOUNDED, run_ensemble
-from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, UNSETTLED
@@ -92,9 +92,9 @@ def _followed(osc: Oscillator, states: Array, borders: tuple[float, float]) -> t
         extent[going] = np.stack(
             [np.minimum(extent[going, 0], late[going, 0]), np.maximum(extent[going, 1], late[going, 1])], axis=1
         )
-        over = ended.status != COMPLETED
+        over = ended.status == DIVERGED
         ahead = np.where(ended.states[over, 1] > 0, borders[1], borders[0])
         late[going[over]] = ahead[:, None]
         started[going] = ended.states
-        going = going[~over]
+        going = going[ended.status == COMPLETED]
     return extent, late

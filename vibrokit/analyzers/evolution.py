@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import ExitStack
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -28,6 +26,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.density_history import DensityHistory
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.validation import check_means, gibibytes, plain
 from vibrokit.symbolic.flow_kind import Flow
@@ -113,21 +112,17 @@ def evolve_density(
     kept: list[Array] = []
     masses: list[float] = []
     changes: list[float] = []
-    findings: list[Finding] = []
-    with working(progress, time_limit) as work, ExitStack() as stack:
-        pool = executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
-        try:
+    with working(progress, time_limit) as work:
+        with Stoppable("evolve_density") as walk:
             chosen = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
             flow = DensityFlow(osc, chosen, grid, count, watches_edge=True)
-            propagator = Propagator(flow, noise.intensity, pool)
+            propagator = Propagator(flow, noise.intensity, executor)
             for carried, change in _at([begins + time for time in wanted], begins, propagator, begun):
                 kept.append(resolved(carried))
                 masses.append(math.exp(grid.mass(carried)))
                 changes.append(change)
-        except KeyboardInterrupt as stopped:
-            findings.append(Finding.stopped("evolve_density", stopped))
         times = np.array(wanted[: len(kept)]) * osc.section_interval
-        findings += _findings(times, masses, changes)
+        findings = [*walk.findings, *_findings(times, masses, changes)]
         arguments = {
             "region": area,
             "intervals": wanted,

@@ -22,10 +22,11 @@ from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import Search
 from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
-from vibrokit.progress import AFTERWARDS, TRAJECTORIES, stage, working
+from vibrokit.progress import TRAJECTORIES, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.structure.orbits import Orbit
 from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
@@ -64,10 +65,9 @@ class ExitSearch:
             ("graph", self.search_beginnings),
         )
         for doing, step in steps:
-            try:
+            with Stoppable(doing, self.problem.source) as work:
                 step()
-            except KeyboardInterrupt as error:
-                self.findings.append(Finding.stopped(doing, error, self.problem.source))
+            self.findings += work.findings
             if self.stopped or self._is_exact:
                 break
         return self.analysis()
@@ -126,16 +126,15 @@ class ExitSearch:
         if shooting is None or not follow:
             return
         candidates: Sequence[Candidate] = ()
-        limit = None
+        complete = True
         try:
             found = self._shots = shooting.search(self.problem)
-            candidates, limit = found.candidates, None if found.complete else AFTERWARDS
+            candidates, complete = found.candidates, found.complete
             self.findings += found.findings
         except (StructureError, StepperError) as error:
             self._failed("action plot", error, only=self.analyzer.graph is None)
         if candidates or self._polishing_begun:  # candidates of the first graph may wait
-            with working(time_limit=limit):
-                self._polish(candidates, quick=limit is not None)
+            self._polish(candidates, quick=not complete)
 
     def search_graph(self) -> None:
         """Search the graph on the next number of nodes, the fewest at first, and polish its paths."""
@@ -203,14 +202,14 @@ class ExitSearch:
         if self._shots is None or not kept:
             return ()
         complete = self._shots.complete and not self.stopped
-        shots, doing = dataclasses.replace(self._shots, branches=kept, complete=complete), "errors of the action plot"
+        shots = dataclasses.replace(self._shots, branches=kept, complete=complete)
         try:
-            return shots.estimates
-        except KeyboardInterrupt as interrupt:  # the paths are known; only their errors are not
-            self.findings.append(Finding.stopped(doing, interrupt, self.problem.source))
+            estimates, errors = shots.rated
         except (StructureError, StepperError) as error:
-            self._failed(doing, error)
-        return dataclasses.replace(shots, complete=False).estimates
+            self._failed("errors of the action plot", error)
+            return dataclasses.replace(shots, complete=False).estimates
+        self.findings += errors.findings
+        return estimates
 
     @cached_property
     def _polishings(self) -> list[Polishing]:
@@ -248,8 +247,7 @@ class ExitSearch:
         branches, polished = self._polished()
         evidence = self._evidence
         if self.graph is not None:
-            with working(time_limit=AFTERWARDS if self.stopped else None):
-                self.graph = self.graph.bounded(self.problem, evidence.cheapest.keys())
+            self.graph = self.graph.bounded(self.problem, evidence.cheapest.keys())
             evidence = self._evidence
         energies, compared = evidence.combined(self._unpolished(evidence))
         every = (*self.findings, *self._graph_findings, *polished)

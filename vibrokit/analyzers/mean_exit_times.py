@@ -27,6 +27,7 @@ from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.result import Result
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.structure.validation import intensities, share
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -132,7 +133,7 @@ class MFET(Analyzer):
         measured: list[AtIntensity] = []
         wanted, limits = with_states(problem, wanted)
         findings = list(limits)
-        complete = True
+        work = Stoppable("simulation of exit times", problem.source)
         covariances = {a.label: covariances_of(problem, a) for a in attractors}
         stepper = problem.ensemble_stepper(Flow.NOISY)
         for number, intensity in enumerate(wanted):
@@ -141,27 +142,23 @@ class MFET(Analyzer):
                 problem.checkpoint.slot(problem.source, number),
             )  # fmt: skip
             try:
-                with stage("exit times", subject=f"{problem.attractor.name}, D = {intensity:g}"):
+                with work, stage("exit times", subject=f"{problem.attractor.name}, D = {intensity:g}"):
                     measured.append(measurement.run())
             except StructureError as error:
                 findings.append(
                     Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=intensity, reason=str(error))
                 )
-            except KeyboardInterrupt as interrupt:
+            if work.stopped:
                 so_far = measurement.so_far()
-                if so_far is not None:
-                    measured.append(so_far)
-                elif not measured:
-                    raise
-                findings.append(Finding.stopped("simulation of exit times", interrupt, problem.source))
-                complete = False
+                measured += [] if so_far is None else [so_far]
                 break
+        findings += work.findings
         if not measured:
-            return Analysis(findings=tuple(findings), complete=complete)
+            return Analysis(findings=tuple(findings), complete=not work.stopped)
         for one in measured:
             findings += one.findings
         energies, more = _energies(problem, measured)
-        return Analysis(energies, dataset_of(problem, measured), (*findings, *more), complete=complete)
+        return Analysis(energies, dataset_of(problem, measured), (*findings, *more), complete=not work.stopped)
 
     def _intensities(self, osc: Oscillator) -> tuple[float, ...]:
         assert osc.noise is not None  # every analyzer checks that

@@ -26,6 +26,7 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.structure.validation import gibibytes, intensities
 
 METHOD = "SGCM-WKB"
@@ -131,25 +132,22 @@ class SGCM(Analyzer):
         solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
         solved: list[AtIntensity] = []
         unresolved: list[Unresolved] = []
-        stopped: tuple[Finding, ...] = ()
-        try:
+        with Stoppable("density", problem.source) as work:
             for one in solver.solve(wanted):
                 if isinstance(one, Unresolved):
                     unresolved.append(one)
                 else:
                     solved.append(one)
-        except KeyboardInterrupt as interrupt:
-            if not solved:
-                raise
-            stopped = (Finding.stopped("density", interrupt, problem.source),)
+        if work.stopped and not solved:
+            return Analysis(findings=(*limits, *work.findings), complete=False)
         if not solved:
             raise StructureError(unresolved[-1].reason)
         energies, more = _energies(problem, solved)
         return Analysis(
             energies,
             _data(problem, solver, solved),
-            (*limits, *_findings(problem, solved, unresolved), *more, *stopped),
-            complete=not stopped,
+            (*limits, *_findings(problem, solved, unresolved), *more, *work.findings),
+            complete=not work.stopped,
         )
 
 

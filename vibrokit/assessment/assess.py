@@ -10,16 +10,18 @@ from concurrent.futures import Executor
 from numbers import Integral
 from typing import Any
 
+import numpy as np
+
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.arguments import members, real
 from vibrokit.assessment.assessment import Assessment
-from vibrokit.assessment.known import Known
+from vibrokit.assessment.known import Known, Part
 from vibrokit.assessment.ladder import fitted, ladder
 from vibrokit.construction import called
-from vibrokit.errors import OutOfTime, ParameterError, SceneError, StructureError, VibrokitError, shown
+from vibrokit.errors import ParameterError, SceneError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
 from vibrokit.registry import Group, load
@@ -30,6 +32,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.merging import merged, part_of
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.result import Result
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
@@ -41,7 +44,6 @@ TIME_LIMIT = 300.0
 """Default budget (s)."""
 
 _PATHS = 0.4  # share of the time left that least action may take when rates are wanted too
-_EARLY = 0.98  # of its time: incomplete work that took less was stopped by the user, not by the limit
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -193,18 +195,17 @@ def assessed(
             )
         given = (*given, before)
     last: Assessment | None = None
-    try:
+    with Stoppable("the assessment") as road:
         for assessment in _Road(osc, request, work, given).stages():
             if kept is not None:
                 assessment.save(kept)
             last = assessment
-    except (KeyboardInterrupt, OutOfTime) as stopped:
-        if last is None:
-            raise
-        finding = Finding.stopped("the assessment", stopped)
-        return dataclasses.replace(last, complete=False, findings=(*last.findings, finding))
-    assert last is not None  # the first stage yields one, or raises
-    return last
+    if last is None:  # the first stage yields one, or is stopped
+        work.stop_again()
+    assert last is not None
+    return dataclasses.replace(
+        last, complete=last.complete and not road.stopped, findings=(*last.findings, *road.findings)
+    )
 
 
 class _Road:
@@ -213,7 +214,7 @@ class _Road:
     def __init__(self, osc: Oscillator, request: Request, work: Work, known: Sequence[Any]) -> None:
         self.osc, self.request, self.work = osc, request, work
         self.structure: Structure | None = None
-        self.parts: dict[tuple[str, int], Result] = {}  # by analyzer and by source
+        self.parts: dict[tuple[str, int], Part] = {}  # by analyzer and by source
         self.left: list[Finding] = []
         self.complete = False
         self.known = Known.of(known, request.accuracy)
@@ -241,46 +242,48 @@ class _Road:
         )
         rated = {name: one for name, one in wanted.analyzers.items() if isinstance(one, MFET | SGCM)}
         others = [name for name in wanted.analyzers if name not in rated]
-        stopped = False
+        ran = True
         for number, name in enumerate(others):
             paths = dataclasses.replace(wanted.analyzers[name], source=wanted.source)
-            share = _PATHS if rated else 1.0 / (len(others) - number)
-            stopped = stopped or self._run(name, paths, labels, share)
+            ran &= self._run(name, paths, labels, _PATHS if rated else 1.0 / (len(others) - number))
             yield self._assessment()
         order = sorted(labels, key=self._energy)
         runs = [(name, label) for label in order for name in rated]
         for number, (name, label) in enumerate(runs):
             rates = dataclasses.replace(rated[name], source=label, intensities=self._intensities(label))
-            stopped = stopped or self._run(name, rates, [label], 1.0 / (len(runs) - number))
-            self.complete = number == len(runs) - 1 and not stopped
+            ran &= self._run(name, rates, [label], 1.0 / (len(runs) - number))
             yield self._assessment()
-        if not runs:
-            self.complete = not stopped
-            yield self._assessment()
+        asked = ((name, label) for name, label in self.parts if name in wanted.analyzers and label in labels)
+        self.complete = ran and all(self._is_known(name, label) for name, label in asked)
+        yield self._assessment()
 
     def _run(self, name: str, analyzer: Analyzer, labels: Sequence[int], share: float) -> bool:
-        """Run one analyzer in a share of the time left; return whether the user stopped it."""
+        """Run one analyzer in a share of the time left, unless as much is known; return whether there was time."""
         assert self.structure is not None
-        if all((name, label) in self.parts and self.parts[name, label].complete for label in labels):
-            return False
+        if all(self._is_known(name, label) for label in labels):
+            return True
         subject = "" if analyzer.source is None else self.structure.names[labels[0]]
-        limit = None
-        if self.request.time_limit is not None:
-            limit = share * (self.request.time_limit - self.work.seconds)
-            if limit <= 0:
-                self._leave(name, subject, "the time was up.")
-                return True
+        if self.work.over:
+            self._leave(name, subject, "the work was stopped before.")
+            return False
+        limit = None if self.request.time_limit is None else share * (self.request.time_limit - self.work.seconds)
         try:
             with stage("how it is left" if not subject else "how long it lasts", subject=subject):
                 found = analyzer.run(self.osc, self.structure, executor=self.request.executor, time_limit=limit)
         except VibrokitError as error:
             self._leave(name, subject, str(error))
-            return False
+            return True
         for label in labels:
             known, part = self.parts.get((name, label)), part_of(found, label)
-            if known is None or part.complete or _content(part) > _content(known):
-                self.parts[name, label] = part
-        return not found.complete and (limit is None or found.seconds < _EARLY * limit)
+            if part.complete:
+                self.parts[name, label] = part, self.request.accuracy
+            elif known is None or (math.isinf(known[1]) and _content(part) > _content(known[0])):
+                self.parts[name, label] = part, math.inf
+        return True
+
+    def _is_known(self, name: str, label: int) -> bool:
+        """Whether an analysis came to its end for the accuracy that is wanted."""
+        return (name, label) in self.parts and self.parts[name, label][1] <= self.request.accuracy
 
     def _leave(self, name: str, subject: str, reason: str) -> None:
         which = f"{name} of {subject}" if subject else name
@@ -299,16 +302,18 @@ class _Road:
 
         An energy that follows from rates would give each method another ladder, and no intensity in common.
         """
-        own = [one for (_, source), one in self.parts.items() if source == label and not isinstance(one, RatedResult)]
+        known = (one for (_, source), (one, _) in self.parts.items() if source == label)
+        own = [one for one in known if not isinstance(one, RatedResult)]
         return min((e.value for one in own for e in one.energies if e.source == label), default=math.inf)
 
     def _assessment(self) -> Assessment:
         assert self.structure is not None
-        results, finished = {}, {}
+        results, reached = {}, {}
         for name in dict.fromkeys(name for name, _ in self.parts):
             own = {label: part for (other, label), part in sorted(self.parts.items()) if other == name}
-            results[name] = merged(list(own.values()))
-            finished[name] = [label for label, part in own.items() if part.complete]
+            results[name] = merged([part for part, _ in own.values()])
+            reached[name] = np.full(len(self.structure.names), np.inf)
+            reached[name][list(own)] = [accuracy for _, accuracy in own.values()]
         wanted = self.request
         return Assessment(
             scene=scene_data(self.osc),
@@ -316,15 +321,15 @@ class _Road:
                 "accuracy": wanted.accuracy,
                 "time_limit": wanted.time_limit,
                 "methods": list(wanted.analyzers),
-                "finished": finished,
             },
             findings=tuple(self.left),
             stats=self.work.stats,
-            complete=self.complete and all(one.complete for one in results.values()),
+            complete=self.complete,
             seed=wanted.rng,
             seconds=self.work.seconds,
             structure=self.structure,
             results=results,
+            reached=reached,
         )
 
 

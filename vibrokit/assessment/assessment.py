@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
+import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from vibrokit.arguments import real
 from vibrokit.assessment.answers import AllowedIntensity, Answer, MeanTime, probability_within
@@ -23,6 +25,7 @@ from vibrokit.comparison.sensitivities import Sensitivity, sensitivities
 from vibrokit.comparison.verdicts import exit_name
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
+from vibrokit.results.arrays import Arrays
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.labels import goal_of, label_of
 from vibrokit.results.merging import analyzed_labels, part_of
@@ -44,12 +47,16 @@ class Assessment(Record):
     structure : Structure
     results : dict of str to Result
         By the name of the analyzer; each has all states that were analyzed.
+    reached : dict of str to array (attractors,)
+        By the name of the analyzer: for what accuracy the analysis of each state came to its end; infinite where it did
+        not.
     """
 
     kind: ClassVar[str] = "assessment"
 
     structure: Structure
     results: Mapping[str, Result]
+    reached: Mapping[str, NDArray[np.float64]] = dataclasses.field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -261,7 +268,9 @@ class Assessment(Record):
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays of the structure and of all results."""
-        return nested({STRUCTURE: self.structure, **self.results})
+        whole = nested({STRUCTURE: self.structure, **self.results})
+        reached = np.array([self._reached(name) for name in self.results]).reshape(-1, len(self.names))
+        return whole.assign(reached=(("result", "state"), reached, {"long_name": "accuracy of a finished analysis"}))
 
     @classmethod
     def from_dataset(cls, dataset: xarray.Dataset, **provenance: Any) -> Self:
@@ -271,16 +280,21 @@ class Assessment(Record):
         if not isinstance(structure, Structure):
             raise ResultFileError("it holds no structure")
         results = {name: one for name, one in records.items() if isinstance(one, Result)}
-        return cls(structure=structure, results=results, **provenance)
+        shape = len(results), len(structure.names)
+        table = Arrays(dataset).numbers("reached", shape, 0.0, finite=False)
+        return cls(structure=structure, results=results, reached=dict(zip(results, table, strict=True)), **provenance)
 
-    def parts(self, name: str) -> list[Result]:
-        """What one result says of each attractor that was analyzed; complete where its analysis came to its end."""
-        whole = self.results[name]
-        finished = self.settings.get("finished", {}).get(name, [])
-        return [
-            dataclasses.replace(part_of(whole, label), complete=whole.complete or label in finished)
-            for label in analyzed_labels(whole)
-        ]
+    def parts(self, name: str) -> dict[int, tuple[Result, float]]:
+        """What one result says of each attractor that was analyzed, by its label, and for what accuracy that is."""
+        whole, reached = self.results[name], self._reached(name).tolist()
+        parts = {label: part_of(whole, label) for label in analyzed_labels(whole)}
+        return {
+            label: (dataclasses.replace(part, complete=math.isfinite(reached[label])), reached[label])
+            for label, part in parts.items()
+        }
+
+    def _reached(self, name: str) -> NDArray[np.float64]:
+        return self.reached.get(name, np.full(len(self.names), np.inf))
 
     def _labels(self, source: int | str, target: int | str | None) -> tuple[int, int | None]:
         return label_of(source, self.names), None if target is None else goal_of(target, self.names)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -22,6 +23,9 @@ from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 
+Part = tuple[Result, float]
+"""A result on one attractor, and the accuracy for which its analysis came to its end; infinite if it did not."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Known:
@@ -30,27 +34,30 @@ class Known:
     Attributes
     ----------
     structures : tuple of Structure
-    results : tuple of Result
-        Those of an assessment of less accuracy than is wanted are marked incomplete.
+    results : tuple of (Result, float)
+        With the accuracy for which each came to its end; infinite if it did not.
     """
 
     structures: tuple[Structure, ...]
-    results: tuple[Result, ...]
+    results: tuple[tuple[Result, float], ...]
 
     @classmethod
     def of(cls, given: Iterable[Any], accuracy: float) -> Known:
-        """Sort records and paths of files; raises a VibrokitError for what is neither."""
+        """Sort records and paths of files; a result of its own counts as of the accuracy that is wanted.
+
+        Raises a VibrokitError for what is neither.
+        """
         structures, results = [], []
         for one in given:
             record = load_result(one) if isinstance(one, str | os.PathLike) else one
             match record:
                 case Assessment():
                     structures.append(record.structure)
-                    results += [_at(part, record, accuracy) for name in record.results for part in record.parts(name)]
+                    results += [part for name in record.results for part in record.parts(name).values()]
                 case Structure():
                     structures.append(record)
                 case Result():
-                    results.append(record)
+                    results.append((record, accuracy if record.complete else math.inf))
                 case _:
                     raise StructureError(
                         "what is known must be a structure, a result or an assessment, or the file of one, got "
@@ -62,31 +69,28 @@ class Known:
         """Raise StructureError for a record of another scene, or a result of another exit."""
         for structure in self.structures:
             check_scene("the known structure", structure, scene_data(osc))
-        for known in self.results:
+        for known, _ in self.results:
             name = str(known.settings.get("analyzer") or known.kind)
             check_scene(f"the known result of {name}", known, scene_data(osc))
             _check_exit(name, known, exit)
 
-    def parts(self, osc: Oscillator, structure: Structure, exit: Exit) -> dict[tuple[str, int], Result]:  # noqa: A002
-        """Return the results by analyzer and label; raises StructureError for those of another scene, states or exit.
+    def parts(self, osc: Oscillator, structure: Structure, exit: Exit) -> dict[tuple[str, int], Part]:  # noqa: A002
+        """Return the results by analyzer and label, and the accuracy of each.
 
-        A second result of the same analyzer and attractor is beside the first, with a number in its name.
+        A second result of the same analyzer and attractor is beside the first, with a number in its name. Raises
+        StructureError for results of another scene, of other states or of another exit.
         """
-        parts: dict[tuple[str, int], Result] = {}
-        for known in self.results:
+        parts: dict[tuple[str, int], Part] = {}
+        for known, accuracy in self.results:
             name = str(known.settings.get("analyzer") or known.kind)
             check_comparable(f"the known result of {name}", known, scene_data(osc), Section.of(structure))
             _check_exit(name, known, exit)
             for label in analyzed_labels(known):
                 part = part_of(known, label)
                 keys = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
-                key = next(one for one in keys if (one, label) not in parts or _same(parts[one, label], part))
-                parts.setdefault((key, label), part)
+                key = next(one for one in keys if (one, label) not in parts or _same(parts[one, label][0], part))
+                parts.setdefault((key, label), (part, accuracy))
         return parts
-
-
-def _at(part: Result, known: Assessment, accuracy: float) -> Result:
-    return part if known.settings["accuracy"] <= accuracy else dataclasses.replace(part, complete=False)
 
 
 def _check_exit(name: str, known: Result, exit: Exit) -> None:  # noqa: A002 - the name that analyzers use

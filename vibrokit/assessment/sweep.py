@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
 from vibrokit.results.finding import Finding
 from vibrokit.results.rated import RatedResult
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.sweep import Prefactor, Sweep
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.continuation import continuation
@@ -118,39 +118,45 @@ def _add_prefactors(
     osc: Oscillator, line: ParameterLine, paths: EnergyContinuation, found: list[Prefactor], findings: list[Finding]
 ) -> bool:
     """Simulate exits at the searched values; return whether that came to its end."""
-    sources = tuple(dict.fromkeys(branch.source for branch in paths.branches))
     places = [int(np.argmin(np.abs(paths.values - value))) for value in paths.settings["search"]]
-    try:
-        with stage("mean times", unit="values", total=len(places)):
-            for place in places:
-                there = line.at(osc, float(paths.values[place]))
-                structure = find_structure(there, manifolds=False, saddles=False, rng=int(paths.settings["rng"]))
-                for source in sources:
-                    energy = float(paths.energy(source)[place])
-                    if source in structure.names and energy > 0:
-                        simulated = MFET(source=source, intensities=(energy / _DEPTH,), target_error=_ERROR)
-                        try:
-                            result = simulated.run(there, structure)
-                        except VibrokitError as error:
-                            findings.append(Finding.of(Code.REMARK, text=str(error)))
-                            continue
-                        if not result.complete:
-                            return False
-                        found += _prefactor(result, source, float(paths.values[place]), energy)
-                advance()
-    except KeyboardInterrupt as interrupt:
-        findings.append(Finding.stopped("mean times", interrupt))
-        return False
-    return True
+    with Stoppable("mean times") as times, stage("mean times", unit="values", total=len(places)):
+        for place in places:
+            there = line.at(osc, float(paths.values[place]))
+            for result in _simulated(there, paths, place, findings):
+                if not result.complete:
+                    return False
+                found += _prefactor(result, float(paths.values[place]))
+            advance()
+    findings += times.findings
+    return not times.stopped
 
 
-def _prefactor(result: Any, source: str, value: float, energy: float) -> list[Prefactor]:
+def _simulated(
+    there: Oscillator, paths: EnergyContinuation, place: int, findings: list[Finding]
+) -> Iterator[RatedResult]:
+    """Yield the exits from each state whose energy is known at a value, at a noise that is strong enough."""
+    structure = find_structure(there, manifolds=False, saddles=False, rng=int(paths.settings["rng"]))
+    for source in dict.fromkeys(branch.source for branch in paths.branches):
+        energy = float(paths.energy(source)[place])
+        if source not in structure.names or not energy > 0:
+            continue
+        analyzer = MFET(source=source, intensities=(energy / _DEPTH,), target_error=_ERROR)
+        try:
+            result = analyzer.run(there, structure)
+        except VibrokitError as error:
+            findings.append(Finding.of(Code.REMARK, text=str(error)))
+            continue
+        if isinstance(result, RatedResult):
+            yield result
+
+
+def _prefactor(result: RatedResult, value: float) -> list[Prefactor]:
     """The prefactor of leaving a state at all, if a rate was found."""
-    assert isinstance(result, RatedResult)
-    rates = [rate for rate in result.rates if result.names[rate.source] == source]
-    if not rates:
+    if not result.rates:
         return []
-    logs, errors = np.array([rate.log_value for rate in rates]), np.array([rate.log_error for rate in rates])
+    logs = np.array([rate.log_value for rate in result.rates])
+    errors = np.array([rate.log_error for rate in result.rates])
     total = float(np.logaddexp.reduce(logs))
     error = float(np.linalg.norm(np.exp(logs - total) * errors))
-    return [Prefactor(source, value, -total - energy / rates[0].intensity, max(error, math.ulp(1.0)))]
+    # The noise was chosen so that the energy is this many times D.
+    return [Prefactor(result.names[result.rates[0].source], value, -total - _DEPTH, error)]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vibrokit.cli.interrupts import Interrupts
-from vibrokit.errors import OutOfTime, VibrokitError
+from vibrokit.errors import VibrokitError
 
 if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vibrokit.results.finding import Finding
     from vibrokit.results.record import Record
     from vibrokit.results.result import Result
+    from vibrokit.results.stoppable import Stoppable
     from vibrokit.results.structure import Structure
 
 STRUCTURE = "structure"  # its name among those of the analyzers
@@ -60,13 +61,6 @@ class Outcome:
         """Whether all that was asked for is there."""
         return {STRUCTURE, *self.asked} == {name for name, record in self.records.items() if record.complete}
 
-    def stopped(self, reason: KeyboardInterrupt | OutOfTime) -> None:
-        """Note that the work ended before its records could say so."""
-        from vibrokit.results.finding import Finding
-
-        stage = "the analysis" if self.structure else "the search for steady states"
-        self.findings.append(Finding.stopped(stage, reason))
-
     @property
     def status(self) -> int:
         """Exit status of a run that was not interrupted."""
@@ -75,15 +69,17 @@ class Outcome:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
+    from vibrokit.results.stoppable import Stoppable
+
     outcome = Outcome(tuple(dict.fromkeys(options.analyzer)))
     with Interrupts() as interrupts:
         plan = planned(options)
-        try:
-            _work(plan, options, interrupts, outcome)
+        # It ends by itself, unless it is stopped before there is a structure, or Ctrl-C is pressed twice.
+        with Stoppable("the search for steady states") as whole:
+            _work(plan, options, interrupts, outcome, whole)
             interrupts.finishing()
-        except (KeyboardInterrupt, OutOfTime) as stopped:  # before there was a structure, or Ctrl-C was pressed twice
-            interrupts.finishing()
-            outcome.stopped(stopped)
+        interrupts.finishing()
+        outcome.findings += whole.findings
         _save(outcome, options)
         _print(outcome, options)
         if not (options.json or interrupts.requested):
@@ -146,7 +142,7 @@ def source_of(text: str) -> int | str:
     return int(text) if text.isdecimal() else text
 
 
-def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outcome: Outcome) -> None:
+def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outcome: Outcome, whole: Stoppable) -> None:
     """Find the structure and run the analyzers; keep each of them in the outcome as soon as it is there."""
     from vibrokit.progress import working
     from vibrokit.results.codes import Code
@@ -161,6 +157,7 @@ def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outco
         try:
             cells = (options.cells, options.cells)
             outcome.structure = find_structure(plan.osc, cells=cells, stepper=plan.stepper, rng=options.seed)
+            whole.doing = "the analysis"
             _print_records(outcome, options)
             for name, analyzer in plan.analyzers.items():
                 if interrupts.requested or not all(record.complete for record in outcome.records.values()):

@@ -80,7 +80,7 @@ class Kernel:
         """Call the function `advance` of the driver with the parameters of a scene until no trajectory is left.
 
         `rest` begins with the start time, the interval, the settings and the streams. Each call of the function does
-        so much work as takes about a tenth of a second, so that interrupts and time limits are seen between calls.
+        so much work as takes about a tenth of a second, so that interrupts and time limits are seen after each.
         """
         function, given = self._advance, linked(theta, _addresses(self), _facts(self.module, theta))
         assert self.driver is not None, "then there is no function"
@@ -90,11 +90,11 @@ class Kernel:
             with first_call(function):
                 began = time.perf_counter()
                 used = function(states, given, *rest, *memory, most)
+            current().check()
             if place[0] == len(states) and place[1] == 0:
                 return
             pace = used / max(time.perf_counter() - began, _LEAST_TIME)
             most = max(1, int(min(_FASTER * most, _AT_ONCE * pace)))
-            current().check()
 
     def link(self) -> bool:
         """Compile or load what the driver calls; return whether the driver is compiled or loaded already."""

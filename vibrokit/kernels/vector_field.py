@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.parts.scene import Scene
+from vibrokit.progress import current
 from vibrokit.symbolic.flow_kind import Flow
 
 if TYPE_CHECKING:
@@ -105,6 +106,7 @@ class VectorField:
         times = np.broadcast_to(time, variables.shape[:-1]).astype(float).ravel()
         out = np.empty_like(flat)
         rates = self._module(flow).rates
+        current().check()  # for all that calls it again and again, such as searches for roots and SciPy's solvers
         with first_call(rates):
             rates(times, flat, self._theta, out)
         return out.reshape(variables.shape)

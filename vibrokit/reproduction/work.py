@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from vibrokit.progress import advance, stage
 from vibrokit.reproduction.steps import Step
 from vibrokit.results.files import load_result
 from vibrokit.results.record import Record
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import load_scene
 from vibrokit.structure.find import find_structure
@@ -27,7 +27,7 @@ def do(steps: Sequence[Step], folder: Path) -> Records:
     An interrupt or a time limit ends the work; the step under way is done again the next time.
     """
     found: Records = {}
-    with contextlib.suppress(KeyboardInterrupt), stage("steps", unit="steps", total=len(steps)):
+    with Stoppable("steps"), stage("steps", unit="steps", total=len(steps)):
         for step in steps:
             own = found.setdefault(step.scene, {})
             record = _kept(folder / step.file, step)

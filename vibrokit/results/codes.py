@@ -80,6 +80,11 @@ class Code(StrEnum):
     STARTS_ENDED = (
         "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
     )  # fmt: skip
+    STARTS_STALLED = (
+        "starts-stalled", WARNING,
+        "{count} of {starts:start} were not followed to their end, because they need too many steps in a section "
+        "interval.", "Take softer laws, or friction that is smoother; `Oscillator.trajectory` names the force.",
+    )  # fmt: skip
     STARTS_UNSETTLED = (
         "starts-unsettled", WARNING, "{count:start} did not settle on an equilibrium or a limit cycle.",
         _RAISE_BUDGET,
@@ -232,6 +237,11 @@ class Code(StrEnum):
         "shots", INFO,
         "Action plot from {state}: {escaped} of {paths:path} reached the exit, {left_region} left the region without "
         "an exit, {remaining} remained inside, {diverged} diverged; {branches:distinct exit path}.",
+    )  # fmt: skip
+    SHOTS_UNFINISHED = (
+        "shots-unfinished", INFO,
+        "Action plot from {state}: {count} of {paths:path} were not followed to their end, because they need too many "
+        "steps, or graze a stop whose force jumps.",
     )  # fmt: skip
     REFINEMENT = (
         "refinement", INFO,

@@ -65,11 +65,6 @@ class Finding(metaclass=Constructed):
         return cls.of(Code.STOPPED, source, stage=stage, reason=word)
 
     @property
-    def interrupt(self) -> KeyboardInterrupt:
-        """The interrupt that `stopped` was made of, for the work around to stop too."""
-        return Deadline() if self.values.get("reason") == TIME_LIMIT else KeyboardInterrupt()
-
-    @property
     def severity(self) -> Severity:
         """How much it matters."""
         return self.code.severity

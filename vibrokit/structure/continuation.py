@@ -18,13 +18,14 @@ from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, Work, advance, put_off, stage, working
+from vibrokit.progress import Progress, Work, advance, current, put_off, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
@@ -128,14 +129,13 @@ def continuation(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Found:
-    """Steady states found at one value, and the reason if the search was stopped."""
+    """Steady states found at one value."""
 
     value: float
     attractors: tuple[Attractor, ...] = ()
     region: Region | None = None
     budget: int = 0
     findings: tuple[Finding, ...] = ()
-    stopped: Finding | None = None
     refused: bool = False  # whether there is no such scene, or none that can have attractors
 
 
@@ -153,19 +153,17 @@ class _Run:
         self.region = self.request.region
         self.found: list[_Found] = []
         self.cell_findings: dict[float, tuple[Finding, ...]] = {}
-        self.stopped: Finding | None = None
+        self.work = Stoppable("values")
 
     def run(self) -> None:
         """Go through the stages; an interrupt ends them, and what is known by then is kept."""
-        doing = "values"
-        try:
+        with self.work as work:
             self._search()
-            doing = "branches"
+            work.doing = "branches"
             self.tracing.run()
-            doing = "basin fractions"
+            work.doing = "basin fractions"
             self._find_fractions()
-        except KeyboardInterrupt as interrupt:
-            self.stopped = Finding.stopped(doing, interrupt)
+        if work.stopped:
             with put_off():
                 self.tracing.pair_off()
 
@@ -187,10 +185,10 @@ class _Run:
             states=states,
             branch_names=branch_names(tracing, numbered),
             bifurcations=bifurcations,
-            complete=self.stopped is None,
+            complete=not self.work.stopped,
             scene=scene_data(self.osc),
             settings=plain(arguments),
-            findings=(*findings, *nothing, *([self.stopped] if self.stopped else [])),
+            findings=(*findings, *nothing, *self.work.findings),
             stats=work.stats,
             seed=request.rng,
             seconds=work.seconds,
@@ -204,8 +202,7 @@ class _Run:
         with stage("values", unit="values", total=len(tasks)), contextlib.closing(self._each(_search, tasks)) as all_:
             for found in all_:
                 self.found.append(found)
-                if found.stopped is not None:
-                    raise found.stopped.interrupt
+                current().stop_again()
                 advance()
 
     @cached_property
@@ -273,8 +270,7 @@ def _search(osc: Oscillator, line: ParameterLine, value: float, given: dict[str,
         return _Found(value, findings=(nothing,), refused=there.model.undamped)
     # The few cells of this grid do not resolve the basins, which are found once all attractors are known.
     findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
-    stopped = next(iter(structure.found(Code.STOPPED)), None)
-    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings, stopped)
+    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings)
 
 
 def _union(regions: list[Region]) -> Region | None:

@@ -23,6 +23,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
@@ -73,21 +74,18 @@ class Finder:
         self.saddle_search: SaddleSearch | None = None
         self.manifolds: tuple[Manifold, ...] = ()
         self.without_manifolds: list[Finding] = []
-        self.stopped: Finding | None = None
-        self.doing = ""
+        self.work = Stoppable("attractors")
 
     def run(self) -> None:
         """Go through the stages; an interrupt ends them, and what is known by then is kept."""
         stages = {"attractors": self._find_attractors, "basins": self._find_basins}
         stages |= {"saddles": self._find_saddles} if self.request.saddles else {}
         stages |= {"manifolds": self._grow_manifolds} if self.request.saddles and self.request.manifolds else {}
-        try:
-            for self.doing, find in stages.items():
+        with self.work:
+            for self.work.doing, find in stages.items():
                 find()
-        except KeyboardInterrupt as interrupt:
-            self.stopped = Finding.stopped(self.doing, interrupt)
-            with put_off():
-                self._order()
+        with put_off():
+            self._order()
 
     def _search_stepper(self) -> Stepper:
         """A stepper finer than the basins need: too few steps can destroy a weak attractor."""
@@ -243,7 +241,7 @@ class Finder:
             stepper=name_of(self.stepper),
             shift=turn_of(self.osc),
             circle=self.circle,
-            complete=self.stopped is None,
+            complete=not self.work.stopped,
             scene=scene_data(self.osc),
             settings=self.request.settings,
             findings=self._findings(grid),
@@ -262,7 +260,9 @@ class Finder:
             found.append(Finding.of(Code.STARTS_ENDED, count=search.diverged, starts=search.starts, where=where))
         elif search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
-        if self.stopped and self.doing == "attractors":
+        if search.stalled:
+            found.append(Finding.of(Code.STARTS_STALLED, count=search.stalled, starts=search.starts))
+        if self.work.stopped and self.work.doing == "attractors":
             found.append(search.progress)
         if followed := search.beyond["followed"]:
             settled = followed - search.beyond["diverged"] - search.beyond["moving"]
@@ -283,7 +283,7 @@ class Finder:
             found += saddles.findings
             outside = sum(not lies_in(grid.basins.region, saddle) for saddle in saddles.saddles)
             found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
-        return (*found, *self.without_manifolds, *([self.stopped] if self.stopped else []))
+        return (*found, *self.without_manifolds, *self.work.findings)
 
     def _tops_outside(self, region: Region) -> list[Finding]:
         """Report tops of potential barriers around the attractors that the region does not contain."""
@@ -329,6 +329,8 @@ def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> st
             advice = (
                 f"most motions end where the forces do ({where}); narrow the region, or check the signs of the forces"
             )
+    if search.stalled > search.starts / 2:
+        advice = f"{search.stalled} need too many steps; take softer laws, or friction that is smoother"
     return (
         f"no steady state was found from {search.starts} starts in x ∈ {region.x}, v ∈ {region.v}: within {budget} "
         f"periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "

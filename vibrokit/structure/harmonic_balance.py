@@ -77,7 +77,7 @@ class SteadyForce:
         return derivatives
 
     def _padded(self, states: Array) -> Array:
-        return np.pad(states, (*[(0, 0)] * (states.ndim - 1), (0, self._extra)))
+        return np.concatenate([states, np.zeros((*states.shape[:-1], self._extra))], axis=-1) if self._extra else states
 
     def rests(self, length: float) -> list[float]:
         """Return the places nearest to x = 0, within some lengths of it, where this force is 0 at rest."""

@@ -17,7 +17,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED, UNSETTLED
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
@@ -75,7 +75,7 @@ class Search:
         self.attractors: list[Attractor] = []
         self.at_rest: tuple[Equilibrium, ...] = ()  # by position
         self.survival: tuple[Survival, ...] = ()
-        self.starts = self.diverged = 0
+        self.starts = self.diverged = self.stalled = 0  # stalled: they need too many steps in a section interval
         self.unsettled = np.empty((0, 2))  # states of the starts that have not settled, after so many periods
         self.periods = 0
         self.findings: list[Finding] = []
@@ -110,24 +110,25 @@ class Search:
 
     def go_on(self, states: Array, wait: int) -> bool:
         """Follow more states; return whether some come to an attractor that was not known."""
-        known, diverged, followed = len(self.attractors), self.diverged, len(states)
+        known, counts, followed = len(self.attractors), (self.diverged, self.stalled), len(states)
         if followed:
             states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD)
         if self.osc.autonomous:
             self._try_cycles(states)
             states = states[[not self._on_cycle(state) for state in states]]
-        gone, self.diverged = self.diverged - diverged, diverged
-        self.beyond = {"followed": followed, "diverged": gone, "moving": len(states)}
+        gone, moving = self.diverged - counts[0], len(states) + self.stalled - counts[1]
+        self.diverged, self.stalled = counts
+        self.beyond = {"followed": followed, "diverged": gone, "moving": moving}
         return len(self.attractors) > known
 
     @property
     def progress(self) -> Finding:
         """What the starts were doing after the last round."""
         moving = int(self.region.contains(self.unsettled[:, :2]).sum())
-        settled, left = self.starts - self.diverged - len(self.unsettled), len(self.unsettled) - moving
+        settled = self.starts - self.diverged - self.stalled - len(self.unsettled)
         return Finding.of(
-            Code.SEARCH_STOPPED, starts=self.starts, periods=self.periods, settled=settled, moving=moving, left=left,
-            diverged=self.diverged,
+            Code.SEARCH_STOPPED, starts=self.starts, periods=self.periods, settled=settled, moving=moving,
+            left=len(self.unsettled) - moving, diverged=self.diverged,
         )  # fmt: skip
 
     def _arrival(self) -> Stop:
@@ -140,15 +141,18 @@ class Search:
         return reached if trapped is None else reached.or_in_cells(trapped.region.bounds, trapped.labels)
 
     def _after(self, states: Array, periods: int) -> Array:
-        """Return the states some periods later, without those that reached a known orbit and those that diverged.
+        """Return the states some periods later, without those that reached a known orbit, diverged or stalled.
 
+        Motion to infinity in a finite time needs too many steps too, outside the region.
         The first ones are followed in stretches, so that if the work is stopped it is known what they were doing.
         """
         arrival, end = self._arrival(), self.periods + periods
         while self.periods < end:
             stretch = min(max(1, _LONGER * self.periods), end - self.periods)
             ended, _, labels = follow(self.osc, states, arrival, stretch, self.stepper, self.executor)
-            self.diverged += int(np.sum(labels == ESCAPED))
+            stalled = (labels == NOT_FOLLOWED) & self.region.contains(ended[:, :2])
+            self.stalled += int(np.sum(stalled))
+            self.diverged += int(np.sum(np.isin(labels, (ESCAPED, NOT_FOLLOWED)) & ~stalled))
             states = self.unsettled = ended[labels == UNSETTLED]
             self.periods += stretch
         return states

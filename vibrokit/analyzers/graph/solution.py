@@ -18,6 +18,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
+from vibrokit.results.stoppable import Stoppable
 
 WHOLE_PATHS = "whole paths"
 
@@ -64,20 +65,17 @@ class GraphSolution:
         whole path has no bounds, and one that is far below it is replaced by it. Exits that polished paths lead to keep
         their energies. If the work is stopped, a finding says so, and the others have no bounds.
         """
-        pairs, findings = list(zip(self.energies, self.behind, strict=True)), self.findings
+        pairs = list(zip(self.energies, self.behind, strict=True))
         actions = {estimate: math.inf for energy, estimate in pairs if energy.target not in polished}
-        try:
-            with stage(WHOLE_PATHS, subject=problem.attractor.name):
-                for estimate in actions:
-                    found = (whole_action(problem, path) for path in estimate.paths)
-                    actions[estimate] = next((action for action in found if math.isfinite(action)), math.inf)
-        except KeyboardInterrupt as interrupt:
-            findings = (*findings, Finding.stopped(WHOLE_PATHS, interrupt, problem.source))
+        with Stoppable(WHOLE_PATHS, problem.source) as work, stage(WHOLE_PATHS, subject=problem.attractor.name):
+            for estimate in actions:
+                found = (whole_action(problem, path) for path in estimate.paths)
+                actions[estimate] = next((action for action in found if math.isfinite(action)), math.inf)
         energies = [
             energy if energy.target in polished else _bounded(energy, estimate, actions[estimate])
             for energy, estimate in pairs
         ]
-        return dataclasses.replace(self, energies=tuple(energies), findings=findings)
+        return dataclasses.replace(self, energies=tuple(energies), findings=(*self.findings, *work.findings))
 
     @property
     def estimates(self) -> tuple[ActivationEnergy, ...]:

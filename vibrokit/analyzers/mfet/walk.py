@@ -16,7 +16,7 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION
 from vibrokit.kernels.streams import streams_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
@@ -243,7 +243,7 @@ class Walk:
 
     def _labelled(self, ended: Ensemble) -> Ensemble:
         """The same with the label of the target where motion left by position, escaped or diverged."""
-        away = np.isin(ended.status, (LEFT_REGION, DIVERGED, STALLED)) | (ended.label == self._escape_label)
+        away = np.isin(ended.status, (LEFT_REGION, DIVERGED)) | (ended.label == self._escape_label)
         outlet = ESCAPED if self.problem.outlet is None else self.problem.outlet
         return dataclasses.replace(ended, label=np.where(away, outlet, ended.label))
 

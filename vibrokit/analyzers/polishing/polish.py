@@ -21,6 +21,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, upper_bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.structure.orbits import Orbit
 
 METHOD = "least action"
@@ -113,35 +114,31 @@ class Polishing:
         ranked = sorted((new[key] for key in new if key not in self._seen), key=lambda each: each.action)
         self._seen |= new.keys()
         self._tried += len(ranked)
-        try:
-            with stage("polishing", unit="candidates", total=len(ranked)):
-                for candidate in ranked:
-                    if _key(candidate) not in self._shared.fruitless:
-                        before = len(self._polisher.solved)
-                        self._polisher.polish(candidate, quick=quick or candidate.momenta is not None)
-                        self._shared.note(candidate, self._polisher.solved[before:], self._number)
-                    advance()
-                self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
-                if not quick:
-                    self._reach_all(quick=True)  # so that candidates that cost more need no costly polishing
-                    self._polisher.polish_the_rest()
-                    self._reach_all()
-                    self._waiting = []
-        except KeyboardInterrupt as error:
-            self._findings.append(Finding.stopped("polishing", error, self._problem.source))
+        source, certified = self._problem.source, 0
+        with Stoppable("polishing", source) as polishing, stage("polishing", unit="candidates", total=len(ranked)):
+            for candidate in ranked:
+                if _key(candidate) not in self._shared.fruitless:
+                    before = len(self._polisher.solved)
+                    self._polisher.polish(candidate, quick=quick or candidate.momenta is not None)
+                    self._shared.note(candidate, self._polisher.solved[before:], self._number)
+                advance()
+            self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
+            if not quick:
+                self._reach_all(quick=True)  # so that candidates that cost more need no costly polishing
+                self._polisher.polish_the_rest()
+                self._reach_all()
+                self._waiting = []
         found = self._new()
-        self._certified, certified = len(self._polisher.solved), 0
-        try:
-            with stage("certifying", unit="paths", total=len(found)):
-                for solved in found:
-                    self._branches += _certified(self._problem, solved, self._findings)
-                    certified += 1
-                    advance()
-        except KeyboardInterrupt as error:
-            self._findings.append(Finding.stopped("certifying", error, self._problem.source))
-            for solved in found[certified:]:
-                self._findings += _remarks(self._problem, solved)
-                self._branches += _energies(self._problem, solved)
+        self._certified = len(self._polisher.solved)
+        with Stoppable("certifying", source) as certifying, stage("certifying", unit="paths", total=len(found)):
+            for solved in found:
+                self._branches += _certified(self._problem, solved, self._findings)
+                certified += 1
+                advance()
+        for solved in found[certified:]:
+            self._findings += _remarks(self._problem, solved)
+            self._branches += _energies(self._problem, solved)
+        self._findings += (*polishing.findings, *certifying.findings)
 
     def _reach_all(self, *, quick: bool = False) -> None:
         """Look for paths to the ends that no candidate led to; quickly for those that are not one of many in a set."""

@@ -43,12 +43,12 @@ class Propagator:
     flow : DensityFlow
     intensity : float
         D (m² s⁻³).
-    executor : Executor
+    executor : Executor, optional
     """
 
     flow: DensityFlow
     intensity: float
-    executor: Executor
+    executor: Executor | None
 
     @property
     def grid(self) -> DensityGrid:

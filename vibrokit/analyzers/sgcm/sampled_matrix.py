@@ -46,7 +46,7 @@ class SampledMatrix:
     seed : int
     beyond : callable or None
         How far states are beyond the exit, if position decides.
-    executor : Executor
+    executor : Executor, optional
     """
 
     scene: Oscillator
@@ -54,7 +54,7 @@ class SampledMatrix:
     samples: int
     seed: int
     beyond: Beyond | None
-    executor: Executor
+    executor: Executor | None
 
     def interval(self, phi: Array, floor: float, highest: Array | None = None) -> tuple[Array, float]:
         """Return φ one section interval later, and the logarithm of the probability that left by position."""

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 from collections.abc import Generator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import ExitStack
 from functools import cached_property
 
 import numpy as np
@@ -79,35 +76,33 @@ class DensitySolver:
         on a coarser grid and from there on the finest one. What fewer steps and other sets change of the committors is
         found on the coarser grid.
         """
-        with ExitStack() as stack:
-            executor = self.problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
-            explored, closer = self.explored(intensities[0], executor)
-            grid, left = None, list(intensities)
-            while left and grid is None:
-                grid = self._grid(closer.region, self._shape(closer, left[-1]))
-                try:
-                    self._check(grid, left[-1], _ALL_FLOWS)
-                except StructureError as error:
-                    yield Unresolved(left.pop(), str(error))
-                    grid = None
-            if grid is None:
-                return
-            nx, nv = (math.ceil(count / COARSER) for count in grid.shape)
-            flow = self._flow(grid, self.steps)
-            coarse = self._flow(self._grid(closer.region, (nx, nv)), self.steps)
-            rough = dataclasses.replace(coarse, steps=self._fewer)
-            before = explored
-            for intensity in left:
-                coarser = self._solved(coarse, before, intensity, executor)
-                before = dataclasses.replace(
-                    self._solved(flow, coarser, intensity, executor),
-                    coarser=coarser,
-                    fewer_steps=self._with(coarser, self._transition(rough, intensity, executor), coarser.cores),
-                    other_sets=self._with(coarser, coarser.transition, self._other_sets(coarser))
-                    if coarser.cores.others
-                    else {},
-                )
-                yield before
+        explored, closer = self.explored(intensities[0])
+        grid, left = None, list(intensities)
+        while left and grid is None:
+            grid = self._grid(closer.region, self._shape(closer, left[-1]))
+            try:
+                self._check(grid, left[-1], _ALL_FLOWS)
+            except StructureError as error:
+                yield Unresolved(left.pop(), str(error))
+                grid = None
+        if grid is None:
+            return
+        nx, nv = (math.ceil(count / COARSER) for count in grid.shape)
+        flow = self._flow(grid, self.steps)
+        coarse = self._flow(self._grid(closer.region, (nx, nv)), self.steps)
+        rough = dataclasses.replace(coarse, steps=self._fewer)
+        before = explored
+        for intensity in left:
+            coarser = self._solved(coarse, before, intensity)
+            before = dataclasses.replace(
+                self._solved(flow, coarser, intensity),
+                coarser=coarser,
+                fewer_steps=self._with(coarser, self._transition(rough, intensity), coarser.cores),
+                other_sets=self._with(coarser, coarser.transition, self._other_sets(coarser))
+                if coarser.cores.others
+                else {},
+            )
+            yield before
 
     def _with(self, known: AtIntensity, transition: Transition, cores: CoreSets) -> dict[int, Committor]:
         """The committors of a density as it is, with another transition or other cores."""
@@ -125,35 +120,35 @@ class DensitySolver:
         coarser = self._cores.on(known.grid, known.intensity, _EVERY)
         return dataclasses.replace(coarser, own=known.cores.own)
 
-    def _solved(self, flow: DensityFlow, before: AtIntensity, intensity: float, executor: Executor) -> AtIntensity:
+    def _solved(self, flow: DensityFlow, before: AtIntensity, intensity: float) -> AtIntensity:
         """The density and the committors on the grid of a flow, begun from those of another one."""
-        transition, cores = self._transition(flow, intensity, executor), self._cores.on(flow.grid, intensity)
+        transition, cores = self._transition(flow, intensity), self._cores.on(flow.grid, intensity)
         begun, committors = before.begun(flow.grid, intensity)
         found = quasi_stationary(transition, begun, cores, self._cores.relaxation, _CONVERGED, _ARRIVED)
         known = self._committors(transition, found, cores, committors, _CONVERGED)
         resolved = not self.problem.exit.at_boundary
         return AtIntensity(intensity, flow.grid, found, transition, cores, known, sets_resolved=resolved)
 
-    def guide(self, intensity: float, executor: Executor) -> AtIntensity:
+    def guide(self, intensity: float) -> AtIntensity:
         """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
 
         It is one at more noise, on the grid of exploration, if this noise needs too many nodes. All steps are taken:
         with half of them the variance of splitting is 1.8 times as large (double well, ζ = 0.05, depth 26).
         """
-        explored, closer = self.explored(intensity, executor)
+        explored, closer = self.explored(intensity)
         grid = self._grid(closer.region, self._nodes(closer, intensity, _ENOUGH, _LARGEST))
         try:
             self._check(grid, intensity, 1.0)
         except StructureError:
             return explored
         start, committors = explored.begun(grid, intensity)
-        transition = Propagator(self._flow(grid, self.steps), intensity, executor)
+        transition = Propagator(self._flow(grid, self.steps), intensity, self.problem.executor)
         cores = self._cores.on(grid, intensity)
         found = quasi_stationary(transition, start, cores, self._cores.relaxation, _EXPLORED_TO)
         known = self._committors(transition, found, cores, committors, _EXPLORED_TO)
         return AtIntensity(intensity, grid, found, transition, cores, known) if known else explored
 
-    def explored(self, intensity: float, executor: Executor) -> tuple[AtIntensity, DensityGrid]:
+    def explored(self, intensity: float) -> tuple[AtIntensity, DensityGrid]:
         """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
         Where the nodes of the whole region are too far apart for the density, a stronger noise is used.
@@ -163,7 +158,7 @@ class DensitySolver:
         grid = self._grid(self._cores.region(intensity), shape)
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
-            propagator = Propagator(self._flow(grid, self._fewer), stronger, executor)
+            propagator = Propagator(self._flow(grid, self._fewer), stronger, self.problem.executor)
             cores, start = self._cores.on(grid, stronger), self._cores.start(grid, stronger)
             found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
@@ -228,11 +223,11 @@ class DensitySolver:
         escaping = self.problem.outlet == ESCAPED  # may take motion far beyond the grid in a leg
         return DensityFlow(self.problem.scene, stepper, grid, steps, beyond, watches_edge=escaping)
 
-    def _transition(self, flow: DensityFlow, intensity: float, executor: Executor) -> Transition:
+    def _transition(self, flow: DensityFlow, intensity: float) -> Transition:
         if self.samples is None:
-            return Propagator(flow, intensity, executor)
+            return Propagator(flow, intensity, self.problem.executor)
         scene = flow.scene.replace({"noise.intensity": intensity})
-        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.beyond, executor)
+        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.beyond, self.problem.executor)
 
     def _committors(
         self,

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import os
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,15 +79,13 @@ def committor_stages(problem: ExitProblem, intensity: float) -> CommittorStages:
     """
     orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
     solver = DensitySolver(problem, None, steps_for(problem.osc, np.concatenate(orbits)), _MEMORY)
-    with ExitStack() as stack:
-        executor = problem.executor or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
-        one = solver.guide(intensity, executor)
-        logs = [known.log_values for known in one.committors.values()]
-        if not logs or not isinstance(one.transition, Propagator):
-            raise StructureError(f"no committor was found at D = {one.intensity:g}.")
-        together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
-        floor = float(together.min()) - _BELOW
-        found = one.transition.stages(one.found, one.cores, together, floor)
+    one = solver.guide(intensity)
+    logs = [known.log_values for known in one.committors.values()]
+    if not logs or not isinstance(one.transition, Propagator):
+        raise StructureError(f"no committor was found at D = {one.intensity:g}.")
+    together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
+    floor = float(together.min()) - _BELOW
+    found = one.transition.stages(one.found, one.cores, together, floor)
     stages = np.concatenate([np.where(found > floor + 0.5 * _BELOW, found, np.nan), together[None]])
     for stage in stages:
         nearest = distance_transform_edt(np.isnan(stage), return_distances=False, return_indices=True)

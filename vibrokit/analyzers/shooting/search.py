@@ -15,10 +15,11 @@ from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.shots import Shots
 from vibrokit.kernels.single import record
-from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.progress import TRAJECTORIES, put_off, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath, upper_bound
 from vibrokit.results.finding import Finding
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.symbolic.flow_kind import Flow
 
 FINDER = "action plot"
@@ -125,11 +126,14 @@ class Search:
     complete: bool = True  # False if the work was stopped before its end
 
     @classmethod
-    def of(cls, shots: Shots) -> Search:
-        """Find the distinct exit paths among some shots."""
+    def of(cls, shots: Shots, refining: Stoppable) -> Search:
+        """Find the distinct exit paths among some shots, and whether these are all that were wanted."""
         problem = shots.shooter.problem
         branches = branches_of(shots.shooter, shots.outcomes, shots.minima()[:_TRIED])
         findings = [Finding.of(Code.SHOTS, problem.source, branches=len(branches), **shots.counts())]
+        if shots.unfinished:
+            count, paths = shots.unfinished, len(shots.outcomes.status)
+            findings.append(Finding.of(Code.SHOTS_UNFINISHED, problem.source, count=count, paths=paths))
         if not branches:
             findings.append(Finding.of(Code.NO_EXIT_FOUND, problem.source))
         elif shots.rounds and math.isinf(shots.change):
@@ -137,12 +141,7 @@ class Search:
         elif shots.rounds:
             values = {"last": shots.starts.patience, "rounds": shots.rounds, "change": shots.change}
             findings.append(Finding(Code.REFINEMENT, problem.source, values=values))
-        return cls(shots, branches, tuple(findings))
-
-    def stopped(self, interrupt: KeyboardInterrupt) -> Search:
-        """Return the same search, marked as stopped before its end."""
-        finding = Finding.stopped(FINDER, interrupt, self.shots.shooter.problem.source)
-        return dataclasses.replace(self, findings=(*self.findings, finding), complete=False)
+        return cls(shots, branches, (*findings, *refining.findings), complete=not refining.stopped)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -150,51 +149,71 @@ class Search:
         return tuple(branch.candidate for branch in self.branches)
 
     @cached_property
-    def estimates(self) -> tuple[ActivationEnergy, ...]:
-        """The best energy of each target, with a numerical error if the search is complete.
+    def rated(self) -> tuple[tuple[ActivationEnergy, ...], Stoppable]:
+        """The best energy of each target, with a numerical error if the search is complete, and whether all have one.
 
         The error takes another integration, so it is computed when it is first asked for.
         """
         best: dict[int, Branch] = {}
         for branch in self.branches:
             best.setdefault(branch.candidate.target, branch)
-        with stage("errors of the action plot", unit=TRAJECTORIES):
-            return tuple(_energy(self.shots, branch, with_error=self.complete) for branch in best.values())
+        with put_off():
+            found = {branch: _energy(self.shots, branch) for branch in best.values()}
+        work = Stoppable("errors of the action plot", self.shots.shooter.problem.source)
+        if self.complete:
+            with work, stage(work.doing, unit=TRAJECTORIES):
+                for branch, energy in found.items():
+                    found[branch] = _with_error(self.shots, branch, energy)
+        return tuple(found.values()), work
+
+    @property
+    def estimates(self) -> tuple[ActivationEnergy, ...]:
+        """The best energy of each target."""
+        return self.rated[0]
 
     @property
     def energies(self) -> tuple[ActivationEnergy, ...]:
         """All exit paths, the cheapest first; those that are not the best of their target have no numerical error."""
         known = {(energy.target, energy.value): energy for energy in self.estimates}
         found = ((branch, known.get((branch.candidate.target, branch.candidate.action))) for branch in self.branches)
-        return tuple(energy or _energy(self.shots, branch, with_error=False) for branch, energy in found)
+        return tuple(energy or _energy(self.shots, branch) for branch, energy in found)
 
 
-def _energy(shots: Shots, branch: Branch, *, with_error: bool) -> ActivationEnergy:
-    """Return the energy of one exit path; without a numerical error it is NaN.
-
-    The error, which takes a second integration, is the sum of what further refinement (for the ring: more points) and
-    finer steps may change, and of the action between the last two exit tests, because the path leaves between them.
-    """
-    problem = shots.shooter.problem
-    per_check = math.ceil(_SAMPLES / problem.checks)
+def _energy(shots: Shots, branch: Branch) -> ActivationEnergy:
+    """Return the energy of one exit path, whose numerical error is not known."""
+    problem, per_check = shots.shooter.problem, _per_check(shots)
     times, z = sampled(shots.shooter, shots.outcomes, branch.index, per_check * problem.checks)
     size = (z.shape[1] - 1) // 2
     section = per_check * (1 if problem.scene.autonomous else problem.checks)
     path = ExitPath(times, z[:, :size], z[:, size : 2 * size], z[:, -1], np.arange(0, len(z), section))
-    value, error = branch.candidate.action, math.nan
-    if with_error:
-        error = _search_error(shots, branch) + _step_error(shots, branch) + _check_error(shots, path, value, per_check)
     return ActivationEnergy(
         source=problem.source,
         target=branch.candidate.target,
-        value=value,
+        value=branch.candidate.action,
         lower=0.0,
-        upper=upper_bound(value, error) if with_error else value,
+        upper=branch.candidate.action,
         method=shots.starts.method,
         bound=Bound.UPPER,
-        numerical_error=error,
+        numerical_error=math.nan,
         path=path,
     )
+
+
+def _with_error(shots: Shots, branch: Branch, energy: ActivationEnergy) -> ActivationEnergy:
+    """Return the energy of an exit path with its numerical error, which takes a second integration.
+
+    It is the sum of what further refinement (for the ring: more points) and finer steps may change, and of the action
+    between the last two exit tests, because the path leaves between them.
+    """
+    assert energy.path is not None
+    checked = _check_error(shots, energy.path, energy.value, _per_check(shots))
+    error = _search_error(shots, branch) + _step_error(shots, branch) + checked
+    return dataclasses.replace(energy, upper=upper_bound(energy.value, error), numerical_error=error)
+
+
+def _per_check(shots: Shots) -> int:
+    """Samples of a path from one exit test to the next."""
+    return math.ceil(_SAMPLES / shots.shooter.problem.checks)
 
 
 def _search_error(shots: Shots, branch: Branch) -> float:

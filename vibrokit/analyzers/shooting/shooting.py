@@ -20,6 +20,7 @@ from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.stoppable import Stoppable
 from vibrokit.symbolic.flow_kind import Flow
 
 _MOST_PERIODS = 10**8
@@ -99,16 +100,12 @@ class Shooting(metaclass=Constructed):
         intervals = growing_time(slowest, problem.attractor.period, starts.growth)
         budget, points = self.budget or default_budget(intervals), self.points or _affordable(intervals)
         rounds = 0 if self.radius is not None else self.rounds
-        interrupt = None
         with stage(FINDER, unit=TRAJECTORIES, total=None if rounds else points):
             shots = Shots.over(starts, Shooter(problem, stepper, budget), Boxes.grid(starts.grid(points)))
-            try:
+            with Stoppable(FINDER, problem.source) as refining:
                 for refined in shots.refinements(rounds, self.tolerance):
                     shots = refined
-            except KeyboardInterrupt as stopped:
-                interrupt = stopped
-            found = Search.of(shots)
-        return found if interrupt is None else found.stopped(interrupt)
+            return Search.of(shots, refining)
 
     def _starts(self, problem: ExitProblem, stepper: Stepper) -> Starts:
         if self.radius is None:

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.shooting.boxes import Boxes
 from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.starts import Starts
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, LEFT_REGION, STALLED
+from vibrokit.kernels.stopping import COMPLETED, DIVERGED, GRAZED, LEFT_BASIN, LEFT_REGION, STALLED
 
 _PART = 4  # a round adds the points of the first grid divided by this
 _CERTAIN = 1.5  # times the least action of a target, up to which all exits are confirmed
 
-_STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED)
-_MEANINGS = "remaining left_region left_basin diverged stalled"
+_STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED, GRAZED)
+_MEANINGS = "remaining left_region left_basin diverged stalled grazed"
 _ATTRIBUTES: dict[str, dict[str, object]] = {
     "angle": {"units": "rad", "long_name": "angle of the start"},
     "radius": {"units": "1", "long_name": "fraction of the logarithmic distance between the domain's edges"},
@@ -102,8 +102,13 @@ class Shots:
             "escaped": int(np.sum(escaped)),
             "left_region": int(np.sum((status == LEFT_REGION) & ~escaped)),
             "remaining": int(np.sum(status == COMPLETED)),
-            "diverged": int(np.sum(np.isin(status, (DIVERGED, STALLED)))),
+            "diverged": int(np.sum(status == DIVERGED)),
         }
+
+    @property
+    def unfinished(self) -> int:
+        """Paths that needed too many steps, or grazed a stop whose force jumps."""
+        return int(np.sum(np.isin(self.outcomes.status, (STALLED, GRAZED))))
 
     def dataset(self) -> xarray.Dataset:
         """Return the arrays of `ActionPlotResult.data`."""

@@ -17,9 +17,9 @@ from scipy.spatial import cKDTree
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED
+from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.basins import ESCAPED, UNSETTLED
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.survival import Survival
 from vibrokit.structure.basins.landings import landed
 from vibrokit.structure.circle import advanced, turn_of, wrapped
@@ -47,14 +47,19 @@ def follow(
     """Follow starts (count, n) on the section until they arrive at a known orbit, or for some periods.
 
     Returned are where they end, after how many periods, and the labels of the arrival test; UNSETTLED where no orbit
-    was reached, ESCAPED where the motion diverged. Where x repeats, motion is moved back by whole turns.
+    was reached, ESCAPED where the motion diverged, NOT_FOLLOWED where it needs too many steps. Where x repeats, motion
+    is moved back by whole turns.
     """
     if turn_of(osc):
         return _follow_on_circle(osc, states, stop, periods, stepper, executor)
     ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
-    without = np.where(ended.status == COMPLETED, UNSETTLED, ESCAPED)
-    labels = np.where(np.isin(ended.status, (REACHED, LEFT_BASIN)), ended.label, without)
-    return ended.states, ended.intervals, labels
+    arrived = np.isin(ended.status, (REACHED, LEFT_BASIN))
+    return ended.states, ended.intervals, np.where(arrived, ended.label, _without(ended.status))
+
+
+def _without(status: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Labels of motion that has not arrived, by how it ended."""
+    return np.select([status == COMPLETED, status == STALLED], [UNSETTLED, NOT_FOLLOWED], ESCAPED)
 
 
 def _follow_on_circle(
@@ -72,7 +77,7 @@ def _follow_on_circle(
         ended, _turns = advanced(osc, stepper, here[alive], executor=executor)
         here[alive] = ended.states
         intervals[alive] += 1
-        labels[alive] = np.where(ended.status == COMPLETED, landed(stop, ended.states), ESCAPED)
+        labels[alive] = np.where(ended.status == COMPLETED, landed(stop, ended.states), _without(ended.status))
         alive = alive[labels[alive] == UNSETTLED]
         if not alive.size:
             break
@@ -93,23 +98,25 @@ def watch(
 
     The watch ends when all have arrived at a known orbit or diverged, after `longest` periods, or when the survivors
     together have gone on for `exposure` periods since the last one settled: transients with a mean lifetime below a
-    third of that would have settled once in that time with a probability of 95 %.
+    third of that would have settled once in that time with a probability of 95 %. Starts that need too many steps on
+    the way are left out.
     """
     here, settled_after = np.array(states, dtype=float), np.full(len(states), -1, dtype=np.int64)
-    alive, periods = np.arange(len(states)), 0
+    alive, periods, stalled = np.arange(len(states)), 0, np.empty(0, dtype=np.int64)
     while alive.size:
         quiet = periods - max(0, int(settled_after.max()))
         stretch = min(longest - periods, math.ceil(exposure / alive.size) - quiet)
         if stretch <= 0:
             break
         here[alive], intervals, labels = follow(osc, here[alive], stop, stretch, stepper, executor)
-        settled = labels != UNSETTLED
-        settled_after[alive[settled]] = periods + intervals[settled]
-        alive, periods = alive[~settled], periods + stretch
+        settled_after[alive] = np.where(labels == UNSETTLED, -1, periods + intervals)
+        stalled = np.append(stalled, alive[labels == NOT_FOLLOWED])
+        alive, periods = alive[labels == UNSETTLED], periods + stretch
+    settled_after = np.delete(settled_after, stalled)
     lifetime, error = fit_decay(settled_after, periods)
     survival = Survival(
         stepper=str(stepper),
-        starts=len(states),
+        starts=len(settled_after),
         periods=periods,
         survivors=len(alive),
         lifetime=lifetime,

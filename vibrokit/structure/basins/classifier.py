@@ -96,7 +96,8 @@ class BasinClassifier:
         """Return the label of the attractor that each state (count, n), at a start time (s), leads to.
 
         It is UNSETTLED where the budget was spent inside the region, ESCAPED where it was spent outside, where the
-        motion diverged, or where it came to a copy of an attractor.
+        motion diverged, or where it came to a copy of an attractor. Motion that needs too many steps in a section
+        interval spends its budget there.
         """
         found = np.full(len(states), NOT_FOLLOWED, dtype=np.int64)
         self.label(found, states, start_time)
@@ -183,6 +184,8 @@ class _Trajectories:
             self.turns += turns_to(osc, ended.states, self.middle).astype(np.int64)
             self.states = wrapped(osc, ended.states, self.middle)
             self.found[ended.status == DIVERGED] = ESCAPED
+            self.remaining[ended.status == STALLED] = 0
+            self.close()
 
     def follow(self, which: Whole, most: int) -> None:
         """Integrate some trajectories by at most so many sections, and note what they reach."""
