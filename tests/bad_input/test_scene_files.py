@@ -235,7 +235,6 @@ NO_TOML = {
     "nested arrays": b"x = " + b"[" * 40_000 + b"]" * 40_000,
     "nested tables": b"x = " + b"{a = " * 10_000 + b"1" + b"}" * 10_000,
     "control characters": b"natural_frequency = 1\x00\n",
-    "byte-order mark": "\ufeff".encode() + GOOD.encode(),
 }
 
 

@@ -40,10 +40,12 @@ def sweep(
     source: int | str | None = None,
     energies: bool = True,
     search: Sequence[float] | None = None,
+    region: Any = None,
+    cells: tuple[int, int] = (100, 100),
+    starts: tuple[int, int] = (24, 24),
     rng: int = 0,
     progress: Progress = None,
     time_limit: float | None = None,
-    **options: Any,
 ) -> Sweep:
     """Follow steady states, activation energies and mean exit times of a scene along values of one parameter.
 
@@ -66,13 +68,13 @@ def sweep(
         Whether to compute energies and mean times; a scene without noise has none.
     search : sequence of float, optional
         Those of the values at which exit paths are searched for, as of `energy_continuation`.
+    region, cells, starts
+        For the steady states, as of `continuation`.
     rng : int
     progress : bool or callable, optional
         As of `find_structure`.
     time_limit : float, optional
         In seconds.
-    **options
-        For `continuation`: ``region``, ``cells``, ``starts``, ``stepper``, ``executor``.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def sweep(
     paths: EnergyContinuation | None = None
     prefactors: list[Prefactor] = []
     with working(progress, time_limit) as work:
-        states = continuation(osc, parameter, values, rng=seed, **options)
+        states = continuation(osc, parameter, values, region=region, cells=cells, starts=starts, rng=seed)
         complete = states.complete
         if complete and energies and osc.noise is not None:
             try:
