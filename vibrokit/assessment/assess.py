@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -16,15 +15,15 @@ from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.analyzers.sgcm_wkb import SGCM
-from vibrokit.arguments import members, real
+from vibrokit.arguments import members
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known, Part
-from vibrokit.assessment.ladder import fitted, ladder
+from vibrokit.assessment.ladder import ladder
+from vibrokit.assessment.request import Request
 from vibrokit.construction import called
-from vibrokit.errors import ParameterError, SceneError, StructureError, VibrokitError, shown
+from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
-from vibrokit.registry import Group, load
+from vibrokit.progress import Progress, Work, stage, working
 from vibrokit.results.atomic import checked_target
 from vibrokit.results.codes import Code
 from vibrokit.results.files import load_result
@@ -36,70 +35,12 @@ from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.validation import check_belongs, check_means, seed_of
+from vibrokit.structure.validation import check_belongs
 
-METHODS = ("least-action", "mfet", "sgcm")
-"""Analyzers that an assessment runs, in this order, by their registered names."""
 TIME_LIMIT = 300.0
 """Default budget (s)."""
 
 _PATHS = 0.4  # share of the time left that least action may take when rates are wanted too
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Request:
-    """The checked arguments of an assessment.
-
-    Attributes
-    ----------
-    accuracy : float
-    time_limit : float or None
-    analyzers : dict of str to Analyzer
-        Fitted to the accuracy, by their registered names.
-    source : int, str or None
-    rng : int
-    executor : Executor or None
-    """
-
-    accuracy: float
-    time_limit: float | None
-    analyzers: dict[str, Analyzer]
-    source: int | str | None
-    rng: int
-    executor: Executor | None
-
-    @classmethod
-    def of(
-        cls,
-        osc: Oscillator,
-        *,
-        accuracy: float,
-        time_limit: float | None,
-        methods: Sequence[str] | None,
-        source: int | str | None,
-        exit: Exit,  # noqa: A002 - the name that analyzers use
-        rng: int,
-        executor: Executor | None,
-    ) -> Request:
-        """Check arguments; raises a VibrokitError."""
-        check_means(osc, None, executor)
-        if not 0 < real(accuracy) < 1:
-            raise ParameterError(f"accuracy must be above 0 and below 1, got {shown(accuracy)}.")
-        names = METHODS if methods is None else members(methods)
-        if not names:
-            raise ParameterError(f"methods must be names of analyzers, such as {METHODS!r}, got {shown(methods)}.")
-        if osc.noise is not None and not osc.noise.intensity > 0:
-            raise SceneError("the noise of the scene has the intensity 0, so nothing is left; give it a positive one.")
-        if source is not None and (not isinstance(source, str | Integral) or isinstance(source, bool) or source == ""):
-            raise ParameterError(f"source must be the label or the name of a state, got {shown(source)}.")
-        analyzers = {}
-        for name in names:
-            analyzers[name] = dataclasses.replace(fitted(load(Group.ANALYZERS, name, Analyzer)(), accuracy), exit=exit)
-            analyzers[name].check(osc)
-        return cls(
-            accuracy=float(accuracy), time_limit=checked_time_limit(time_limit), analyzers=analyzers, source=source,
-            rng=seed_of(rng), executor=executor,
-        )  # fmt: skip
 
 
 @called

@@ -47,9 +47,10 @@ def assess_scene(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     from vibrokit.analyzers.exits import LeaveBasin
     from vibrokit.analyzers.settings import named_exit
-    from vibrokit.assessment.assess import TIME_LIMIT, Request, assessed
+    from vibrokit.assessment.assess import TIME_LIMIT, assessed
     from vibrokit.assessment.durations import required_time, seconds_in
     from vibrokit.assessment.plausibility import plausibility
+    from vibrokit.assessment.request import Request
     from vibrokit.cli.interrupts import Interrupts
     from vibrokit.cli.run import source_of
     from vibrokit.progress import working
