@@ -160,8 +160,7 @@ class Work:
         self.began = time.perf_counter()
         self.deadline = math.inf if time_limit is None else self.began + time_limit
         self.interrupted = self.held = False
-        self._stopped = False
-        self._reason: type[KeyboardInterrupt] = Deadline  # what is raised after the deadline
+        self._stopped_by: type[KeyboardInterrupt] | None = None
         self.counts: Counter[str] = Counter()
         self.spent: defaultdict[str, float] = defaultdict(float)  # s, by stage
         self.stages: list[_Stage] = []
@@ -184,13 +183,13 @@ class Work:
     @property
     def over(self) -> bool:
         """Whether the work was stopped, or is to be at its next report."""
-        own = self._stopped or self.interrupted or time.perf_counter() > self.deadline
-        return own or (self.outer is not None and self.outer.over)
+        own = self.interrupted or time.perf_counter() > self.deadline
+        return own or self._stopped_by is not None or (self.outer is not None and self.outer.over)
 
     def stop_again(self) -> None:
         """Raise again what has stopped this work while work inside it was under way, which kept what it had found."""
-        if self._stopped:
-            raise self._reason
+        if self._stopped_by is not None:
+            raise self._stopped_by
         if self.outer is not None:
             self.outer.stop_again()
 
@@ -211,23 +210,20 @@ class Work:
             return
         if self.interrupted:
             self.interrupted = False
-            self.wind_up(KeyboardInterrupt())
+            self.wind_up()
             raise KeyboardInterrupt
         now = time.perf_counter()
         if now > self.deadline:
-            self.deadline, self._stopped = now + AFTERWARDS, True
-            raise self._reason
+            self.deadline, self._stopped_by = now + AFTERWARDS, self._stopped_by or Deadline
+            raise self._stopped_by
         if self.outer is not None:
             self.outer.check()
 
-    def wind_up(self, reason: BaseException) -> None:
-        """Leave the work, and that around it, a short time after Ctrl-C; a time limit has its own work do that."""
-        if isinstance(reason, Deadline | OutOfTime):
-            return
-        self._stopped, self._reason = True, KeyboardInterrupt
-        self.deadline = min(self.deadline, time.perf_counter() + AFTERWARDS)
+    def wind_up(self) -> None:
+        """Note Ctrl-C, which leaves this work and that around it `AFTERWARDS`."""
+        self.deadline, self._stopped_by = min(self.deadline, time.perf_counter() + AFTERWARDS), KeyboardInterrupt
         if self.outer is not None:
-            self.outer.wind_up(reason)
+            self.outer.wind_up()
 
     def close(self) -> None:
         """Add what was counted to the work around this one."""

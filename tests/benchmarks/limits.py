@@ -5,7 +5,7 @@ stopped. The longest such gap and the work after the limit are measured in proce
 on a busy machine. With ``--signal`` the command line runs in place of the calls, without a limit, and the signal comes
 at a random moment; ``interrupts.py`` compares what is printed and saved then. Usage:
 
-    python tests/benchmarks/limits.py [--seconds 2 10 25] [--signal INT or TERM] [--seed 0] [call] [scene]
+    python tests/benchmarks/limits.py [call] [scene] [--seconds 2 10 25] [--signal INT or TERM] [--seed 0]
 """
 
 import argparse
@@ -29,7 +29,7 @@ from vibrokit import progress
 
 OVER, GAP = 2.0, 1.0  # processor seconds: allowed after a limit, and between two looks at it
 _BUSY = 0.3  # of them, from which on it is noted what is done
-_HOPELESS = 90.0  # s after the limit, at which it is ended, and says what its threads do
+_HOPELESS = 300.0  # s after the limit, at which it is ended, and says what its threads do
 _SECOND = os.sysconf("SC_CLK_TCK")
 _NOISE = vk.WhiteNoise(intensity=1e-4)
 
@@ -123,10 +123,10 @@ RETURNS_NOTHING = {"trajectory", "ensemble"}
 ENDS_EARLY = (vk.errors.StructureError, vk.errors.SceneError)  # the scene has nothing to leave
 MAIN = "import sys; from vibrokit.cli import main; sys.exit(main())"
 COMMANDS = {  # of the command line, for signals
-    "structure": ["run", "--analyzer", "--"],
-    "assess": ["assess", "--time-limit", "0"],
+    "structure": ["run", "scene.toml", "--analyzer"],
+    "assess": ["assess", "scene.toml", "--time-limit", "0"],
     **{
-        name: ["run", "--analyzer", name, "--"]
+        name: ["run", "scene.toml", "--analyzer", name]
         for name in ("least-action", "action-graph", "action-plot", "sgcm", "mfet")
     },
 }  # fmt: skip
@@ -230,7 +230,7 @@ def signalled(call, name, number, moment):
     """Send a signal to the command line after some processor seconds; return whether it ends well, and how."""
     with tempfile.TemporaryDirectory() as folder:
         vk.save_scene(SCENES[name](), Path(folder) / "scene.toml")
-        command = [sys.executable, "-c", MAIN, *COMMANDS[call], "scene.toml", "--json", "-o", "r.nc"]
+        command = [sys.executable, "-c", MAIN, *COMMANDS[call], "--json", "-o", "r.nc"]
         process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         while process.poll() is None and used(process) < moment:
             time.sleep(0.02)

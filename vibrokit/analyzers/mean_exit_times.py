@@ -19,7 +19,7 @@ from vibrokit.analyzers.sgcm.stages import committor_stages
 from vibrokit.arguments import whole
 from vibrokit.errors import SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import stage
+from vibrokit.progress import put_off, stage
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -149,7 +149,8 @@ class MFET(Analyzer):
                     Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=intensity, reason=str(error))
                 )
             if work.stopped:
-                so_far = measurement.so_far()
+                with put_off():
+                    so_far = measurement.so_far()
                 measured += [] if so_far is None else [so_far]
                 break
         findings += work.findings

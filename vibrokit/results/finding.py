@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vibrokit.construction import Constructed
-from vibrokit.errors import OutOfTime, counted, shown
-from vibrokit.progress import Deadline
+from vibrokit.errors import counted, shown
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code, Severity
 
-INTERRUPT, TIME_LIMIT = "interrupt", "time limit"  # reasons for which work is stopped
 Value = float | int | str | bool | None | Sequence[float] | Sequence[int] | Sequence[str]
 
 
@@ -57,12 +55,6 @@ class Finding(metaclass=Constructed):
     def of(cls, code: Code, source: int | None = None, target: int | None = None, **values: Value) -> Finding:
         """Make a finding from its values."""
         return cls(code, source, target, values)
-
-    @classmethod
-    def stopped(cls, stage: str, reason: KeyboardInterrupt | OutOfTime, source: int | None = None) -> Finding:
-        """Make the finding that a stage was stopped, by the user or by a time limit."""
-        word = TIME_LIMIT if isinstance(reason, Deadline | OutOfTime) else INTERRUPT
-        return cls.of(Code.STOPPED, source, stage=stage, reason=word)
 
     @property
     def severity(self) -> Severity:

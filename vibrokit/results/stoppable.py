@@ -5,7 +5,8 @@ from __future__ import annotations
 from types import TracebackType
 
 from vibrokit.errors import OutOfTime
-from vibrokit.progress import current
+from vibrokit.progress import Deadline, current
+from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 
 
@@ -43,6 +44,9 @@ class Stoppable:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> bool:
         if not isinstance(error, KeyboardInterrupt | OutOfTime):
             return False
-        current().wind_up(error)
-        self.findings = (Finding.stopped(self.doing, error, self.source),)
+        limited = isinstance(error, Deadline | OutOfTime)
+        if not limited:
+            current().wind_up()
+        reason = "time limit" if limited else "interrupt"
+        self.findings = (Finding.of(Code.STOPPED, self.source, stage=self.doing, reason=reason),)
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -62,8 +62,8 @@ class Branch:
         return bool(near.size and np.median(near) <= _APART)
 
 
-def branches_of(shooter: Shooter, outcomes: Outcomes, ranked: Iterable[int]) -> tuple[Branch, ...]:
-    """Return the distinct paths among some confirmed exits, given in the order of their actions.
+def branches_of(shooter: Shooter, outcomes: Outcomes, ranked: Iterable[int]) -> Iterator[Branch]:
+    """Yield the distinct paths among some confirmed exits, given in the order of their actions.
 
     Of each target, at most 8 that cost at most three times the least action are kept.
     """
@@ -76,7 +76,7 @@ def branches_of(shooter: Shooter, outcomes: Outcomes, ranked: Iterable[int]) -> 
         branch = _branch(shooter, outcomes, int(index))
         if not any(branch.same(other) for other in known):
             found.append(branch)
-    return tuple(found)
+            yield branch
 
 
 def sampled(shooter: Shooter, outcomes: Outcomes, index: int, per_interval: int) -> tuple[Array, Array]:
@@ -129,7 +129,10 @@ class Search:
     def of(cls, shots: Shots, refining: Stoppable) -> Search:
         """Find the distinct exit paths among some shots, and whether these are all that were wanted."""
         problem = shots.shooter.problem
-        branches = branches_of(shots.shooter, shots.outcomes, shots.minima()[:_TRIED])
+        branches = list[Branch]()
+        with refining:  # whether or not it was stopped already
+            for branch in branches_of(shots.shooter, shots.outcomes, shots.minima()[:_TRIED]):
+                branches.append(branch)
         findings = [Finding.of(Code.SHOTS, problem.source, branches=len(branches), **shots.counts())]
         if shots.unfinished:
             count, paths = shots.unfinished, len(shots.outcomes.status)
@@ -141,7 +144,7 @@ class Search:
         elif shots.rounds:
             values = {"last": shots.starts.patience, "rounds": shots.rounds, "change": shots.change}
             findings.append(Finding(Code.REFINEMENT, problem.source, values=values))
-        return cls(shots, branches, (*findings, *refining.findings), complete=not refining.stopped)
+        return cls(shots, tuple(branches), (*findings, *refining.findings), complete=not refining.stopped)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -176,7 +179,8 @@ class Search:
         """All exit paths, the cheapest first; those that are not the best of their target have no numerical error."""
         known = {(energy.target, energy.value): energy for energy in self.estimates}
         found = ((branch, known.get((branch.candidate.target, branch.candidate.action))) for branch in self.branches)
-        return tuple(energy or _energy(self.shots, branch) for branch, energy in found)
+        with put_off():
+            return tuple(energy or _energy(self.shots, branch) for branch, energy in found)
 
 
 def _energy(shots: Shots, branch: Branch) -> ActivationEnergy:
