@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.klein_kramers import double_well_rate
 from tests.scenes import scene
+from vibrokit.analyzers.sgcm import cores
 from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
@@ -41,6 +43,36 @@ def test_the_limit_contains_the_certified_energy_if_the_target_is_not_metastable
     assert found.findings  # that the target is not metastable, or that the rates are uncertain
     for limit in found.energies:
         assert limit.lower <= energy <= limit.upper < 2 * energy
+
+
+@pytest.mark.parametrize(("length", "side"), [(1.0, "right"), (1e-3, "left")])
+def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side):
+    """The clear state, ΔU/D = 10 and 20: its basin has 1.4 % of the cells of the region."""
+    osc, simulated = one_sided(length, side), {4.2e-5: (12.96, 0.05), 2.1e-5: (23.41, 0.06)}  # by MFET, in periods
+    structure = vk.find_structure(osc, manifolds=False, cells=(100, 100), rng=0)
+    found = vk.SGCM(source="clear", intensities=tuple(D * length**2 for D in simulated)).run(osc, structure)
+    assert len(found.rates) == 2
+    for rate, (time, error) in zip(found.rates, simulated.values(), strict=True):
+        assert abs(-rate.log_value - math.log(osc.section_interval) - time) <= rate.log_error + 2 * error
+        assert rate.log_error < 0.6
+
+
+@pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), (0.5, 30)])
+def test_rates_are_exact_wherever_states_are_committed(damping, depth, monkeypatch):
+    """Also nearer to the basin's edge, farther from it, and in the core only: the exact rate is in the stated error."""
+    osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))
+    structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
+    intensity = damping / depth  # ΔU = 4ζ × 1/4
+    exact = double_well_rate(damping, intensity)
+    committed = []
+    for factor in (0.7, 1.0, 1e3):
+        monkeypatch.setattr(cores, "_COMMITTED", 5.0 * factor)
+        found = vk.SGCM(source=0, intensities=(intensity,), nodes=(100, 100)).run(osc, structure)
+        (rate,) = found.rates
+        assert abs(rate.log_value - exact) <= rate.log_error
+        assert rate.log_error < 0.15
+        committed.append(np.sum(found.data["log_committor"].values == 0))
+    assert committed[0] > committed[1] > committed[2]
 
 
 class Beyond(vk.LeaveRegion):

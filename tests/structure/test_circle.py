@@ -143,6 +143,20 @@ def test_copies_in_a_wide_region_are_told_apart():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("turns", [-1, 0.5])
+def test_a_libration_is_listed_in_the_turn_of_its_region(turns):
+    """At x = −2.407661 by an independent integration, or whole turns away."""
+    low = 2 * math.pi * turns - math.pi
+    osc = pendulum(vk.Harmonic(1.66, 1.0), damping=0.2)
+    found = vk.find_structure(
+        osc, region=((low, low + 2 * math.pi), (-4.0, 4.0)), cells=(16, 16), starts=(10, 10), saddles=False
+    )  # fmt: skip
+    (librating,) = (float(one.points[0, 0]) for one in found.attractors if not one.turns)
+    assert low < librating < low + 2 * math.pi
+    assert math.remainder(librating + 2.407661, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_forced_pendulum_librates_or_rotates_either_way():
     osc = pendulum(vk.Harmonic(1.66, 1.0), damping=0.2)

@@ -45,3 +45,20 @@ def test_a_weak_cycle_of_van_der_pol_counts_once():
     """Its amplitude is 2 + mu²/96; the units are those of a scene at 100 rad/s."""
     found = amplitudes("w2*x - mu*(1 - x**2)*v", starts=(6, 6), frequency=100.0, mu=0.5)
     assert found == pytest.approx([2.0], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("formula", "damping"),
+    [
+        ("x - mu*(1 - x**2)*v", 0.0),  # the multiplier of the cycle is exp(−2π mu)
+        ("x - mu*(1 - x**2 + 0.01*x**4)*v", 0.0),
+        ("mu*x/10 + mu*x**3", 0.05),  # x falls at the rate 0.1 mu/0.1, far more slowly than by the damping
+    ],
+)
+def test_cells_are_followed_as_long_as_the_slowest_deviation_takes(formula, damping):
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=damping, spring=vk.CustomSpring(formula, mu=0.002))
+    found = vk.find_structure(osc, region=((-3.0, 3.0), (-3.0, 3.0)), cells=(20, 20), starts=(6, 6), saddles=False)
+    (only,) = found.attractors
+    assert found.budget > 2000
+    assert only.basin_fraction == 1.0

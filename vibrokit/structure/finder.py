@@ -41,7 +41,7 @@ from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
 from vibrokit.structure.validation import Request
 from vibrokit.symbolic.flow_kind import Flow
 
-_FOLDS = 30  # e-foldings of the linear damping for a transient
+_FOLDS = 30  # e-foldings of the linear damping, or of the slowest deviation from an attractor, for a transient
 _LEAST_WAIT = 200
 _LONGEST_WAIT = 20_000
 _LIFETIMES = 5  # of chaotic transients for a cell
@@ -107,8 +107,10 @@ class Finder:
             raise StructureError(_none_inside(self.region, self.attractors))
         self._choose_stepper()
         lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
-        if self.request.budget is None and lifetimes:
-            self.budget = min(_LONGEST_WAIT, max(self.budget, math.ceil(_LIFETIMES * max(lifetimes))))
+        if self.request.budget is None:
+            slow = [_periods(self.osc, rate) for rate in map(_slowest_rate, self.attractors) if rate > 0]
+            waits = [self.budget, *slow, *(math.ceil(_LIFETIMES * lifetime) for lifetime in lifetimes)]
+            self.budget = min(_LONGEST_WAIT, max(waits))
 
     def _choose_stepper(self) -> None:
         """Choose a stepper with which every attractor persists, unless one is given."""
@@ -309,9 +311,22 @@ def _wait(osc: Oscillator) -> int:
             "attractors; give it damping."
         )
     slowest = rate if osc.damping_ratio < 1 else osc.natural_frequency / (2 * osc.damping_ratio)
-    if slowest == 0:
-        return _LEAST_WAIT
-    return min(_LONGEST_WAIT, _LEAST_WAIT + math.ceil(_FOLDS / (slowest * osc.section_interval)))
+    return _periods(osc, slowest) if slowest else _LEAST_WAIT
+
+
+def _periods(osc: Oscillator, rate: float) -> int:
+    """Return the periods in which deviations that fall at a rate (s⁻¹) are gone."""
+    return min(_LONGEST_WAIT, _LEAST_WAIT + math.ceil(_FOLDS / (rate * osc.section_interval)))
+
+
+def _slowest_rate(attractor: Attractor) -> float:
+    """Return the rate (s⁻¹) at which the slowest deviation from an orbit or an equilibrium falls; 0 for other sets."""
+    if not attractor.repeats:
+        return 0.0
+    rates = attractor.exponents.real
+    if attractor.kind == "limit cycle":  # a shift along it does not fall
+        rates = np.delete(rates, np.argmin(np.abs(rates)))
+    return float(-rates.max())
 
 
 def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.random.Generator) -> Array:

@@ -34,7 +34,8 @@ class DerivedContact:
     exponent : sympy.Expr or None
         Leading power of depth at first touch at non-zero rate; None if unknown.
     rooted : bool
-        True if the force is smooth in √depth but not in depth.
+        True if the force is not smooth in depth, so that its contacts are stepped in √time and √depth: those of a
+        force like depth^0.6 too, whose slope is infinite at touch.
     smooth : bool
         True if the force is smooth in depth or √depth, so that located contacts keep the full order of a stepper.
     values : mapping
@@ -59,6 +60,12 @@ class DerivedContact:
         """True if first derivatives of the force jump, at first touch or where the force is set to zero."""
         return self.clamped or self.jumps or _bends(self.law, self.values)
 
+    @property
+    def steep(self) -> bool:
+        """True if the slope of the force in depth is infinite at first touch."""
+        slope = _at_touch(sympy.diff(self.law, DEPTH), self.values)
+        return slope is not None and slope.has(sympy.oo, -sympy.oo, sympy.zoo)
+
 
 def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_frequency: float) -> DerivedContact:
     """Derive the formula and the properties of the law of a barrier in a scene of this natural frequency (s⁻¹).
@@ -80,7 +87,7 @@ def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_f
         jumps=jumps,
         clamped=not barrier.adhesive and not law.is_nonnegative,
         exponent=_leading_power(law),
-        rooted=smooth and not analytic,
+        rooted=not analytic,
         smooth=smooth,
         values=values,
     )

@@ -18,7 +18,7 @@ from vibrokit.symbolic.friction import refuse_friction
 from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.removable import without_removable
-from vibrokit.symbolic.roughness import refuse_rough
+from vibrokit.symbolic.roughness import Roughness, refuse_rough, roughness_of
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
 
 _SHARES = (0.0341, 0.2163, 0.4527, 0.6194, 0.8812)  # of a period, where a pulse seldom begins or ends
@@ -88,10 +88,17 @@ class Model:
         refuse_friction(spring, force, v, symbols, self.scene.natural_frequency)
         return force
 
+    @cached_property
+    def roughness(self) -> Roughness:
+        """Where the force of the spring is least smooth."""
+        if self.scene.spring is None:
+            return Roughness()
+        return roughness_of(self.scene.spring, self._spring_force, self.state[:2], self._symbols_of("spring"))
+
     def check_derivatives(self) -> None:
         """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under the spring."""
-        for variable in self.state[:2] if self.scene.spring is not None else ():
-            refuse_rough(self.scene.spring, self._spring_force, variable, self._symbols_of("spring"))
+        if self.scene.spring is not None:
+            refuse_rough(self.scene.spring, self._spring_force, self.roughness, self._symbols_of("spring"))
 
     @cached_property
     def excitations(self) -> tuple[sympy.Expr, ...]:

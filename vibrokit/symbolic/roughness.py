@@ -1,15 +1,16 @@
-"""Refuses derivatives of motion under forces of a spring that jump, or rise as steeply as a jump nearly."""
+"""Where the force of a spring jumps, or its slope is infinite."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import mpmath
 import sympy
 
 from vibrokit.errors import DerivationError
+from vibrokit.parts.part import Part
 from vibrokit.symbolic.friction import switches_of
 from vibrokit.symbolic.printer import as_text
 from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
@@ -17,38 +18,72 @@ from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_o
 _DRAWS = 8  # of the other variables and parameters
 _JUMP = 0.01  # power of the distance below which a change is a jump
 _ROOT = 0.499  # the same, of the root, with its rounding
+_KINK = 0.99  # the same, of a kink
 
 
-def refuse_rough(part: Any, force: sympy.Expr, variable: sympy.Symbol, values: Mapping[str, sympy.Expr]) -> None:
-    """Raise DerivationError if a force changes by less than the root of the distance from a switch in a variable.
+@dataclasses.dataclass(frozen=True)
+class Roughness:
+    """Where a force is least smooth.
 
-    Derivatives of the motion jump where a force does, and steppers locate that at stops only. Where the slope is
-    infinite they integrate it, to 1e-6 for √|x|; for |x|^0.2 they were off by 1e-3 to 2 at a tolerance of 1e-10.
-
-    Parameters
+    Attributes
     ----------
-    part : Part
-        The part whose force it is.
-    force : sympy.Expr
-        Its formula.
-    variable : sympy.Symbol
-        The position or the velocity.
-    values : mapping
-        The symbol of each parameter of the part.
+    power : float
+        Power of the distance with which the force changes there: 0 at a jump, below 1 where its slope is infinite.
+    switch : sympy.Expr
+        It is 0 there.
+    """
+
+    power: float = 1.0
+    switch: sympy.Expr = sympy.S.Zero
+
+    @property
+    def steep(self) -> bool:
+        """Whether the force jumps or its slope is infinite, so that fixed steps lose more order than at a kink."""
+        return self.power < _KINK
+
+
+def roughness_of(
+    part: Part, force: sympy.Expr, variables: Sequence[sympy.Symbol], values: Mapping[str, sympy.Expr]
+) -> Roughness:
+    """Find where a force of a part is least smooth in some variables.
+
+    `values` has the symbol of each parameter of the part. Those that are no exponents are drawn at random too, since
+    the same compiled code serves other values.
     """
     names = {symbol: name for name, symbol in values.items() if symbol in force.free_symbols}
     numbers = {symbol: float(part.parameters[name]) for symbol, name in names.items()}
-    others = sorted(force.free_symbols - {variable}, key=str)
-    value = sympy.lambdify([variable, *others], force, "mpmath", dummify=True)
     fixed = set().union(*(power.exp.free_symbols for power in force.atoms(sympy.Pow))) & set(numbers)
-    with mpmath.workdps(DIGITS):
+    least = Roughness()
+    for variable in variables:
+        others = sorted(force.free_symbols - {variable}, key=str)
+        value = sympy.lambdify([variable, *others], force, "mpmath", dummify=True)
         for switch in dict.fromkeys([*switches_of(force, variable), *_roots(force, variable)]):
             argument = sympy.lambdify([variable, *others], switch, "mpmath", dummify=True)
-            points = points_of(others, numbers, fixed, _DRAWS)
-            power = min(_power(value, argument, point) for point in points)
-            if power < _ROOT:
-                plain = {symbol: sympy.Symbol(name) for symbol, name in names.items()}
-                raise _refusal(part, as_text(force.xreplace(plain)), as_text(switch.xreplace(plain)), power)
+            with mpmath.workdps(DIGITS):
+                power = min(_power(value, argument, each) for each in points_of(others, numbers, fixed, _DRAWS))
+            least = min(least, Roughness(power, switch), key=lambda each: each.power)
+    return least
+
+
+def refuse_rough(part: Part, force: sympy.Expr, found: Roughness, values: Mapping[str, sympy.Expr]) -> None:
+    """Raise DerivationError if derivatives of the motion cannot be followed under a force.
+
+    They jump where a force does, and steppers locate that at stops only. Where the slope is infinite steppers
+    integrate it, to 1e-6 for √|x|; for |x|^0.2 they were off by 1e-3 to 2 at a tolerance of 1e-10.
+    """
+    if found.power >= _ROOT:
+        return
+    plain = {symbol: sympy.Symbol(name) for name, symbol in values.items()}
+    switch = as_text(found.switch.xreplace(plain))
+    what, advice = "jumps", "give the jump as stops with a constant law, whose touches are located, or in"
+    if found.power > _JUMP:
+        what, advice = "rises more steeply than the root of the distance", "give powers of 0.5 or more, or"
+    raise DerivationError(
+        f"{type(part).__name__}: the force {as_text(force.xreplace(plain))} {what} where {switch} = 0, and no stepper "
+        f"follows the derivatives of the motion across that, which orbits, their multipliers, saddles and exit paths "
+        f"need; {advice} a smooth form, such as tanh(({switch})/w) or (({switch})**2 + w**2)**(1/4) with a small "
+        "width w."
+    )
 
 
 def _roots(force: sympy.Expr, variable: sympy.Symbol) -> Iterator[sympy.Expr]:
@@ -75,14 +110,3 @@ def _power(value: Function, argument: Function, point: list[mpmath.mpf]) -> floa
             power = float(mpmath.log10(far / close) / mpmath.log10(NEAR / NEARER))
             least = min(least, power if power > -_JUMP else math.inf)
     return least
-
-
-def _refusal(part: Any, force: str, switch: str, power: float) -> DerivationError:
-    what, advice = "jumps", "give the jump as stops with a constant law, whose touches are located, or in"
-    if power > _JUMP:
-        what, advice = "rises more steeply than the root of the distance", "give powers of 0.5 or more, or"
-    return DerivationError(
-        f"{type(part).__name__}: the force {force} {what} where {switch} = 0, and no stepper follows the derivatives "
-        f"of the motion across that, which orbits, their multipliers, saddles and exit paths need; {advice} a smooth "
-        f"form, such as tanh(({switch})/w) or (({switch})**2 + w**2)**(1/4) with a small width w."
-    )

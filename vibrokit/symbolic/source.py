@@ -77,6 +77,13 @@ class SceneText:
         return self.jumps and self.flow not in (Flow.STATE, Flow.STATE_REVERSED, Flow.NOISY)
 
     @property
+    def steep(self) -> bool:
+        """Whether an integrated variable depends on an infinite slope of a force."""
+        if not (self.flow.has_derivatives or self.flow.has_momenta or self.flow.has_covariance):
+            return False
+        return self._model.roughness.steep or any(contact.steep for contact in self._model.contacts)
+
+    @property
     def preamble(self) -> str:
         """Module docstring and imports."""
         symbols = enumerate(self._model.symbols.items())
@@ -101,7 +108,7 @@ class SceneText:
                 "ROOTED": tuple(contact.rooted for contact in contacts),
                 "JUMPS": tuple(contact.jumps for contact in contacts),
             }
-        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders)}
+        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders), "ROUGH": self._model.roughness.steep}
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"

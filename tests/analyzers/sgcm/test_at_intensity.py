@@ -11,7 +11,7 @@ from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary
 
 NONE = np.empty((0, 0))
-CORES, POSITION = CoreSets(NONE, {1: NONE}, NONE, None), CoreSets(NONE, {}, NONE, -1)
+CORES, POSITION = CoreSets(NONE, {1: NONE}, NONE, None, NONE), CoreSets(NONE, {}, NONE, -1, NONE)
 DENSITY = QuasiStationary(NONE, NONE, {1: -9.0}, NONE, 0.0, 0.3, True, 0.0, 10)  # what it loses is no rate
 
 
@@ -32,8 +32,13 @@ def solved(own, coarser, fewer_steps, other_sets, **more):
 def test_the_rate_is_that_of_the_committor_and_other_cores_are_no_error_of_it():
     found = solved(-5.0, -5.1, -5.3, -4.6, change=0.01)
     assert found.log_rates == {1: -5.0}
-    np.testing.assert_allclose(found.changes(1), [0.1, 0.2, 0.5])
+    np.testing.assert_allclose(found.changes(1), [0.1, 0.2, 0.0, 0.5])
     assert found.errors[1] == pytest.approx(0.1 + 0.2 + 0.01)
+
+
+def test_what_returns_from_a_basin_is_an_error():
+    found = solved(-5.0, -5.1, -5.1, -5.1, nearer=committors(-5.07))
+    assert found.errors[1] == pytest.approx(0.1 + 0.03)
 
 
 def test_basins_known_by_cells_are_an_error():
@@ -48,7 +53,7 @@ def test_errors_of_the_second_to_the_fourth_order_are_stated_once_to_three_times
 
 
 def test_where_position_decides_there_are_no_other_sets():
-    assert solved(-5.0, -5.1, -5.1, None, cores=POSITION).changes(1)[2] == 0.0
+    assert solved(-5.0, -5.1, -5.1, None, cores=POSITION).changes(1)[3] == 0.0
 
 
 @pytest.mark.parametrize(

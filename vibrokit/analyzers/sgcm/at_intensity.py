@@ -23,6 +23,8 @@ FEWER = 1.5
 """Factor by which steps are longer in a third solution, at least: they are even."""
 LARGER = 1.5
 """Factor by which cores are larger, to see whether limits of weak noise depend on their size."""
+NEARER = math.sqrt(2.0)
+"""Factor by which states are committed nearer to the edge of a basin, to see whether some return from there."""
 _STEEPER = 1.1  # exponent with which depths grow as D falls: above the prefactors' share in hertz-0.570 at D = 1e-5
 
 Array = NDArray[np.float64]
@@ -58,6 +60,8 @@ class AtIntensity:
     sets_resolved : bool
         Whether the sets that absorb are as they are defined, so that others give another number. Otherwise what they
         change is an error: basins are known by cells.
+    nearer : mapping of int to Committor or None
+        On that grid, with states that are committed nearer to the edges of basins; None if none are by their basin.
     """
 
     intensity: float
@@ -70,6 +74,7 @@ class AtIntensity:
     fewer_steps: Mapping[int, Committor] = dataclasses.field(default_factory=dict)
     other_sets: Mapping[int, Committor] = dataclasses.field(default_factory=dict)
     sets_resolved: bool = True
+    nearer: Mapping[int, Committor] | None = None
 
     @property
     def log_rates(self) -> dict[int, float]:
@@ -79,20 +84,26 @@ class AtIntensity:
     @property
     def errors(self) -> dict[int, float]:
         """By target: error estimate of ln rate, the sum of the changes that are errors and of what iteration leaves."""
-        of_rates = slice(2 if self.sets_resolved else 3)
+        of_rates = slice(3 if self.sets_resolved else 4)
         return {
             target: float(np.abs(self.changes(target)[of_rates]).sum()) + known.change
             for target, known in self.committors.items()
         }
 
     def changes(self, target: int) -> Array:
-        """Return by how much ln rate changes in three ways, each with its sign, shape (3,); inf where not known.
+        """Return by how much ln rate changes in four ways, each with its sign, shape (4,); inf where not known.
 
-        They are nodes farther apart, fewer steps, and other sets that absorb.
+        They are nodes farther apart, fewer steps, states that are committed nearer to the edge of a basin, and other
+        cores or coarser basins.
         """
         coarse = _log_rate({} if self.coarser is None else self.coarser.committors, target)
         of_sets = _log_rate(self.other_sets, target) - coarse if self.cores.others else 0.0
-        found = [_log_rate(self.committors, target) - coarse, coarse - _log_rate(self.fewer_steps, target), of_sets]
+        found = [
+            _log_rate(self.committors, target) - coarse,
+            coarse - _log_rate(self.fewer_steps, target),
+            0.0 if self.nearer is None else coarse - _log_rate(self.nearer, target),
+            of_sets,
+        ]
         return np.nan_to_num(found, nan=math.inf, neginf=math.inf)
 
     @property

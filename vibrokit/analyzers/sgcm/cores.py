@@ -1,13 +1,19 @@
-"""Cores: sets around attractors in which a state has settled, and what the density around them needs."""
+"""Cores: sets around attractors in which a state has settled, and what the density around them needs.
+
+A state has also settled where noise does not bring it back: in another basin, farther from its edge than noise moves
+states around the attractors. So a grid need not cover another attractor whose basin is wider than that.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
 from vibrokit.analyzers.metastability import targets_at
 from vibrokit.analyzers.neighbourhoods import (
@@ -22,11 +28,15 @@ from vibrokit.analyzers.neighbourhoods import (
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor
+from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.region import Region
 
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
+# Deviations from the edge of a basin, beyond which a state in it counts as settled. Nearer by √2, ln of the rate from
+# the clear state of a one-sided Hertz stop (ζ = 0.03, ΔU/D = 10 and 20) changes by 0.006.
+_COMMITTED = 5.0
 _BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
 
 Array = NDArray[np.float64]
@@ -41,17 +51,21 @@ class CoreSets:
     own : array (nx, nv)
         How much of each cell belongs to the core of the attractor that is left.
     others : mapping of int to array (nx, nv)
-        By label: the same for the cores of others, or for their basins if those count; empty if position decides.
+        By label: the same for the cores of others with what is committed to them, or for their basins if those count;
+        empty if position decides.
     entry : array (nx, nv)
         ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
     outlet : int or None
         Target of what leaves by position, at any time; None if nothing does.
+    committed : array (nx, nv)
+        How much of each cell absorbs because of the basin that it is in.
     """
 
     own: Array
     others: Mapping[int, Array]
     entry: Array
     outlet: int | None
+    committed: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,21 +84,31 @@ class Cores:
         """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
         return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
 
-    def on(self, grid: DensityGrid, intensity: float, every: int = 1, larger: float = 1.0) -> CoreSets:
-        """Return the cores on a grid, larger by a factor; of basins, so many cells are made one."""
+    def on(
+        self, grid: DensityGrid, intensity: float, every: int = 1, larger: float = 1.0, nearer: float = 1.0
+    ) -> CoreSets:
+        """Return the cores on a grid, larger by a factor; of basins, so many cells are made one.
+
+        States are settled `nearer` to the edge of a basin by a factor: with 0 only in the core.
+        """
         size = larger * CORE_SIZE
         own = self._core(self.problem.attractor, grid, intensity, size)
         with np.errstate(divide="ignore"):
             entry: Array = self.start(grid, intensity) + np.log(own)
         outlet, targets = self.problem.outlet, self.problem.targets
         others: dict[int, Array] = {}
+        committed = np.zeros_like(own)
         if self.problem.exit.at_boundary:
             labels = [a.label for a in targets] + ([] if outlet is None else [outlet])
             others = {label: self._basin(label, grid, own, every) for label in labels}
+            committed = np.minimum(sum(others.values(), committed), 1.0)
         elif not self.problem.exit.by_position:
             settled = targets_at(self.problem, intensity) or targets  # exploration may take more noise than is wanted
             others = {a.label: self._core(a, grid, intensity, size) for a in settled}
-        return CoreSets(own, others, entry, outlet)
+            for label in others if nearer else ():
+                inner = self._inner(label, grid, own, _COMMITTED * math.sqrt(intensity) / nearer)
+                committed, others[label] = np.maximum(committed, inner), np.maximum(others[label], inner)
+        return CoreSets(own, others, entry, outlet, committed)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
@@ -136,6 +160,25 @@ class Cores:
         """How much of each cell belongs to the basin of another attractor or to escape, and not to the own core."""
         basins, problem = self.problem.structure.basins, self.problem
         covered = grid.covered(lambda states: basins.at(problem.on_turn(states), every) == label)
+        return np.minimum(covered, 1.0 - own)
+
+    def _inner(self, label: int, grid: DensityGrid, own: Array, deviations: float) -> Array:
+        """How much of each cell is in a basin, so far from its edge in units of the deviations that D = 1 makes.
+
+        Those are the largest around both attractors. Nothing is known of them if one never repeats.
+        """
+        basins, problem = self.problem.structure.basins, self.problem
+        pair = problem.attractor, problem.structure.attractors[label]
+        if not all(attractor.is_fixed for attractor in pair):
+            return np.zeros(grid.shape)
+        both = np.concatenate([self.covariances[attractor.label] for attractor in pair])
+        widths = deviations * np.sqrt(np.diagonal(both, axis1=1, axis2=2).max(axis=0))
+        cells = np.ptp(basins.region.bounds, axis=1) / basins.labels.shape
+        reach = np.ceil(np.minimum(widths / cells, basins.labels.shape)).astype(int)
+        beyond = ("wrap" if problem.turn else "constant", "constant")
+        inner = minimum_filter(basins.labels == label, tuple(2 * reach + 1), mode=beyond)
+        held = dataclasses.replace(basins, labels=np.where(inner, label, UNSETTLED))
+        covered = grid.covered(lambda states: held.at(problem.on_turn(states)) == label)
         return np.minimum(covered, 1.0 - own)
 
     def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:

@@ -117,9 +117,8 @@ def quasi_stationary(
     grid = transition.grid
     phi, rates, change, intervals = start - grid.mass(start), list[float](), np.inf, 0
     most, sets = most_intervals(relaxation), cores.others
-    areas = {target: float(np.log((covered * grid.areas).sum())) for target, covered in sets.items()}
-    if cores.outlet is not None:
-        areas[cores.outlet] = float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))
+    everywhere = float(np.log(np.broadcast_to(grid.areas, grid.shape).sum()))
+    levels: dict[int, float] = {}
     floor, level, drift = phi.max() - 2 * _BELOW, -np.inf, 0.0
     log_rates: dict[int, float] = {}
     highest = in_core = np.empty_like(phi)
@@ -135,17 +134,19 @@ def quasi_stationary(
             if cores.outlet is not None:
                 mass = float(np.logaddexp(mass, lost))
                 log_rates = {cores.outlet: lost - mass}
+                levels[cores.outlet] = lost - everywhere
             drift = float(np.expm1(mass))
             for target, covered in sets.items():
                 held = covered > 0
                 share = np.where(held, covered, 1.0) * ABSORBED
-                log_rates[target] = grid.mass(phi + np.log(share), held) - mass
+                leaving = phi + np.log(share)
+                log_rates[target] = grid.mass(leaving, held) - mass
+                levels[target] = grid.mass(leaving + phi, held) - grid.mass(leaving, held)
                 phi[held] += np.log1p(-share[held])
             kept = grid.mass(phi)
             phi, highest = phi - kept, highest - kept
             rates.append(max(log_rates.values()))
-            level = max(log_rates[target] - areas[target] for target in areas)
-            least = min(log_rates[target] - areas[target] for target in areas)
+            level, least = max(levels.values()) - kept, min(levels.values()) - kept
             if math.isfinite(level):  # otherwise nothing has reached an exit yet
                 floor = max(least, level - _RAREST) - _BELOW
             phi = np.where(empty, floor, np.maximum(phi, floor))
@@ -158,7 +159,7 @@ def quasi_stationary(
             intervals += 1
             change = remaining(rates, relaxation, crossed)
             advance()
-    resolved = {target: rate for target, rate in log_rates.items() if rate - areas[target] > floor + 0.5 * _BELOW}
+    resolved = {target: rate for target, rate in log_rates.items() if levels[target] - kept > floor + 0.5 * _BELOW}
     error = spread_of(rates, change)
     return QuasiStationary(phi, highest, resolved, in_core, level, error, change <= converged, drift, intervals)
 

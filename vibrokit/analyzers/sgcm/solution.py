@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.at_intensity import COARSER, FEWER, LARGER, AtIntensity, Unresolved
+from vibrokit.analyzers.sgcm.at_intensity import COARSER, FEWER, LARGER, NEARER, AtIntensity, Unresolved
 from vibrokit.analyzers.sgcm.committor import Committor, committor
 from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
@@ -101,6 +101,9 @@ class DensitySolver:
                 other_sets=self._with(coarser, coarser.transition, self._other_sets(coarser))
                 if coarser.cores.others
                 else {},
+                nearer=self._with(coarser, coarser.transition, self._nearer(coarser))
+                if coarser.cores.committed.any() and not self.problem.exit.at_boundary
+                else None,
             )
             yield before
 
@@ -119,6 +122,10 @@ class DensitySolver:
             return self._cores.on(known.grid, known.intensity, larger=LARGER)
         coarser = self._cores.on(known.grid, known.intensity, _EVERY)
         return dataclasses.replace(coarser, own=known.cores.own)
+
+    def _nearer(self, known: AtIntensity) -> CoreSets:
+        """Sets that absorb nearer to the edges of the basins."""
+        return self._cores.on(known.grid, known.intensity, nearer=NEARER)
 
     def _solved(self, flow: DensityFlow, before: AtIntensity, intensity: float) -> AtIntensity:
         """The density and the committors on the grid of a flow, begun from those of another one."""
@@ -159,14 +166,15 @@ class DensitySolver:
         for _ in range(_ZOOMS):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
             propagator = Propagator(self._flow(grid, self._fewer), stronger, self.problem.executor)
-            cores, start = self._cores.on(grid, stronger), self._cores.start(grid, stronger)
+            nearer = math.sqrt(stronger / intensity)  # as near as at the noise that is wanted
+            cores = self._cores.on(grid, stronger, nearer=nearer)
+            start = self._cores.start(grid, stronger)
             found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
             below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
             wanted = found.highest > min(found.level, found.highest.max()) - below
             if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
-                needed = cores if stronger == intensity else self._cores.on(grid, intensity)
-                for covered in needed.others.values():
-                    wanted |= covered > 0
+                for covered in self._cores.on(grid, intensity, nearer=0.0).others.values():
+                    wanted |= (covered > 0) & (cores.committed == 0)
             if self.problem.outlet is not None:
                 wanted |= propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted
             closer = self._grid(grid.around(wanted, _MARGIN), shape)
