@@ -144,6 +144,23 @@ def test_a_preloaded_orbit_grazes_where_an_independent_integration_touches_zero(
     assert path.y_events[0][:, 0].min() == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(("k", "c", "frequency", "side"), [(9.0, 1.0, 1.5, "right"), (20.0, 0.5, 2.0, "left")])
+def test_a_preloaded_dash_pot_lets_go_where_its_force_falls_to_zero(k, c, frequency, side):
+    """While it pushes, the scene is linear: the force k/(1 + k) at rest, and the amplitude |k + iωc| |X|."""
+    unit = 1 / (1 + k - frequency**2 + 1j * frequency * (0.2 + c))
+    lift_off = k / (1 + k) / abs((k + 1j * c * frequency) * unit)
+    law = vk.CustomLaw("k*depth + c*rate", k=k, c=c)
+    osc = pressed(law, side=side, amplitude=0.97 * lift_off, frequency=frequency)
+    response, sign = 0.97 * lift_off * unit, 1 if side == "right" else -1
+    state = sign * np.array([1 / (1 + k) + response.real, -frequency * response.imag])
+    followed = passed(osc, AMPLITUDE, state, sign * 1.03 * lift_off)
+    released, left = sorted(followed.bifurcations, key=lambda one: abs(one.value))  # depth reaches 0 later
+    assert {released.kind, left.kind} == {"grazing"}
+    assert released.value == pytest.approx(sign * lift_off, abs=1e-10)
+    assert abs(left.value) > lift_off + 5e-4
+    assert (released.side, released.bracketed, left.bracketed) == (side, False, False)
+
+
 def test_a_limit_cycle_in_contact_grazes_where_an_independent_integration_lifts_off():
     stop = vk.Barrier(vk.Linear(3.0), 0.0, "right")
     osc = rayleigh(excitations=(vk.Constant(1.0),), barriers=(stop,), m=0.25)

@@ -21,7 +21,7 @@ class Bifurcation:
     kind : str
         ``"fold"`` (the branch turns back), ``"pitchfork or transcritical"`` (another branch crosses it), ``"period
         doubling"``, ``"Neimark–Sacker"``, ``"Hopf"``, or ``"grazing"`` (one more turn of the orbit touches a stop, or
-        leaves it, or an equilibrium does).
+        leaves it or lets go of it, or an equilibrium does).
     value : float
         Of the parameter.
     error : float

@@ -13,6 +13,7 @@ from vibrokit.kernels.single import record
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.tracing.families import Family, Member
 from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.numeric import contact_force_of
 
 NEXT_TO = 1e-2
 """Distance from a surface, relative to the extent of the motion, within which a turn counts as next to it."""
@@ -29,59 +30,77 @@ class Surface:
     stop: int  # number of the stop
     leaving: bool  # whether motion reaches it from within the stop
 
-    def direction(self, osc: Oscillator) -> int:
-        """Return the direction of x in which motion passes the surface: 1 or −1."""
-        return -osc.barriers[self.stop].sign if self.leaving else osc.barriers[self.stop].sign
+    def reach(self, osc: Oscillator, path: Array, spacing: float) -> tuple[Array, Array]:
+        """Return how far beyond the surface the samples of a path are, negative short of it, and how fast it grows."""
+        barrier = osc.barriers[self.stop]
+        direction = -barrier.sign if self.leaving else barrier.sign
+        return direction * (path[:, 0] - barrier.position), direction * path[:, 1]
 
-    def reach(self, osc: Oscillator, x: Array) -> Array:
-        """Return how far beyond the surface positions are; negative short of it."""
-        return self.direction(osc) * (x - osc.barriers[self.stop].position)
+
+@dataclasses.dataclass(frozen=True)
+class Release(Surface):
+    """Where the force of a stop that does not pull falls to 0, as seen from within the stop."""
+
+    def reach(self, osc: Oscillator, path: Array, spacing: float) -> tuple[Array, Array]:
+        """Return minus the force (m s⁻²), −∞ outside the stop, and how fast that grows."""
+        barrier, force = osc.barriers[self.stop], contact_force_of(osc.model, self.stop)
+        depth, rate = barrier.sign * (path[:, 0] - barrier.position), barrier.sign * path[:, 1]
+        pushes = [force(one, speed) if one > 0 else math.inf for one, speed in zip(depth, rate, strict=True)]
+        reach = -np.array(pushes)
+        with np.errstate(invalid="ignore"):
+            return reach, np.gradient(reach, spacing, edge_order=2)
 
 
 def surfaces_of(osc: Oscillator) -> list[Surface]:
     """Return the surfaces of a scene's stops."""
-    return [Surface(stop, leaving) for stop in range(len(osc.barriers)) for leaving in (False, True)]
+    found = [Surface(stop, leaving) for stop in range(len(osc.barriers)) for leaving in (False, True)]
+    return found + [Release(stop, True) for stop, contact in enumerate(osc.model.contacts) if contact.clamped]
 
 
 def turns_at(family: Family, member: Member, scene: Oscillator, surfaces: Sequence[Surface]) -> dict[Surface, Array]:
     """Return how far beyond each surface of a scene a motion is at its turns towards it, the farthest first.
 
-    The unit is the extent of the motion in x. An equilibrium, which turns nowhere, has one reach, from outside, in
-    units of the family.
+    The unit is the extent of the reach, which is that of the motion in x, or of the force. An equilibrium, which turns
+    nowhere, has one reach, from outside, in units of the family.
     """
-    if family.kind == "equilibrium":
-        size, x = family.sizes[0], member.point[:1]
-        return {surface: surface.reach(scene, x) / size for surface in surfaces if not surface.leaving}
     osc = family.at(member.value)
+    if family.kind == "equilibrium":
+        place = member.point[None]
+        return {one: one.reach(scene, place, 0.0)[0] / family.sizes[0] for one in surfaces if not one.leaving}
     unit = min(osc.section_interval, 2 * math.pi / osc.natural_frequency)
     count = _SAMPLES * math.ceil(member.duration / unit - 1e-9)
     spacing = member.duration / count
     # A sample more, for a turn at the section itself.
     path = record(osc, Flow.STATE, family.stepper, member.point, 0.0, spacing, count + 1)
-    extent, found = float(np.ptp(path[:, 0])), {}
+    found = {}
     for surface in surfaces:
-        reaches: list[float] = []
-        for index, reach in _turns(path, spacing, scene, surface):
-            if index == count and reaches and _turns(path[:2], spacing, scene, surface):
+        reach, rate = surface.reach(scene, path, spacing)
+        known, reaches = reach[np.isfinite(reach)], list[float]()
+        extent = float(np.ptp(known)) if known.size else 0.0
+        for index, farthest in _turns(reach, rate, spacing):
+            if index == count and reaches and _turns(reach[:2], rate[:2], spacing):
                 continue
-            if abs(reach) < NEXT_TO * extent:
+            if abs(farthest) < NEXT_TO * extent:
                 finer = spacing / _FINER
                 closer = record(osc, Flow.STATE, family.stepper, path[index], index * spacing, finer, _FINER)
-                reach = max((finer_reach for _, finer_reach in _turns(closer, finer, scene, surface)), default=reach)
-            reaches.append(reach / extent)
+                again = _turns(*surface.reach(scene, closer, finer), finer)
+                farthest = max((each for _, each in again), default=farthest)
+            reaches.append(farthest / extent)
         found[surface] = np.sort(reaches)[::-1]
     return found
 
 
-def _turns(path: Array, spacing: float, scene: Oscillator, surface: Surface) -> list[tuple[int, float]]:
-    """Where a path turns back from a surface: the sample before, and the reach by the cubic through both samples."""
-    reach, rate = surface.reach(scene, path[:, 0]), surface.direction(scene) * path[:, 1]
+def _turns(reach: Array, rate: Array, spacing: float) -> list[tuple[int, float]]:
+    """Where a reach is largest: the sample before, and its value by the cubic through both samples."""
     found = []
-    for index in np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0)):
-        rise, before, after = reach[index + 1] - reach[index], spacing * rate[index], spacing * rate[index + 1]
-        # Reach along the step is the cubic r + before·s + bend·s² + twist·s³; it is stationary at the root in (0, 1].
-        bend, twist = 3 * rise - 2 * before - after, before + after - 2 * rise
-        root = before / (math.sqrt(max(bend * bend - 3 * twist * before, 0.0)) - bend)
-        root = min(max(root, 0.0), 1.0) if math.isfinite(root) else 0.5
-        found.append((int(index), float(reach[index] + root * (before + root * (bend + root * twist)))))
+    for index in np.flatnonzero((rate[:-1] > 0) & np.isfinite(rate[:-1]) & (rate[1:] <= 0)):
+        farthest = float(max(reach[index], reach[index + 1]))
+        if np.isfinite(rate[index + 1]):  # not where the motion leaves the stop
+            rise, before, after = reach[index + 1] - reach[index], spacing * rate[index], spacing * rate[index + 1]
+            # The cubic r + before·s + bend·s² + twist·s³ along the step is stationary at the root in (0, 1].
+            bend, twist = 3 * rise - 2 * before - after, before + after - 2 * rise
+            root = before / (math.sqrt(max(bend * bend - 3 * twist * before, 0.0)) - bend)
+            root = min(max(root, 0.0), 1.0) if math.isfinite(root) else 0.5
+            farthest = float(reach[index] + root * (before + root * (bend + root * twist)))
+        found.append((int(index), farthest))
     return found
