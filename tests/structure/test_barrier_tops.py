@@ -74,3 +74,26 @@ def test_a_libration_is_recorded_where_its_points_are():
     np.testing.assert_allclose(libration.orbit[0], libration.points[0], atol=1e-9)
     assert np.abs(libration.orbit[:, 0]).max() < 0.01
     assert not structure.found(Code.TOPS_OUTSIDE)
+
+
+@pytest.mark.parametrize(
+    ("formula", "values", "force"),
+    [
+        ("x + a*sin(3*x)", {"a": 8.0}, lambda x: x + 8 * np.sin(3 * x)),  # the outermost wells are 0.13 wide
+        pytest.param(
+            "k*x + a*sin(n*x)",
+            {"a": 8.0, "k": 1e3, "n": 3e3},
+            lambda x: 1e3 * x + 8 * np.sin(3e3 * x),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param("x + 12*sin(4*x) - 1", {}, lambda x: x + 12 * np.sin(4 * x) - 1, marks=pytest.mark.slow),
+    ],
+)
+def test_all_wells_of_the_region_that_tops_widen_are_found(formula, values, force):
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring(formula, **values))
+    found = vk.find_structure(osc, rng=0, cells=(40, 40), saddles=False)
+    places = np.linspace(*found.region.x, 1_000_003)
+    wells = places[1:][(force(places[:-1]) <= 0) & (force(places[1:]) > 0)]
+    assert sorted(one.points[0, 0] for one in found.attractors) == pytest.approx(
+        wells, abs=2e-6 * np.ptp(found.region.x)
+    )

@@ -102,6 +102,7 @@ class Finder:
         self.search.run(starts, self.budget, self.budget >= self.wait)
         if not self.search.attractors:
             raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
+        self._add_rests()
         self._order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
             raise StructureError(_none_inside(self.region, self.attractors))
@@ -111,6 +112,15 @@ class Finder:
             slow = [_periods(self.osc, rate) for rate in map(_slowest_rate, self.attractors) if rate > 0]
             waits = [self.budget, *slow, *(math.ceil(_LIFETIMES * lifetime) for lifetime in lifetimes)]
             self.budget = min(_LONGEST_WAIT, max(waits))
+
+    def _add_rests(self) -> None:
+        """Add the equilibria of the region around what was found, which may be wider than that of the search."""
+        (low, high), widened = self.searched.x, self.osc.autonomous and self.region is None
+        for _ in range(_WIDENINGS * widened):
+            low, high = min(low, self.frame.x[0]), max(high, self.frame.x[1])
+            if (low, high) == self.searched.x or not self.search.add_rests(low, high):
+                return
+            del self.frame
 
     def _choose_stepper(self) -> None:
         """Choose a stepper with which every attractor persists, unless one is given."""
@@ -168,6 +178,7 @@ class Finder:
             self.attractors = ()
             for cached in ("frame", "settling"):
                 vars(self).pop(cached, None)
+            self._add_rests()
             self._order()
             self._choose_stepper()
         self._fill_grid()

@@ -91,9 +91,7 @@ class Search:
         self.starts, self.unsettled = len(states), states
         with stage("attractors", unit="starts", total=self.starts):
             if self.osc.autonomous:  # then starts need not be followed until they rest, which is long on stiff stops
-                self.at_rest = tuple(equilibria(self.osc, *self.region.x))
-                for rest in self.at_rest:
-                    self._add_orbit(rest.point, 1)
+                self.add_rests(*self.region.x)
             else:
                 for start in known_motions(self.osc, self.region):
                     self._add_orbit(start, 1)
@@ -107,6 +105,14 @@ class Search:
             elif patient or self.attractors:
                 self._watch(states)
             report(self.starts)
+
+    def add_rests(self, low: float, high: float) -> bool:
+        """Add the stable equilibria between two places (m); return whether some were not known."""
+        known = len(self.attractors)
+        self.at_rest = tuple(equilibria(self.osc, low, high))
+        for rest in self.at_rest:
+            self._add_orbit(rest.point, 1)
+        return len(self.attractors) > known
 
     def go_on(self, states: Array, wait: int) -> bool:
         """Follow more states; return whether some come to an attractor that was not known."""
