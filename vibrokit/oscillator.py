@@ -292,7 +292,7 @@ class Oscillator(Scene):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
-_NO_VALUE = "where a force has no value: a formula is 0/0 there, or infinite; write it without that division."
+_NO_VALUE = "where a force has no value: a formula is 0/0 there, infinite or not real; write it without that division."
 _AT_BORDER = "no motion goes on from there: start elsewhere, follow it for a shorter time, or put a stop before it."
 
 

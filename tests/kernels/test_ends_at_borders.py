@@ -175,3 +175,12 @@ def test_a_start_where_the_forces_have_no_value_is_refused(formula, start, borde
             moved()
         assert caught.value.time == 0.0
         assert border in str(caught.value)
+
+
+@pytest.mark.parametrize("formula", ["x + b**1.5", "x*b**n"])
+def test_a_formula_without_a_real_value(formula):
+    spring = vk.CustomSpring(
+        formula, **{name: value for name, value in {"b": -2.0, "n": 0.25}.items() if name in formula}
+    )
+    with pytest.raises(IntegrationError, match="no value"):
+        scene(spring=spring).trajectory((0.1, 0.2), periods=1)

@@ -76,7 +76,8 @@ def outputs(
     points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
     kept = np.zeros((count, visits, 5))
     kernel.advance(
-        states, theta() if values is None else values, 0.0, interval, np.array([tolerance, limit, cycle, 1.0, span]),
+        states, theta() if values is None else values, 0.0, interval,
+        np.array([tolerance, limit, cycle, 1.0, span, np.inf]),
         np.zeros((count, 0), dtype=np.uint64), np.zeros((0, 2)),
         np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, 0.0,
         out, done, status, label, kept,

@@ -1,5 +1,6 @@
 """Motion that needs too many steps is told apart from motion that diverges, and states that vanish are neither."""
 
+import cmath
 import math
 
 import pytest
@@ -25,6 +26,20 @@ def test_friction_that_nearly_jumps_is_named(formula):
     assert caught.value.friction
     assert caught.value.time_scale == pytest.approx(1e-11, rel=0.6)
     assert all(map(math.isfinite, caught.value.state))
+
+
+@pytest.mark.parametrize(("stiffness", "damping", "tolerance"), [(1e8, 5105.0, 1e-12), (1e9, 2e4, 1e-11)])
+def test_rest_on_a_stiff_table_is_followed(stiffness, damping, tolerance):
+    """A mass that rests on a shaken table moves as a linear oscillator; rounding where v = 0 leaves no step short."""
+    law = vk.CustomLaw("k*depth + c*rate", k=stiffness, c=damping)
+    scene = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.0, spring=vk.LinearSpring(0.0),
+        barriers=(vk.Barrier(law, 0.0, "left"),), excitations=(vk.Constant(-9.8), vk.Harmonic(5.0, 7.0)),
+    )  # fmt: skip
+    path = scene.trajectory((0.1, 0.0), duration=25.0, samples=4, stepper=vk.Order8(tolerance))
+    response = 5.0 * cmath.exp(7j * 25.0) / (stiffness - 49.0 + 7j * damping)
+    assert path.x[-1] == pytest.approx(-9.8 / stiffness + response.real, rel=1e-9)
+    assert path.v[-1] == pytest.approx((7j * response).real, rel=1e-5)
 
 
 def test_motion_to_infinity_in_a_finite_time_names_no_force():

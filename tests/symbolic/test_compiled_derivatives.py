@@ -112,6 +112,10 @@ def quintic_with_damping(x, v):
     return -2 * mpf(0.03) * mpf(1.1) * v - (mpf(0.8) * x + mpf(0.3) * x**5 + mpf(0.2) * v**3 + mpf(0.1) * x**2 * v)
 
 
+def power_of_a_length(x, v):
+    return -2 * mpf(0.03) * mpf(1.1) * v + mpf(0.8) * abs(x / mpf(1.3)) ** mpf(2.5) * mpmath.sign(x)
+
+
 def duffing(x, v):
     return -2 * mpf(0.03) * mpf(1.1) * v - (mpf(-1.2) * x + mpf(0.7) * x**3)
 
@@ -154,6 +158,9 @@ CASES = {
             spring=vk.CustomSpring("a*x + b*x**5 + c*v**3 + d*x**2*v", a=0.8, b=0.3, c=0.2, d=0.1)
         ),
         quintic_with_damping, one, FREE,
+    ),
+    "power of a length": Case(
+        oscillator(spring=vk.CustomSpring("a*abs(x/b)**2.5*sign(x/b)", a=0.8, b=-1.3)), power_of_a_length, one, FREE,
     ),
     "varied noise": Case(
         oscillator(

@@ -45,9 +45,10 @@ class SGCM(Analyzer):
     exit rate follows from this density and the committor, see the notes.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
-    shape and the standard deviations of the density there, or 2.5 node spacings where that is more; or when it has
-    escaped from the region for good. With `LeaveBasin(for_good=False)` it has left when it is in another
-    basin on the section, and with an exit by position at the first time that satisfies the condition.
+    shape and the standard deviations of the density there, or 2.5 node spacings where that is more; when it is in
+    its basin, 10 standard deviations from the edge; or when it has escaped from the region for good. With
+    `LeaveBasin(for_good=False)` it has left when it is in another basin on the section, and with an exit by position at
+    the first time that satisfies the condition.
 
     Parameters
     ----------
@@ -76,7 +77,8 @@ class SGCM(Analyzer):
     that core, which the backward equation gives. The loss of the density in a section interval is the same rate, but
     less accurate where the density leaves in thin arms. The error estimate of ln of the rate is the whole change by a
     grid whose nodes are √2 times as far apart, plus the whole change by steps 1.5 times as long, plus the iteration
-    error, plus the change by basin cells twice as large if basins decide about exits. A rate depends on the cores if
+    error, plus the change by states that count as left √2 times nearer to the edge of a basin, plus the change by basin
+    cells twice as large if basins decide about exits. A rate depends on the cores if
     the attractors are not metastable. This is no error, because cores are defined; a finding reports it.
 
     An activation energy is the limit of D ln τ as D → 0, extrapolated from the mean times τ at two intensities or more.

@@ -15,6 +15,7 @@ from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
+from vibrokit.kernels.pulses import changes_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.excitation.constant import Constant
@@ -28,6 +29,7 @@ _STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscilla
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
+_PER_PULSE, _PER_RISE = 16, 4  # steps in a pulse of an excitation, and where it crosses its range
 _TOLERANCE = 1e-10
 LOCATED = Order8(1e-6)
 """For ensembles, wherever fixed steps would be too many."""
@@ -75,16 +77,19 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     if not isinstance(stepper, FixedSteps):
         return
     shortest = min((contact.duration for contact in contact_times(scene, flow)), default=math.inf)
-    taken = stepper.steps * shortest / scene.time_unit
-    if taken >= _TOO_FEW:
+    taken, needed = stepper.steps * shortest / scene.time_unit, _steps_of_changes(scene, flow)
+    if taken < _TOO_FEW:
+        problem = f"takes about {taken:.2g} steps in a contact with a stop, too few to follow it"
+    elif stepper.steps < needed / 2:
+        problem = "takes steps that are too long for the shortest pulse or the steepest rise of an excitation"
+    else:
         return
     steps = _power_of_two(_steps_needed(scene, flow))
     advice = f"take RK4(steps={steps})" if steps <= _MOST_NOISY_STEPS else f"it needs some {steps} steps"
     if flow is not Flow.NOISY:
-        advice += f", or {type(single_stepper(scene, flow)).__name__}, which locates contacts"
+        advice += f", or {type(single_stepper(scene, flow)).__name__}, which finds contacts and pulses"
     warnings.warn(
-        f"{type(stepper).__name__}(steps={stepper.steps}) takes about {taken:.2g} steps in a contact with a stop, too "
-        f"few to follow it; {advice}.",
+        f"{type(stepper).__name__}(steps={stepper.steps}) {problem}; {advice}.",
         CoarseStepsWarning,
         stacklevel=_frames_inside(sys._getframe()),
     )
@@ -93,10 +98,17 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
 def _steps_needed(scene: Scene, flow: Flow) -> float:
     unit = scene.time_unit
     turns = _turns(scene)
-    needed = max(_FEWEST_STEPS, _STEPS * min(1.0, 4.0 * turns), _PER_TURN * turns)
+    needed = max(_FEWEST_STEPS, _STEPS * min(1.0, 4.0 * turns), _PER_TURN * turns, _steps_of_changes(scene, flow))
     for contact in contact_times(scene, flow):
         needed = max(needed, _steps_per_contact(contact.exponent) * unit / contact.duration)
     return needed
+
+
+def _steps_of_changes(scene: Scene, flow: Flow) -> float:
+    """Steps that resolve the excitations; with noise, which no step resolves either, those that see each pulse."""
+    changes = changes_of(scene)
+    rises = 0.0 if flow is Flow.NOISY else _PER_RISE / changes.rise
+    return scene.time_unit * max(_PER_PULSE / changes.pulse, rises)
 
 
 def _turns(scene: Scene) -> float:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
 from vibrokit.kernels.jumps import EXTREMALS, LINEARIZED, MOMENTA, NOTHING
+from vibrokit.kernels.pulses import changes_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 FINEST, COARSEST = 1e-15, 1e-2
 MOST_STEPS = 200_000.0
 """In one interval; motion that needs more is given up."""
+_IN_PULSE = 3.0  # a step of so many pulses has a stage in each: no two of its nodes are farther apart than 0.27
 _JUMPING: Mapping[Flow, float] = {
     Flow.STATE_VARIATIONAL: LINEARIZED,
     Flow.LINEARISED: LINEARIZED,
@@ -50,13 +52,19 @@ class LocatedStepper(Stepper):
             )
 
     def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, most steps in an interval, intervals until the forcing repeats, 1/ω_n; 0: each begins anew."""
-        cycle = scene.intervals_in_period(interval)
-        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, 0.0
+        """Tolerance, most steps in an interval, intervals until the forcing repeats, 1/ω_n; 0: each begins anew.
+
+        The last is the longest step (s).
+        """
+        return self._settings(scene, scene.intervals_in_period(interval), 0.0)
 
     def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
         """The same, under a forcing that never repeats, and the time over which the motion goes on."""
-        return float(self.tolerance), MOST_STEPS, 0.0, 1.0 / scene.natural_frequency, spacing * samples
+        return self._settings(scene, 0, spacing * samples)
+
+    def _settings(self, scene: Scene, cycle: int, lapse: float) -> tuple[float, ...]:
+        longest = _IN_PULSE * changes_of(scene).pulse
+        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, lapse, longest
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes."""

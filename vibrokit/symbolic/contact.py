@@ -10,7 +10,7 @@ import sympy
 from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.formulas import derived_formula, exact
-from vibrokit.symbolic.friction import refuse_friction
+from vibrokit.symbolic.jumps import refuse_jumps
 
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
@@ -71,11 +71,11 @@ def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_f
     """Derive the formula and the properties of the law of a barrier in a scene of this natural frequency (s⁻¹).
 
     Signs of its parameters are known; a minimum or a maximum that they do not decide at touch is decided by values.
-    Raises DerivationError if the force is unbounded at first touch, or jumps in the rate.
+    Raises DerivationError if the force is unbounded at first touch, or jumps in the depth or the rate.
     """
     values = {symbol: exact(barrier.law.parameters[name]) for name, symbol in symbols.items()}
     law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
-    refuse_friction(barrier.law, law, RATE, symbols, natural_frequency)
+    refuse_jumps(barrier.law, law, (DEPTH, RATE), symbols, natural_frequency)
     law = law.xreplace({symbol: sympy.Integer(0) for symbol in values if symbol.is_zero})
     jumps = _jumps(law, values)
     _refuse_steep_touch(law, values)

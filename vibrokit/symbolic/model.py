@@ -14,7 +14,7 @@ from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
 from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
-from vibrokit.symbolic.friction import refuse_friction
+from vibrokit.symbolic.jumps import refuse_jumps
 from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
 from vibrokit.symbolic.removable import without_removable
@@ -77,7 +77,7 @@ class Model:
         omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
         spring = omega**2 * x if self.scene.spring is None else self._spring_force
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
-        push = derived_formula(self.scene.noise, "force", self._symbols_of("noise"), tuple(extra)) if extra else 0
+        push = self._noise_formula("force", tuple(extra)) if extra else 0
         return -2 * zeta * omega * v - spring + constant + push
 
     @cached_property
@@ -85,7 +85,7 @@ class Model:
         """Force of the spring that is given."""
         spring, symbols, (x, v) = self.scene.spring, self._symbols_of("spring"), self.state[:2]
         force = without_removable(derived_formula(spring, "force", symbols, (x, v)), (x, v))
-        refuse_friction(spring, force, v, symbols, self.scene.natural_frequency)
+        refuse_jumps(spring, force, (v,), symbols, self.scene.natural_frequency)
         return force
 
     @cached_property
@@ -145,7 +145,11 @@ class Model:
         noise, extra = self.scene.noise, self.state[2:]
         if noise is None or not extra:
             return ()
-        return derived_rates(noise, "drift", self._symbols_of("noise"), self.state, len(extra))
+        symbols = self._symbols_of("noise")
+        rates = derived_rates(noise, "drift", symbols, self.state, len(extra))
+        for rate in rates:
+            refuse_jumps(noise, rate, self.state, symbols, self.scene.natural_frequency)
+        return rates
 
     @cached_property
     def drift(self) -> sympy.Matrix:
@@ -181,6 +185,8 @@ class Model:
         met = next(((index, list(state)) for index, one in enumerate(borders) if one.excludes(place)), None)
         if met is None:
             rates = self.drift.subs(self.numbers | place | {self.time: time}).evalf()
+            if not all(rate.is_extended_real for rate in rates):  # at no state, or the state were at a border
+                return ""
             met = border_ahead(borders, self.state, state, [lapse * float(rate) for rate in rates])
         if met is None:
             return ""
@@ -208,10 +214,14 @@ class Model:
         """Column σ(q), the factor of √D dW."""
         column = [sympy.Integer(0)] * len(self.state)
         if self.scene.noise is not None:
-            column[-1 if len(self.state) > 2 else 1] = derived_formula(
-                self.scene.noise, "amplitude", self._symbols_of("noise"), self.state[:2]
-            )
+            column[-1 if len(self.state) > 2 else 1] = self._noise_formula("amplitude", self.state[:2])
         return sympy.Matrix(column)
+
+    def _noise_formula(self, method: str, state: tuple[sympy.Symbol, ...]) -> sympy.Expr:
+        symbols = self._symbols_of("noise")
+        formula = derived_formula(self.scene.noise, method, symbols, state)
+        refuse_jumps(self.scene.noise, formula, state, symbols, self.scene.natural_frequency)
+        return formula
 
     @cached_property
     def diffusion(self) -> sympy.Matrix:

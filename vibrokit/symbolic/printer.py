@@ -115,8 +115,15 @@ def _is_root(factor: sympy.Expr) -> bool:
 
 
 def printable(expression: sympy.Expr) -> sympy.Expr:
-    """Replace the step and delta functions that differentiation yields at kinks; compilers do not know them."""
+    """Replace the step and delta functions that differentiation yields at kinks; compilers do not know them.
+
+    SymPy leaves the derivative of sign(x/a) as it stands, where a might be 0.
+    """
     expression = expression.replace(sympy.DiracDelta, lambda *arguments: sympy.Integer(0))
+    expression = expression.replace(
+        lambda node: isinstance(node, sympy.Derivative) and isinstance(node.expr, sympy.sign),
+        lambda node: sympy.Integer(0),
+    )
     return expression.replace(sympy.Heaviside, lambda argument, *rest: sympy.Piecewise((1, argument > 0), (0, True)))
 
 

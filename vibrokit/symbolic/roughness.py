@@ -11,7 +11,7 @@ import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.part import Part
-from vibrokit.symbolic.friction import switches_of
+from vibrokit.symbolic.jumps import switches_of
 from vibrokit.symbolic.printer import as_text
 from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
 

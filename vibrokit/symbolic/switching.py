@@ -40,7 +40,11 @@ def points_of(
 
 
 def zeros_of(argument: Callable[[Any], mpmath.mpf]) -> Iterator[mpmath.mpf]:
-    """Speeds at which an argument changes its sign or is zero, as far as a grid shows them."""
+    """Where an argument changes its sign or is zero: exactly if it is linear, else as far as a grid shows it."""
+    zero, one, two = (argument(mpmath.mpf(number)) for number in range(3))
+    if one != zero and abs(two - 2 * one + zero) < NEARER**2 * abs(one - zero):
+        yield zero / (zero - one)
+        return
     signs = [mpmath.sign(argument(place)) for place in _GRID]
     yield from (place for place, sign in zip(_GRID, signs, strict=True) if sign == 0)
     for (low, high), (before, after) in zip(itertools.pairwise(_GRID), itertools.pairwise(signs), strict=True):

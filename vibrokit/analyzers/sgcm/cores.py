@@ -34,9 +34,9 @@ from vibrokit.results.region import Region
 _LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
 _DEVIATIONS = 5.0  # of the density around the orbit that the region covers
 _WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
-# Deviations from the edge of a basin, beyond which a state in it counts as settled. Nearer by √2, ln of the rate from
-# the clear state of a one-sided Hertz stop (ζ = 0.03, ΔU/D = 10 and 20) changes by 0.006.
-_COMMITTED = 5.0
+# Deviations from the edge of a basin, beyond which a state in it counts as settled. On hertz-0.570, ln of the rate from
+# the clear orbit changes by 0.003 at D = 5e-6; with 5 by 0.042 at D = 2e-5, since transients pass the edge again.
+_COMMITTED = 10.0
 _BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
 
 Array = NDArray[np.float64]

@@ -70,9 +70,9 @@ def press(i, lane, memory, pushing, theta, settings, lanes, room):
     now, x = of(STATE, CLOCK, lane, lanes), of(STATE, 0, lane, lanes)
     rate = side_of(i, theta) * of(STATE, 1, lane, lanes)
     course, sigma = course_of(i, lane, memory, pushing, theta, lanes, room)
-    remaining = memory[END] - now
-    last = course != ROOT_DEPTH and memory[CONTACT_STEP] >= 0.99 * remaining
-    length = length_of(course, sigma, remaining if last else memory[CONTACT_STEP], rate)
+    remaining, step = memory[END] - now, min(memory[CONTACT_STEP], settings[5])
+    last = course != ROOT_DEPTH and step >= 0.99 * remaining
+    length = length_of(course, sigma, remaining if last else step, rate)
     if course == ROOT_DEPTH and memory[DEEP] == 0.0:
         length *= NEAR_TURN
     memory[DEEP] = 1.0 if course == ROOT_DEPTH else 0.0

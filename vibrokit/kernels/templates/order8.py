@@ -44,8 +44,9 @@ from vibrokit.kernels.templates.steps import (
 def fly(lane, memory, pushing, theta, settings, lanes, room):
     """Ask for a step of the free motion."""
     remaining = memory[END] - of(STATE, CLOCK, lane, lanes)
-    last = memory[FREE_STEP] >= 0.99 * remaining
-    length = remaining if last else memory[FREE_STEP]
+    step = min(memory[FREE_STEP], settings[5])
+    last = step >= 0.99 * remaining
+    length = remaining if last else step
     return plan(TIME, 0.0, length, last, 0.0, np.inf, lane, memory, settings, lanes)
 
 

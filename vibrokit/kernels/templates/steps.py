@@ -179,16 +179,16 @@ def plan(course, sigma, length, last, grain, depth, lane, memory, settings, lane
 def shortened(error, factor, tiny, lane, memory, settings, lanes):
     """Length of the next attempt after one with too large an error; 0 if the attempt is taken.
 
-    It is taken, too, where shortening the step has not reduced its error, which is then rounding; the next step need
-    not be shorter than this one was at first. Tiny attempts count as many: next to a singular force time does not go
-    on, and motion ends after 2000 of them.
+    It is taken, too, where shortening the step has not reduced its error, which is then rounding; the next step may be
+    longer than this one was at first, lest motion crawls where rounding is all the error that is left. Tiny attempts
+    count as many: next to a singular force time does not go on, and motion ends after 2000 of them.
     """
     if tiny:
         memory[COUNT] += MORE
     if not (error > 1.0) or tiny:
         return 0.0
     if memory[MISSES] >= 2.0:
-        lanes[FACTOR + lane] = memory[FIRST] / lanes[LENGTH + lane]
+        lanes[FACTOR + lane] = 2.0 * memory[FIRST] / lanes[LENGTH + lane]
         return 0.0
     stuck = error > 0.8 * memory[BEFORE] and error * settings[0] < 1e-6
     memory[MISSES] = memory[MISSES] + 1.0 if stuck else 0.0

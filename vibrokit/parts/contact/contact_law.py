@@ -13,7 +13,8 @@ class ContactLaw(Part):
 
     `Barrier` holds side, position and sign, and sets the force to zero without contact; the formula is evaluated at
     positive depth only. Whether the law is conservative, how smooth it is at first touch, and whether its force jumps
-    there, is derived from the formula. A force that jumps in the rate is refused when the equations are derived.
+    there, is derived from the formula. A force that jumps in the rate, or at another depth, is refused when the
+    equations are derived.
     """
 
     variables: ClassVar[tuple[str, ...]] = ("depth", "rate")

@@ -15,7 +15,11 @@ class Excitation(Part):
 
     @abstractmethod
     def force(self, t: Any) -> Any:
-        """Force (m s⁻²) at time `t` (s), as a SymPy expression."""
+        """Force (m s⁻²) at time `t` (s), as a SymPy expression.
+
+        It may jump, and have pulses as short as 1/30 000 of its period; one that never repeats is searched for pulses
+        from t = 0 to 128 free oscillations.
+        """
 
     @property
     @abstractmethod

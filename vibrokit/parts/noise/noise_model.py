@@ -19,7 +19,8 @@ class NoiseModel(Part):
 
     For developers
     --------------
-    `amplitude` alone is a complete model. With `extra_states`, write `force` and `drift` as well.
+    `amplitude` alone is a complete model. With `extra_states`, write `force` and `drift` as well. None of them may jump
+    in a state; the derivation of the equations refuses that.
     """
 
     variables: ClassVar[tuple[str, ...]] = ("x", "v")

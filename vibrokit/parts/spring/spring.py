@@ -17,6 +17,7 @@ class Spring(Part):
     def force(self, x: Any, v: Any) -> Any:
         """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression.
 
-        It must not jump in `v`, as dry friction does: write f*tanh(v/w) for f*sign(v), with a small width w. The
-        derivation of the equations raises DerivationError otherwise.
+        It must not jump in `v`, as dry friction does: write f*tanh(v/w) for f*sign(v), with a small width w. Nor in
+        `x`: there, a stop may have the jump at first touch. The derivation of the equations raises DerivationError
+        otherwise.
         """

@@ -1,28 +1,40 @@
-"""Refuses forces that jump in the velocity, as dry friction does."""
+"""Refuses forces that jump in the state: in the velocity, as dry friction does, in the displacement, or in others."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mpmath
 import sympy
 
 from vibrokit.errors import DerivationError
+from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.spring.spring import Spring
 from vibrokit.symbolic.printer import as_text
 from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
 
+_WIDTH = 1e-3  # of the smooth form, in the velocity that the jump changes in a time of 1/ω_n
 _SWITCHES = (
     sympy.sign, sympy.Heaviside, sympy.floor, sympy.ceiling, sympy.frac, sympy.Mod, sympy.acot, sympy.atan2,
 )  # fmt: skip
-_WIDTH = 1e-3  # of the smooth form, in the velocity that the jump changes in a time of 1/ω_n
+
+_SPEEDS = ("v", "rate")
+_NOT_LOCATED = "and no stepper locates that, so multipliers and energies would be wrong"
 
 
-def refuse_friction(
-    part: Any, force: sympy.Expr, speed: sympy.Symbol, values: Mapping[str, sympy.Expr], natural_frequency: float
+def refuse_jumps(
+    part: Any,
+    force: sympy.Expr,
+    state: Sequence[sympy.Symbol],
+    values: Mapping[str, sympy.Expr],
+    natural_frequency: float,
 ) -> None:
-    """Raise DerivationError if a force jumps in `speed`, where motion may stick, which no stepper follows.
+    """Raise DerivationError if a force, or a rate or an amplitude of the noise, jumps in a variable of the state.
+
+    Motion may stick where it jumps in the velocity. Elsewhere derivatives of the motion and momenta jump too. Only
+    stops have their jumps located.
 
     A force can jump only where the argument of one of its switches vanishes: of a sign, a step, a condition, or a
     divisor. Its one-sided limits are compared there, at sixty digits, for the scene's own parameters and for random
@@ -34,13 +46,20 @@ def refuse_friction(
         The part whose force it is.
     force : sympy.Expr
         Its formula.
-    speed : sympy.Symbol
-        The velocity or the rate among the symbols of the formula.
+    state : sequence of sympy.Symbol
+        Displacement and velocity, or depth and rate, then extra states: the symbols in which it must not jump.
     values : mapping
         The symbol of each parameter of the part.
     natural_frequency : float
         ω_n (s⁻¹), for the width of the smooth form that the error suggests.
     """
+    for variable in sorted(state, key=lambda symbol: symbol.name not in _SPEEDS):  # friction is named first
+        _refuse(part, force, variable, values, natural_frequency)
+
+
+def _refuse(
+    part: Any, force: sympy.Expr, speed: sympy.Symbol, values: Mapping[str, sympy.Expr], natural_frequency: float
+) -> None:
     switches = switches_of(force, speed)
     if not switches:
         return
@@ -53,8 +72,11 @@ def refuse_friction(
         for switch in switches:
             argument = sympy.lambdify([speed, *others], switch, "mpmath", dummify=True)
             for point in points_of(others, numbers, fixed):
-                if _jump(value, argument, point) > 0:
-                    steps = [_jump(value, argument, each) for each in points_of(others, numbers, set(numbers), 3)]
+                if _jump(value, argument, point, speed.is_positive) > 0:
+                    steps = [
+                        _jump(value, argument, each, speed.is_positive)
+                        for each in points_of(others, numbers, set(numbers), 3)
+                    ]
                     plain = {symbol: sympy.Symbol(name) for symbol, name in names.items()}
                     raise _refusal(part, force.xreplace(plain), switch.xreplace(plain), speed, steps, natural_frequency)
 
@@ -69,6 +91,10 @@ def switches_of(force: sympy.Expr, speed: sympy.Symbol) -> list[sympy.Expr]:
             found += node.args
         elif isinstance(node, sympy.core.relational.Relational):
             found.append(node.lhs - node.rhs)
+        elif isinstance(node, sympy.tan | sympy.sec):  # an arc tangent makes a jump of a pole
+            found.append(sympy.cos(node.args[0]))
+        elif isinstance(node, sympy.cot | sympy.csc):
+            found.append(sympy.sin(node.args[0]))
         elif isinstance(node, sympy.Pow) and node.exp.is_nonnegative is not True:
             found.append(node.base.args[0] if isinstance(node.base, sympy.Abs) else node.base)
         if isinstance(node, sympy.floor | sympy.ceiling | sympy.frac | sympy.Mod):  # at 0 a factor may hide the jump
@@ -76,10 +102,15 @@ def switches_of(force: sympy.Expr, speed: sympy.Symbol) -> list[sympy.Expr]:
     return [each for each in dict.fromkeys(found) if speed in each.free_symbols]
 
 
-def _jump(value: Function, argument: Function, point: list[mpmath.mpf]) -> float:
-    """Largest jump of the force where the argument of a switch changes its sign, or is zero at rest; 0 for none."""
+def _jump(value: Function, argument: Function, point: list[mpmath.mpf], positive: bool | None) -> float:
+    """Largest jump of the force where the argument of a switch changes its sign, or is zero at rest; 0 for none.
+
+    Of a variable that is `positive` other values do not count.
+    """
     largest = 0.0
     for place in zeros_of(lambda speed: real_value(argument, speed, point)):
+        if positive and place <= 0:
+            continue
         sides = [
             (real_value(value, place - near, point), real_value(value, place + near, point))
             for near in (NEAR * (abs(place) or 1), NEARER * (abs(place) or 1))
@@ -92,19 +123,28 @@ def _jump(value: Function, argument: Function, point: list[mpmath.mpf]) -> float
 
 
 def _refusal(
-    part: Any, force: sympy.Expr, switch: sympy.Expr, speed: sympy.Symbol, steps: list[float], natural_frequency: float
+    part: Any,
+    force: sympy.Expr,
+    switch: sympy.Expr,
+    variable: sympy.Symbol,
+    steps: list[float],
+    natural_frequency: float,
 ) -> DerivationError:
     same = 0.0 < steps[0] < math.inf and math.isclose(min(steps), max(steps), rel_tol=1e-9)
-    width = sympy.Symbol(f"{_WIDTH * steps[0] / (2 * natural_frequency) if same else _WIDTH:.1g}")
+    fast = variable.name in _SPEEDS and not isinstance(part, NoiseModel)
+    unit = steps[0] / (2 * natural_frequency ** (1 if fast else 2)) if same else 1.0
+    width = sympy.Symbol(f"{_WIDTH * unit:.1g}")
     size = f" by {steps[0]:.6g}" if same else ""
-    smooth = _smooth(force, speed, width)
+    smooth = _smooth(force, variable, width)
     form = f"a smooth form, such as {as_text(smooth)}"
     if smooth == force:
         form = f"the jump as {as_text(sympy.tanh(switch / width))}"
+    reason = "as dry friction does, and no stepper holds a mass that sticks there" if fast else _NOT_LOCATED
+    other = "; a stop of a CustomLaw may have it at first touch" if isinstance(part, Spring) and not fast else ""
+    what = "formula" if isinstance(part, NoiseModel) else "force"
     return DerivationError(
-        f"{type(part).__name__}: the force {as_text(force)} jumps{size} where {as_text(switch)} = 0, as dry friction "
-        f"does, and no stepper holds a mass that sticks there; write {form}, with a width, here {width}, well below "
-        f"the velocities of interest."
+        f"{type(part).__name__}: the {what} {as_text(force)} jumps{size} where {as_text(switch)} = 0, {reason}; "
+        f"write {form}, with a width, here {width}, well below the values of {variable} of interest{other}."
     )
 
 

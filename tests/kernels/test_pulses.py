@@ -1,0 +1,121 @@
+"""Pulses and jumps of excitations are not stepped over: against SciPy, which starts anew at each of them."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import sympy
+from scipy.integrate import solve_ivp
+
+import vibrokit as vk
+from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper
+from vibrokit.kernels.pulses import changes_of
+from vibrokit.symbolic.flow_kind import Flow
+
+PERIOD, START = 7.0, (0.4, 0.2)
+
+
+class Blows(vk.Excitation):
+    """Rectangular blows of one impulse."""
+
+    impulse: float = vk.parameter("J", "m s^-1")
+    width: float = vk.parameter("w", "s", above=0)
+    repeat: float = vk.parameter("T", "s", above=0)
+
+    def force(self, t):
+        return self.impulse / self.width * sympy.Piecewise((1, sympy.Mod(t, self.repeat) < self.width), (0, True))
+
+    @property
+    def period(self):
+        return self.repeat
+
+
+class Bump(vk.Excitation):
+    """One smooth blow."""
+
+    impulse: float = vk.parameter("J", "m s^-1")
+    width: float = vk.parameter("w", "s", above=0)
+    when: float = vk.parameter("t_0", "s")
+
+    def force(self, t):
+        shape = sympy.exp(-(((t - self.when) / self.width) ** 2) / 2)
+        return self.impulse / self.width / sympy.sqrt(2 * sympy.pi) * shape
+
+    @property
+    def period(self):
+        return math.inf
+
+
+def beam(excitation, unit=1.0, **more):
+    """A stiffening beam of frequency 1, in a unit of time (s)."""
+    spring = vk.CubicSpring(1.0 / unit**2, 0.3 / unit**2)
+    rate = 1.0 / unit
+    return vk.Oscillator(natural_frequency=rate, damping_ratio=0.05, excitations=(excitation,), spring=spring, **more)
+
+
+def by_pieces(force, cuts):
+    """The end of the motion of the beam under a force of (time, number of the piece)."""
+    state = START
+    for piece, (begin, end) in enumerate(itertools.pairwise(cuts)):
+        solution = solve_ivp(
+            lambda t, y, piece=piece: [y[1], force(t, piece) - y[0] - 0.3 * y[0] ** 3 - 0.1 * y[1]],
+            (begin, end), state, method="DOP853", rtol=1e-12, atol=1e-13, max_step=(end - begin) / 20,
+        )  # fmt: skip
+        state = solution.y[:, -1]
+    return state
+
+
+def blown(width, periods):
+    cuts = [PERIOD * number + part for number in range(periods) for part in (0.0, width)]
+    return by_pieces(lambda _, piece: 0.5 / width if piece % 2 == 0 else 0.0, [*cuts, PERIOD * periods])
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+@pytest.mark.parametrize("width", [1.0, 0.01, 1e-3, 2e-4])
+def test_no_blow_is_missed(width, unit):
+    scene = beam(Blows(0.5 / unit, width * unit, PERIOD * unit), unit)
+    path = scene.trajectory((START[0], START[1] / unit), periods=3, samples=3)
+    assert np.allclose([path.x[-1], path.v[-1] * unit], blown(width, 3), rtol=0, atol=1e-7)
+
+
+def test_many_at_once_see_blows_and_jumps():
+    scene = beam(Blows(0.5, 0.01, PERIOD))
+    assert np.allclose(scene.section_map([START], 3)[0], blown(0.01, 3), rtol=0, atol=1e-4)
+    assert isinstance(ensemble_stepper(scene, Flow.STATE), vk.Order8)
+
+
+def test_blow_that_never_repeats():
+    scene = beam(Bump(0.5, 2e-2, 40.0))
+    bell = lambda t, _: 0.5 / 2e-2 / math.sqrt(2 * math.pi) * math.exp(-(((t - 40.0) / 2e-2) ** 2) / 2)  # noqa: E731
+    path = scene.trajectory(START, duration=50.0, samples=2)
+    assert np.allclose([path.x[-1], path.v[-1]], by_pieces(bell, [0.0, 39.8, 40.2, 50.0]), rtol=0, atol=1e-7)
+
+
+def test_blow_is_seen_through_contact():
+    """A mass that is at rest in a soft stop takes long steps there too."""
+    stop = vk.Barrier(vk.Linear(1.0), -5.0, "right")  # the mass never leaves it
+    scene = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=1.0, barriers=(stop,), excitations=(Blows(0.5, 0.01, PERIOD),),
+        spring=vk.LinearSpring(0.0),
+    )  # fmt: skip
+    state = np.array([-5.0 + 0.2, 0.0])
+    end = scene.trajectory(state, periods=3, samples=3)
+    expected = np.array([0.2, 0.0])
+    for span, force in ((0.01, 50.0), (PERIOD - 0.01, 0.0)) * 3:
+        place = np.array([force, 0.0])  # where the mass would rest
+        grow = math.exp(-span) * np.array([[1 + span, span], [-span, 1 - span]])
+        expected = place + grow @ (expected - place)
+    assert np.allclose([end.x[-1] + 5.0, end.v[-1]], expected, rtol=0, atol=1e-7)
+
+
+def test_coarse_steps_are_warned_of():
+    with pytest.warns(CoarseStepsWarning, match="pulse"):
+        beam(Blows(0.5, 0.01, PERIOD)).trajectory(START, periods=1, stepper=vk.RK4(256))
+
+
+def test_times_of_changes():
+    found = changes_of(beam(Blows(0.5, 0.01, PERIOD)))
+    assert 0.01 / 1.5 < found.pulse < 0.01 * 1.5
+    assert found.rise < 1e-3
+    assert changes_of(beam(vk.Harmonic(0.5, 200.0))) == (math.inf, math.inf)
