@@ -63,7 +63,7 @@ def test_derivatives_across_a_jump_in_x_are_refused(formula):
     """No stepper maps derivatives and momenta across it; multipliers were those without the jump."""
     osc = scene(spring=spring(formula))
     _ = osc.model.drift  # motion itself can be followed
-    with pytest.raises(DerivationError, match="jumps where .* multipliers"):
+    with pytest.raises(DerivationError, match=r"jumps where .* multipliers"):
         osc.model.check_derivatives()
 
 
