@@ -48,7 +48,8 @@ def calls(monkeypatch):
             ran.append((name, self.source, getattr(self, "intensities", None)))
             if len(ran) in stop:
                 current().wind_up()
-            return made(self, kind, complete=not {len(ran), -len(ran)} & set(stop))
+            whole = not {len(ran), -len(ran)} & set(stop)
+            return made(self, kind, complete=whole, seconds=0.0 if whole else options["time_limit"] or 0.0)
 
         return run
 
@@ -237,6 +238,15 @@ def test_a_single_state_is_kept_and_first_contact_is_offered(calls, monkeypatch,
     with pytest.raises(StructureError, match="FirstContact"):
         vk.assess(OSC, checkpoint=tmp_path / "a.nc")
     assert vk.load_result(tmp_path / "a.nc").names == one.names
+
+
+def test_what_a_share_of_the_time_did_not_suffice_for_is_run_again(calls):
+    """Each of the made-up runs takes no time, so that all of it is left."""
+    ran, stop = calls
+    stop.append(-3)
+    found = vk.assess(OSC, time_limit=1000.0)
+    assert which(ran) == [PATHS, *BOTH, BOTH[1]]
+    assert found.complete
 
 
 WELL = vk.Oscillator(

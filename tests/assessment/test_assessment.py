@@ -12,9 +12,10 @@ import vibrokit as vk
 from tests.builders import PROVENANCE, assert_same, energy, full_structure, rated_result, section
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.errors import ParameterError, StructureError
+from vibrokit.progress import Stats
 from vibrokit.report.assessment import assessment_text
 from vibrokit.results.least_action import LeastActionResult
-from vibrokit.results.merging import merged
+from vibrokit.results.merging import merged, part_of
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.sgcm import SGCMResult
 
@@ -206,3 +207,14 @@ def test_results_of_different_attractors_are_merged():
         merged([whole, parts[0]])
     with pytest.raises(StructureError, match="one analyzer"):
         merged([parts[0], rated(SGCMResult, sources=(1,))])
+
+
+def test_parts_of_a_result_have_its_work_together():
+    stats = Stats(trajectories=7, steps=1001, seconds={"density": 3.0, "graph": 1.0})
+    whole = dataclasses.replace(rated(), stats=stats, seconds=5.0)
+    again = merged([part_of(whole, label) for label in (0, 1)])
+    assert (again.stats, again.seconds) == (stats, 5.0)
+    more = dataclasses.replace(part_of(whole, 1), stats=Stats(trajectories=4, seconds={"splitting": 2.0}))
+    found = merged([part_of(whole, 0), more]).stats
+    assert (found.trajectories, found.steps) == (3 + 4, 500)
+    assert found.seconds == {"density": 1.5, "graph": 0.5, "splitting": 2.0}

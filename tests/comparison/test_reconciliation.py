@@ -25,7 +25,10 @@ from tests.builders import (
 from vibrokit.cli import main
 from vibrokit.comparison.pairs import Side, verdict_of
 from vibrokit.comparison.quantities import Kind, Quantity
+from vibrokit.comparison.tables import agreement_text
 from vibrokit.comparison.verdicts import Agreement
+from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.sgcm import SGCMResult
@@ -389,6 +392,36 @@ def test_the_command_line_gives_json_and_a_status(tmp_path, capsys):
     assert not found["agreed"]
     assert main(["reconcile", paths[0]]) == 2
     assert main(["reconcile", *paths, "--level", "1"]) == 2
+
+
+def test_what_was_not_compared_is_said():
+    whole = vk.reconcile(least_action(), rated(MFETResult))
+    assert agreement_text(whole) == "All methods agree."
+    one = {(0, 1): log_times()[0, 1]}
+    found = vk.reconcile(least_action(), rated(MFETResult, one, energies=(), complete=False))
+    text = agreement_text(found)
+    assert "All methods" not in text
+    assert "hammering → clear by mfet" in text
+    assert "Incomplete: mfet" in text
+
+
+def test_two_intensities_do_not_contradict_an_energy():
+    """hertz-0.570, hammering → clear by MFET at ΔU/D = 4 and 7; the slope is 0.001158, certified are 8.1709e-4."""
+    certified = 8.1709e-4
+    intensities = np.array([2.04272e-4, 1.16727e-4])
+    fit = ArrheniusFit.of(
+        [ExitRate(0, 1, d, -y, 0.048, "", "") for d, y in zip(intensities, (10.8318, 15.0836), strict=True)]
+    )
+    low, high = fit.interval
+    assert fit.slope == pytest.approx(1.158e-3, rel=1e-3)
+    limit = energy(0, 1, fit.slope, lower=max(low, 0.0), upper=high)
+    exact = least_action(energies=(energy(0, 1, certified, lower=0.98 * certified, upper=certified),))
+    times = {(0, 1): [10.8318, 15.0836]}
+    slope = rated_result(MFETResult, times, intensities, 0.048, energies=(limit,), section=TWO)
+    (verdict,) = vk.reconcile(exact, slope).verdicts
+    assert (verdict.code, verdict.less_certain, verdict.remedy) == (
+        Agreement.UNDER_RESOLVED, "mfet", "add noise intensities",
+    )  # fmt: skip
 
 
 def test_incomplete_results_are_used_as_far_as_they_go():

@@ -1,5 +1,6 @@
 """Every registered part, built in or of an installed plug-in, conforms; so do formulas."""
 
+import dataclasses
 import math
 
 import pytest
@@ -7,11 +8,13 @@ import pytest
 import vibrokit as vk
 from tests.scenes import Coloured
 from vibrokit import testing
+from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.parts.contact.contact_law import ContactLaw
 from vibrokit.parts.excitation.excitation import Excitation
 from vibrokit.parts.noise.noise_model import NoiseModel
 from vibrokit.parts.spring.spring import Spring
 from vibrokit.registry import Group, load_all
+from vibrokit.results.rated import RatedResult
 
 pytestmark = pytest.mark.slow
 
@@ -32,6 +35,20 @@ REGISTERED = [
 @pytest.mark.parametrize("make", REGISTERED)
 def test_registered(make):
     make()
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, id=name) for name, kind in load_all(Group.ANALYZERS, Analyzer).items()]
+)
+def test_analyzers_answer_what_an_assessment_asks(kind):
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    assert kind.takes_intensities == ("intensities" in fields)
+    if kind.takes_intensities:
+        assert issubclass(kind.result, RatedResult)
+        assert fields["intensities"].default is None
+        assert kind(intensities=(2e-3, 1e-3)).intensities == (2e-3, 1e-3)
+    for accuracy in (1e-3, 0.03, 0.1, 0.9):
+        assert type(kind().for_accuracy(accuracy)) is kind
 
 
 LAWS = [

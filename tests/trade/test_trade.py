@@ -120,9 +120,10 @@ def test_command(linear, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
     monkeypatch.setattr("vibrokit.trade.densities.measure_densities", lambda osc, source: "densities")
     monkeypatch.setattr("vibrokit.trade.exit_times.measure_exit_times", lambda osc, source: "exit times")
+    monkeypatch.setattr("vibrokit.trade.assessments.measure_assessments", lambda osc, source: "assessments")
     picture = tmp_path / "trade.png"
     assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
     printed = capsys.readouterr().out
     assert str(linear) in printed
-    assert all(f"\n{name}\n" in printed for name in ("basins", "energies", "densities", "exit times"))
+    assert all(f"\n{name}\n" in printed for name in ("basins", "energies", "densities", "exit times", "assessments"))
     assert picture.read_bytes().startswith(b"\x89PNG")

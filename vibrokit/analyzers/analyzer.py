@@ -9,7 +9,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from typing import Any, ClassVar, dataclass_transform
+from typing import Any, ClassVar, Self, dataclass_transform
 
 import xarray
 
@@ -100,11 +100,14 @@ class Analyzer(ABC, metaclass=Constructed):
     --------------
     Write `analyze`, and register the class under the entry-point group ``vibrokit.analyzers``: then ``vibrokit run
     SCENE --analyzer NAME`` runs it, and its results are saved, opened and drawn. A method with its own picture names a
-    subclass of `Result` as its `result`.
+    subclass of `Result` as its `result`. A method that gives exit rates at finite noise has a parameter
+    ``intensities``, a tuple of numbers or None, and says ``takes_intensities = True``: `assess` then chooses them.
     """
 
     result: ClassVar[type[Result]] = Result
     keeps_checkpoints: ClassVar[bool] = False
+    takes_intensities: ClassVar[bool] = False
+    """Whether its parameter `intensities` lists noise intensities D (m² s⁻³) at which its result has exit rates."""
 
     source: int | str | None = None
     exit: Exit = dataclasses.field(default_factory=LeaveBasin)
@@ -216,6 +219,13 @@ class Analyzer(ABC, metaclass=Constructed):
         if not isinstance(self.exit, Exit):
             raise StructureError(f"exit must be an Exit, such as LeaveBasin(), got {shown(self.exit)}.")
         self.exit.check_scene(osc)
+
+    def for_accuracy(self, accuracy: float) -> Self:
+        """Return the analyzer with settings for a relative error of energies and mean times, the half of an interval.
+
+        By default as it is: the method chooses its own effort. `assess` asks each analyzer.
+        """
+        return self
 
     def least_intensity(self, osc: Oscillator) -> float:
         """Return the least noise intensity for which energies are meant, that of the scene by default (m² s⁻³)."""

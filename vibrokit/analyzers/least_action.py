@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.exit_search import ExitSearch
@@ -83,6 +83,10 @@ class LeastAction(Analyzer):
             raise StructureError("LeastAction: shooting and graph are both None; at least one must search for paths.")
         share("LeastAction: accuracy", self.accuracy)
         whole("LeastAction: orbits", self.orbits, 0, _MOST_ORBITS)
+
+    def for_accuracy(self, accuracy: float) -> Self:
+        """Return it with this accuracy."""
+        return dataclasses.replace(self, accuracy=accuracy)
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Find and certify the exit paths of one attractor.

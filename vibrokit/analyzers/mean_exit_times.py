@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -33,7 +34,9 @@ from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "Arrhenius fit"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's, as SGCM has them
-_SMALLEST_ERROR = 1e-3  # a million exits
+_SMALLEST_ERROR, _LARGEST_ERROR = 1e-3, 0.25  # a million and 16 exits
+_REPLICAS = 32  # of splitting at a relative error of 0.1: its default of 128 reaches 0.05
+_FEWEST_REPLICAS, _MOST_REPLICAS = 16, 1_000_000
 _MOST_STAGES = 64  # of an importance function in a section interval: a tenth of a radian, where it may be interpolated
 
 
@@ -85,6 +88,7 @@ class MFET(Analyzer):
 
     result: ClassVar[type[Result]] = MFETResult
     keeps_checkpoints: ClassVar[bool] = True
+    takes_intensities: ClassVar[bool] = True
 
     intensities: tuple[float, ...] | None = None
     target_error: float = 0.05
@@ -98,13 +102,19 @@ class MFET(Analyzer):
         share("MFET: target_error", self.target_error, _SMALLEST_ERROR)
         whole("MFET: seed", self.seed, 0, 2**63 - 1)
         whole("MFET: escapes", self.escapes, 0, 100_000)
-        whole("MFET: replicas", self.replicas, 16, 1_000_000)
+        whole("MFET: replicas", self.replicas, _FEWEST_REPLICAS, _MOST_REPLICAS)
         if not isinstance(self.from_orbit, bool):
             raise StructureError(f"MFET: from_orbit must be True or False, got {shown(self.from_orbit)}.")
         if not isinstance(self.splitting, bool | None):
             raise StructureError(f"MFET: splitting must be True, False or None, got {shown(self.splitting)}.")
         if self.intensities is not None:
             object.__setattr__(self, "intensities", intensities("MFET", self.intensities))
+
+    def for_accuracy(self, accuracy: float) -> Self:
+        """Return it with a standard error of half the accuracy; splitting gets as many replicas as that needs."""
+        error = min(max(accuracy / 2, _SMALLEST_ERROR), _LARGEST_ERROR)
+        replicas = max(_FEWEST_REPLICAS, math.ceil(_REPLICAS * (0.1 / error) ** 2))
+        return dataclasses.replace(self, target_error=error, replicas=min(replicas, _MOST_REPLICAS))
 
     def least_intensity(self, osc: Oscillator) -> float:
         """The least of the intensities."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 import xarray
@@ -17,7 +18,7 @@ from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.energies import limit_of
 from vibrokit.analyzers.sgcm.propagator import checked_noise
-from vibrokit.analyzers.sgcm.solution import DensitySolver
+from vibrokit.analyzers.sgcm.solution import ACCURACY, DensitySolver
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
@@ -27,7 +28,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.stoppable import Stoppable
-from vibrokit.structure.validation import gibibytes, intensities
+from vibrokit.structure.validation import gibibytes, intensities, share
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
@@ -56,11 +57,14 @@ class SGCM(Analyzer):
         Noise intensities D (m² s⁻³); by default 1.5, 1.2 and 1 times the scene's.
     nodes : (int, int), optional
         Nodes in x and in v; by default so many that the narrowest density around the attractor is 5 node spacings
-        wide, from 120 to 400, or 2 spacings with up to 640 nodes.
+        wide, from 120 to 400, or 2 spacings with up to 640 nodes; see `accuracy`.
     steps : int, optional
         How often noise acts in a section interval; even. By default 2 per radian of the fastest oscillation or decay.
     max_memory_gib : float
         Memory that the tables may take (GiB).
+    accuracy : float
+        Relative error of rates that is wanted, as two error estimates. The number of node spacings follows from it: 5
+        at 0.1, and in proportion to its inverse root. Each rate has the error that was reached.
     samples : int, optional
         If given, the transition over one section interval is a matrix of sampled transitions, as published, with so
         many trajectories from each cell. It is there for comparison: it does not see what is less likely than one in
@@ -92,12 +96,14 @@ class SGCM(Analyzer):
     """
 
     result: ClassVar[type[Result]] = SGCMResult
+    takes_intensities: ClassVar[bool] = True
 
     intensities: tuple[float, ...] | None = None
     nodes: tuple[int, int] | None = None
     steps: int | None = None
     max_memory_gib: float = 2.0
     samples: int | None = None
+    accuracy: float = ACCURACY
 
     def __post_init__(self) -> None:
         if self.nodes is not None:
@@ -106,9 +112,14 @@ class SGCM(Analyzer):
             check_steps("SGCM", self.steps)
         if self.samples is not None:
             whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
+        share("SGCM: accuracy", self.accuracy)
         gibibytes("SGCM: max_memory_gib", self.max_memory_gib)
         if self.intensities is not None:
             object.__setattr__(self, "intensities", intensities("SGCM", self.intensities))
+
+    def for_accuracy(self, accuracy: float) -> Self:
+        """Return it with this accuracy."""
+        return dataclasses.replace(self, accuracy=accuracy)
 
     def least_intensity(self, osc: Oscillator) -> float:
         """The least of the intensities."""
@@ -131,7 +142,7 @@ class SGCM(Analyzer):
         wanted, limits = with_states(problem, wanted)
         if not wanted:
             return Analysis(findings=limits)
-        solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples)
+        solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples, self.accuracy)
         solved: list[AtIntensity] = []
         unresolved: list[Unresolved] = []
         with Stoppable("density", problem.source) as work:

@@ -13,8 +13,6 @@ import numpy as np
 
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
-from vibrokit.analyzers.mean_exit_times import MFET
-from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.arguments import members
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known, Part
@@ -181,7 +179,7 @@ class _Road:
         labels = (
             range(len(structure.attractors)) if wanted.source is None else [structure.attractor(wanted.source).label]
         )
-        rated = {name: one for name, one in wanted.analyzers.items() if isinstance(one, MFET | SGCM)}
+        rated = {name: one for name, one in wanted.analyzers.items() if one.takes_intensities}
         others = [name for name in wanted.analyzers if name not in rated]
         ran = True
         for number, name in enumerate(others):
@@ -190,13 +188,26 @@ class _Road:
             yield self._assessment()
         order = sorted(labels, key=self._energy)
         runs = [(name, label) for label in order for name in rated]
-        for number, (name, label) in enumerate(runs):
-            rates = dataclasses.replace(rated[name], source=label, intensities=self._intensities(label))
-            ran &= self._run(name, rates, [label], 1.0 / (len(runs) - number))
+        waiting, repeated = list(runs), False
+        while waiting:
+            name, label = waiting.pop(0)
+            chosen: dict[str, Any] = {"source": label, "intensities": self._intensities(label)}
+            rates = dataclasses.replace(rated[name], **chosen)
+            ran &= self._run(name, rates, [label], 1.0 / (len(waiting) + 1))
+            if not (waiting or repeated or self.work.over):
+                waiting, repeated = self._open(runs), True
             yield self._assessment()
         asked = ((name, label) for name, label in self.parts if name in wanted.analyzers and label in labels)
         self.complete = ran and all(self._is_known(name, label) for name, label in asked)
         yield self._assessment()
+
+    def _open(self, runs: Sequence[tuple[str, int]]) -> list[tuple[str, int]]:
+        """Runs that the limit ended, if each can now have more time than it had."""
+        if self.request.time_limit is None:
+            return []
+        left = self.request.time_limit - self.work.seconds
+        ended = [run for run in runs if run in self.parts and not self.parts[run][0].complete]
+        return [run for run in ended if self.parts[run][0].seconds < left / len(ended)]
 
     def _run(self, name: str, analyzer: Analyzer, labels: Sequence[int], share: float) -> bool:
         """Run one analyzer in a share of the time left, unless as much is known; return whether there was time."""
@@ -241,11 +252,12 @@ class _Road:
     def _energy(self, label: int) -> float:
         """ΔU of the cheapest exit of a state by methods without rates; infinite if none is known.
 
-        An energy that follows from rates would give each method another ladder, and no intensity in common.
+        An energy that follows from rates would give each method another ladder, and no intensity in common. One with an
+        error as large as itself tells no intensity.
         """
         known = (one for (_, source), (one, _) in self.parts.items() if source == label)
-        own = [one for one in known if not isinstance(one, RatedResult)]
-        return min((e.value for one in own for e in one.energies if e.source == label), default=math.inf)
+        own = (e for one in known if not isinstance(one, RatedResult) for e in one.energies if e.source == label)
+        return min((e.value for e in own if not e.numerical_error >= e.value), default=math.inf)
 
     def _assessment(self) -> Assessment:
         assert self.structure is not None

@@ -10,7 +10,6 @@ from numbers import Integral
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit
 from vibrokit.arguments import members, real
-from vibrokit.assessment.ladder import fitted
 from vibrokit.errors import ParameterError, SceneError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import checked_time_limit
@@ -69,7 +68,7 @@ class Request:
             raise ParameterError(f"source must be the label or the name of a state, got {shown(source)}.")
         analyzers = {}
         for name in names:
-            analyzers[name] = dataclasses.replace(fitted(load(Group.ANALYZERS, name, Analyzer)(), accuracy), exit=exit)
+            analyzers[name] = load(Group.ANALYZERS, name, Analyzer)(exit=exit).for_accuracy(float(accuracy))
             analyzers[name].check(osc)
         return cls(
             accuracy=float(accuracy), time_limit=checked_time_limit(time_limit), analyzers=analyzers, source=source,

@@ -196,6 +196,7 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.progress import working
     from vibrokit.results.pictures import save_figure
     from vibrokit.scene_file import load_scene
+    from vibrokit.trade.assessments import measure_assessments
     from vibrokit.trade.basins import measure_basins
     from vibrokit.trade.densities import measure_densities
     from vibrokit.trade.energies import measure_energies
@@ -212,6 +213,7 @@ def _trade(options: argparse.Namespace) -> None:
             partial(measure_energies, source=source),
             partial(measure_densities, source=source),
             partial(measure_exit_times, source=source),
+            partial(measure_assessments, source=source),
         ):
             try:
                 print(f"\n{measure(osc)}", flush=True)

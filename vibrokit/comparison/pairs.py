@@ -13,6 +13,7 @@ from scipy import stats
 from vibrokit.comparison.of_exits import fit_of
 from vibrokit.comparison.quantities import DEVIATIONS, Kind, Quantity
 from vibrokit.comparison.verdicts import Agreement, Verdict
+from vibrokit.results.arrhenius import ENOUGH
 from vibrokit.results.rated import HELD, METASTABLE
 
 _ONE_SIDED = 1.645  # standard errors that a normal error exceeds on one side in 5 % of all cases
@@ -183,4 +184,6 @@ def _not_metastable(kind: Kind, quantities: Sequence[Quantity], about: dict[str,
 
 def _unresolved(kind: Kind, sides: Sides, about: dict[str, Any], known: Sequence[bool]) -> Verdict:
     less = sides[0] if not known[0] else sides[1]
-    return Verdict(Agreement.UNDER_RESOLVED, kind, **about, less_certain=less.method, remedy=less.remedy)
+    few = kind is Kind.ENERGY and 0 < len(less.series) < ENOUGH
+    remedy = "add noise intensities" if few else less.remedy
+    return Verdict(Agreement.UNDER_RESOLVED, kind, **about, less_certain=less.method, remedy=remedy)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from vibrokit.comparison.quantities import OF_STATES, Kind, Quantity
+from vibrokit.comparison.quantities import OF_EXITS, OF_STATES, Kind, Quantity
 from vibrokit.comparison.verdicts import Agreement, exit_name
+from vibrokit.results.codes import Code
 from vibrokit.text_table import number_text, power_text, text_table
 
 if TYPE_CHECKING:
@@ -51,14 +52,29 @@ def overview_text(one: Reconciliation) -> str:
 
 
 def agreement_text(one: Reconciliation) -> str:
-    """Return in a sentence whether the methods agree."""
+    """Return whether the methods agree, and what could not be compared."""
+    left = _not_compared(one)
     wrong = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is Agreement.DISAGREE)
     open_ = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is not Agreement.AGREE)
     if wrong:
-        return f"Methods disagree on {', '.join(wrong)}."
-    if open_:
-        return f"No methods disagree. What is not settled: {', '.join(open_)}."
-    return "All methods agree."
+        found = f"Methods disagree on {', '.join(wrong)}."
+    elif open_:
+        found = f"No methods disagree. What is not settled: {', '.join(open_)}."
+    else:
+        found = "The methods agree where they were compared." if left else "All methods agree."
+    return " ".join([found, *left])
+
+
+def _not_compared(one: Reconciliation) -> list[str]:
+    """Sentences on results that are incomplete, and on exits of which some methods say nothing."""
+    incomplete = [str(finding.values["method"]) for finding in one.found(Code.USED_INCOMPLETE)]
+    sentences = [f"Incomplete: {', '.join(incomplete)}."] if incomplete else []
+    known = {(q.source, q.target, q.method) for q in one.quantities if q.kind in OF_EXITS}
+    unknown: dict[str, list[str]] = {}
+    for exit_ in one.exits:
+        absent = ", ".join(method for method in one.methods if (*exit_, method) not in known)
+        unknown.setdefault(absent, []).append(exit_name(one.names, *exit_))
+    return [*sentences, *(f"Nothing on {', '.join(exits)} by {absent}." for absent, exits in unknown.items() if absent)]
 
 
 def _lasting(one: Reconciliation) -> list[str]:

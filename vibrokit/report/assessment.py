@@ -13,7 +13,7 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.durations import duration_text
 from vibrokit.comparison.tables import agreement_text, verdicts_text
 from vibrokit.errors import StructureError
-from vibrokit.report.blocks import Table
+from vibrokit.report.blocks import Sentences, Table
 from vibrokit.report.data import findings_data, plain, run_data
 from vibrokit.report.text import findings_text
 from vibrokit.results.codes import Severity
@@ -57,10 +57,14 @@ def _open_text(name: str, findings: Sequence[Finding], names: Sequence[str]) -> 
 
 
 def states_text(one: Assessment) -> str:
-    """Return a line for each state: its share of time, how long it lasts, and its activation energy."""
+    """Return how long each state lasts, its activation energy and its share of time: a table of each."""
     if not one.names:
         return "No steady state was found."
-    return "\n".join([f"At {noise_text(one)}:", *states_table(one).lines, *_shares(one)[1]])
+    shares, why = _shares(one)
+    texts = ["\n".join([f"At {noise_text(one)}:", *lasting_table(one).lines]), "\n".join(barrier_table(one).lines)]
+    if not why:
+        texts.append("\n".join(share_table(one, shares).lines))
+    return "\n\n".join([*texts, *why])
 
 
 def noise_text(one: Assessment) -> str:
@@ -70,12 +74,28 @@ def noise_text(one: Assessment) -> str:
     return f"D = {one.intensity:g} m² s⁻³{psd}"
 
 
-def states_table(one: Assessment) -> Table:
-    """Return a row for each state: its share of time, how long it lasts, and its activation energy."""
-    header = ("state", "share of time", "mean time until it is left", "by", "ΔU (m² s⁻³)", "bounds", "to")
-    shares = _shares(one)[0]
-    rows = tuple((name, shares[n], *_lasting(one, n), *_barrier(one, n)) for n, name in enumerate(one.names))
-    return Table("lasting", "How long each state lasts", header, rows)
+def states_blocks(one: Assessment) -> list[Table | Sentences]:
+    """Return the tables of how long each state lasts, of its activation energy and of its share of time."""
+    shares, why = _shares(one)
+    last = Sentences(tuple(why)) if why else share_table(one, shares)
+    return [lasting_table(one), barrier_table(one), last]
+
+
+def lasting_table(one: Assessment) -> Table:
+    """Return how long each state lasts."""
+    rows = tuple((name, *_lasting(one, label)) for label, name in enumerate(one.names))
+    return Table("lasting", "How long each state lasts", ("state", "mean time until it is left", "by"), rows)
+
+
+def barrier_table(one: Assessment) -> Table:
+    """Return the activation energy of each state."""
+    rows = tuple((name, *_barrier(one, label)) for label, name in enumerate(one.names))
+    return Table("barriers", "Activation energies", ("state", "ΔU (m² s⁻³)", "bounds", "to"), rows)
+
+
+def share_table(one: Assessment, shares: Sequence[str]) -> Table:
+    """Return the share of time of each state."""
+    return Table("shares", "Shares of time", ("state", "share of time"), tuple(zip(one.names, shares, strict=True)))
 
 
 def trust_text(one: Assessment) -> str:
@@ -84,7 +104,9 @@ def trust_text(one: Assessment) -> str:
         found = one.reconciliation
     except StructureError as error:
         return f"The methods could not be compared: {error}" if len(one.results) > 1 else ""
-    return f"{agreement_text(found)}\n{verdicts_text(found)}".strip()
+    absent = [name for name in one.settings.get("methods", ()) if name not in one.results]
+    without = f" No result by {', '.join(absent)}." if absent else ""
+    return f"{agreement_text(found)}{without}\n{verdicts_text(found)}".strip()
 
 
 def assessment_data(one: Assessment, question: Question = Question()) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from vibrokit.assessment.plausibility import Plausibility, plausibility
 from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.report.answer import answer_sentences
-from vibrokit.report.assessment import states_table
+from vibrokit.report.assessment import states_blocks
 from vibrokit.report.blocks import Block, Chapter, Formulas, Listing, Sentences, Table
 from vibrokit.report.pictures import pictures_of, scene_picture
 from vibrokit.report.tables import input_table
@@ -54,7 +54,7 @@ def _heading(name: str) -> str:
 
 def _answers(one: Assessment) -> Iterator[Chapter]:
     yield Chapter("Answer", (Sentences(answer_sentences(one)),))
-    yield Chapter("How long each state lasts", (states_table(one), *pictures_of(one, "times")))
+    yield Chapter("How long each state lasts", (*states_blocks(one), *pictures_of(one, "times")))
 
 
 def _scene(osc: Oscillator) -> Chapter:

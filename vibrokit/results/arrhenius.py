@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError
 from vibrokit.results.exit_rate import ExitRate
 
+ENOUGH = 3
+"""Noise intensities, at least, that show how a prefactor depends on D, so that an energy has bounds."""
+
 _DEVIATIONS = 1.96  # of the normal law, for intervals of 95 %
 
 Array = NDArray[np.float64]
@@ -71,7 +74,7 @@ class ArrheniusFit:
         line, spread = _fitted([places**0, places], log_times, errors)
         curvature, curvature_error = math.nan, math.nan
         systematic, limit, limit_error = math.inf, math.nan, math.nan
-        if len(known) > 2:
+        if len(known) >= ENOUGH:
             parabola, around = _fitted([places**0, places, places**2], log_times, errors)
             curvature, curvature_error = 2 * float(parabola[2]), 2 * float(around[2])
             straight, straight_errors = _fitted([places**0, places, powers], log_times, errors)

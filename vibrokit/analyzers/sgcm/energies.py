@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.results.arrhenius import ENOUGH
+
 Array = NDArray[np.float64]
 
 
@@ -43,7 +45,7 @@ def limit_of(
     """
     d, times = np.array(intensities), np.array(log_times)
     value = _limit(d[-2:], times[-2:])
-    if len(d) < 3:
+    if len(d) < ENOUGH:
         return value, math.inf
     powers = -np.log(d)
     of_prefactor = [
