@@ -88,7 +88,7 @@ def check_agreement(drawn, starts, *, more):
     if not finite.any():
         return _ROUNDING
     starts, true = starts[finite], tight[finite]
-    left = np.abs((tight - loose)[finite] / (1 + np.abs(true))).max()
+    left = np.abs((true - loose[finite]) / (1 + np.abs(true))).max()
     allowed = check_refinement(drawn, starts, vk.RK4, true, left)
     for kind in (vk.RK8, vk.RKN12) if more else ():
         with contextlib.suppress(StepperError):  # not for this scene

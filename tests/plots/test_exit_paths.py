@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from vibrokit.errors import VibrokitError
-from vibrokit.plots.axes import colour
+from vibrokit.plots.axes import MARKS, colour
 from vibrokit.plots.exit_paths import exit_paths, path_history
 from vibrokit.plots.quasi_potential import quasi_potential_map
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
@@ -63,7 +63,7 @@ def test_a_path_given_all_along_is_a_line_without_dots():
     np.testing.assert_array_equal(a[0].get_xydata(), LONG)
     assert (len(a), a[0].get_marker()) == (1, "")
     np.testing.assert_array_equal(b[0].get_xydata(), -LONG[::4])
-    assert (len(b), b[0].get_marker()) == (4, "o")
+    assert (len(b), b[0].get_marker()) == (4, MARKS[1])
 
 
 @pytest.mark.parametrize(("swing", "shown"), [(0.0, 41), (0.3, 5)])

@@ -60,9 +60,13 @@ def connected(osc: Oscillator, region: Region, place: float) -> bool:
 
 
 def intervals_within(osc: Oscillator, low: float, high: float) -> list[tuple[float, float]]:
-    """Return the parts of a range of x (m) between borders; they end a little before their ends.
+    """Return the parts of a range of x (m) between borders; those that end at a border end a little before it.
 
     The ends of the range may be borders, too: those of a default region are.
     """
-    found = osc.model.domain.intervals(low, high)
-    return [(one + _BESIDE * (other - one), other - _BESIDE * (other - one)) for one, other in found]
+    domain, found = osc.model.domain, []
+    for one, other in domain.intervals(low, high):
+        beside = _BESIDE * (other - one)
+        first, last = (beside * bool(domain.borders(end - beside, end + beside)) for end in (one, other))
+        found.append((one + first, other - last))
+    return found
