@@ -314,9 +314,11 @@ def test_an_interrupt_keeps_the_first_solution_and_marks_it():
     assert [(found.code, found.source) for found in result.findings] == [(Code.GRAPH, 0), (Code.STOPPED, 0)]
 
 
-def test_an_interrupt_before_any_solution_is_passed_on():
-    with pytest.raises(KeyboardInterrupt):
-        StoppedGraph().analyze(problem(*well(0.05)))
+def test_an_interrupt_before_any_solution_leaves_nothing_and_says_so():
+    result = StoppedGraph(nodes=(64, 64)).run(*well(0.05))
+    assert not result.complete
+    assert result.energies == ()
+    assert [found.code for found in result.findings] == [Code.STOPPED]
     with pytest.raises(KeyboardInterrupt):
         Stopping(nodes=(64, 64)).search(problem(*well(0.05)))
 

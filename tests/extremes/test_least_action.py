@@ -108,6 +108,7 @@ def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
         assert energy.lower <= exact[energy.source] <= energy.upper
 
 
+@pytest.mark.long
 def test_steps_are_fine_enough_for_the_stability_of_an_orbit_at_a_stiff_stop():
     """With the default steps of ensembles, this orbit of period 6 exists, but is unstable."""
     osc = paper_scene("hertz", stiffness=1e4)

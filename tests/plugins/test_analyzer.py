@@ -57,7 +57,7 @@ def test_the_example_is_short():
 
 
 def test_the_command_line_runs_saves_and_draws_it(tmp_path, capsys):
-    assert main(RUN) == 0
+    assert main([*RUN, "--verbose"]) == 0
     assert "The quadratic form holds near right-rest." in capsys.readouterr().out
     result = vk.load_result(tmp_path / "quadratic.nc")
     assert type(result) is load(Group.RECORDS, "quadratic")

@@ -141,14 +141,19 @@ def one_table(monkeypatch, tmp_path):
 
 def test_the_command_prints_the_tables(one_table, trade, monkeypatch, capsys):
     asked = []
-    tables = {"energies": trade, "densities": "of densities", "exit_times": "of exit times"}
+    tables = {
+        "energies": trade,
+        "densities": "of densities",
+        "exit_times": "of exit times",
+        "assessments": "of assessments",
+    }
     for name, table in tables.items():
         measure = f"vibrokit.trade.{name}.measure_{name}"
         monkeypatch.setattr(measure, lambda osc, source, table=table: asked.append(source) or table)
     assert main(["trade", "double-well", "--source", "left-rest", *one_table]) == 0
     printed = capsys.readouterr().out
     assert all(str(table) in printed for table in tables.values())
-    assert asked == ["left-rest"] * 3
+    assert asked == ["left-rest"] * len(tables)
 
 
 def test_the_command_says_why_there_is_no_table(one_table, tmp_path, capsys):

@@ -90,7 +90,7 @@ def shares_text(shares: xarray.DataArray) -> str:
     for one in shares:
         cells = zip(one.values, one["lower"].values, one["upper"].values, one["state"].values, names, strict=True)
         rows.append([f"{float(one['intensity']):g}", *(_cell(*cell) for cell in cells)])
-    escapes = [power_text(time) for time in shares["log_escape_time"].values if math.isfinite(time)]
+    escapes = [power_text(time) for time in shares["log_escape_time"].values.ravel() if math.isfinite(time)]
     until = f"Shares are of the time before motion escapes, after {', '.join(escapes)} s on average."
     return "\n".join([*text_table(rows), *([until] if escapes else [])])
 
