@@ -1,6 +1,7 @@
 import pytest
 
 import vibrokit as vk
+from vibrokit import progress
 
 
 @pytest.fixture(scope="session")
@@ -8,6 +9,21 @@ def paper():
     """The paper's scene at ω = 0.570 and its structure."""
     osc = vk.load_scene("hertz-0.570")
     return osc, vk.find_structure(osc, cells=(100, 100))
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock of progress and time limits that tests set."""
+
+    class Clock:
+        now = 100.0
+
+        def perf_counter(self):
+            return self.now
+
+    clock = Clock()
+    monkeypatch.setattr(progress, "time", clock)
+    return clock
 
 
 def pytest_collection_modifyitems(items):

@@ -2,25 +2,9 @@
 
 import pytest
 
-from vibrokit import progress
 from vibrokit.display import Display
 from vibrokit.errors import OutOfTime, StructureError, VibrokitError
 from vibrokit.progress import Deadline, Work, advance, compiling, count, current, put_off, report, stage, working
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """A clock that tests set."""
-
-    class Clock:
-        now = 100.0
-
-        def perf_counter(self):
-            return self.now
-
-    clock = Clock()
-    monkeypatch.setattr(progress, "time", clock)
-    return clock
 
 
 def test_updates_tell_stage_subject_and_counts():

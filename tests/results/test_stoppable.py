@@ -2,26 +2,10 @@
 
 import pytest
 
-from vibrokit import progress
 from vibrokit.errors import OutOfTime, StructureError
 from vibrokit.progress import AFTERWARDS, Deadline, advance, put_off, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.stoppable import Stoppable
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """A clock that tests set."""
-
-    class Clock:
-        now = 100.0
-
-        def perf_counter(self):
-            return self.now
-
-    clock = Clock()
-    monkeypatch.setattr(progress, "time", clock)
-    return clock
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ class Evidence:
         for one in self.rated:
             rates = [rate for rate in one.rates if rate.source == start and end in (None, rate.target)]
             if rates:
-                found.append(MeanTimes.of(rates, str(one.settings.get("analyzer") or one.kind)))
+                found.append(MeanTimes.of(rates, one.made_by))
         if not found:
             leaving = exit_name(self.names, start, end)
             raise StructureError(f"no exit rate is known for {leaving}; see the findings, or give more time.")

@@ -70,9 +70,8 @@ class Known:
         for structure in self.structures:
             check_scene("the known structure", structure, scene_data(osc))
         for known, _ in self.results:
-            name = str(known.settings.get("analyzer") or known.kind)
-            check_scene(f"the known result of {name}", known, scene_data(osc))
-            _check_exit(name, known, exit)
+            check_scene(f"the known result of {known.made_by}", known, scene_data(osc))
+            _check_exit(known.made_by, known, exit)
 
     def parts(self, osc: Oscillator, structure: Structure, exit: Exit) -> dict[tuple[str, int], Part]:  # noqa: A002
         """Return the results by analyzer and label, and the accuracy of each.
@@ -82,7 +81,7 @@ class Known:
         """
         parts: dict[tuple[str, int], Part] = {}
         for known, accuracy in self.results:
-            name = str(known.settings.get("analyzer") or known.kind)
+            name = known.made_by
             check_comparable(f"the known result of {name}", known, scene_data(osc), Section.of(structure))
             _check_exit(name, known, exit)
             for label in analyzed_labels(known):

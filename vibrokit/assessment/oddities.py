@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from enum import StrEnum
+
+from vibrokit.results.sentenced import Sentenced
 
 
-class OddityCode(StrEnum):
+class OddityCode(Sentenced):
     """Kinds of oddities. Each code has a sentence, a template of the oddity's values."""
-
-    sentence: str
-
-    def __new__(cls, value: str, sentence: str) -> OddityCode:
-        member = str.__new__(cls, value)
-        member._value_ = value
-        member.sentence = sentence
-        return member
 
     NATURAL_FREQUENCY_IN_HZ = (
         "natural-frequency-in-hz",

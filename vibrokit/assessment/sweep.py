@@ -17,6 +17,7 @@ from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
+from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.stoppable import Stoppable
@@ -156,9 +157,6 @@ def _prefactor(result: RatedResult, value: float) -> list[Prefactor]:
     """The prefactor of leaving a state at all, if a rate was found."""
     if not result.rates:
         return []
-    logs = np.array([rate.log_value for rate in result.rates])
-    errors = np.array([rate.log_error for rate in result.rates])
-    total = float(np.logaddexp.reduce(logs))
-    error = float(np.linalg.norm(np.exp(logs - total) * errors))
+    left = ExitRate.total(result.rates)
     # The noise was chosen so that the energy is this many times D.
-    return [Prefactor(result.names[result.rates[0].source], value, -total - _DEPTH, error)]
+    return [Prefactor(result.names[left.source], value, -left.log_value - _DEPTH, left.log_error)]

@@ -44,7 +44,6 @@ def sweep_scene(options: argparse.Namespace) -> int:
     from vibrokit.report.tables import coexistence_table
     from vibrokit.report.text import findings_text
     from vibrokit.results.atomic import checked_target
-    from vibrokit.results.codes import Severity
     from vibrokit.results.pictures import checked_picture, save_figure
     from vibrokit.scene_file import load_scene
     from vibrokit.structure.parameter_values import parameter_line
@@ -69,9 +68,8 @@ def sweep_scene(options: argparse.Namespace) -> int:
                 energies=not options.states_only, rng=options.seed,
             )  # fmt: skip
         interrupts.finishing()
-        serious = [finding for finding in found.findings if finding.severity is not Severity.INFO]
         heading = f"{options.scene}: sweep{'' if found.complete else ' (incomplete)'}"
-        parts = (heading, coexistence_table(found, unit).text, findings_text(serious, found.names))
+        parts = (heading, coexistence_table(found, unit).text, findings_text(found.serious, found.names))
         print("\n\n".join(part for part in parts if part), f"\n\n{found.seconds:.1f} s.")
         if options.output is not None:
             found.save(options.output)

@@ -102,7 +102,7 @@ def _check(results: Sequence[Any]) -> None:
 
 def _method_names(results: Sequence[Result]) -> tuple[str, ...]:
     """Names of the results: those of their analyzers, numbered where one occurs twice."""
-    names = [str(result.settings.get("analyzer") or result.kind) for result in results]
+    names = [result.made_by for result in results]
     many = {name for name, count in Counter(names).items() if count > 1}
     seen: Counter[str] = Counter()
     found = []

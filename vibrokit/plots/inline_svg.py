@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from typing import Any
 
 import matplotlib
@@ -16,20 +15,19 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def inline_svg(draw: Callable[[], Artists], name: str) -> str:
+def inline_svg(artists: Artists, name: str) -> str:
     """Return a picture as an element ``svg``.
 
     Parameters
     ----------
-    draw : callable
-        Draws the picture.
+    artists : Artists
     name : str
         Begins the identifiers of the picture, so that they differ from those of the page's other pictures.
     """
     content = io.StringIO()
     with matplotlib.rc_context(_STYLE):
         metadata = {"Date": None, "Creator": None}
-        draw().figure.savefig(content, format="svg", metadata=metadata, bbox_inches="tight")
+        artists.figure.savefig(content, format="svg", metadata=metadata, bbox_inches="tight")
     svg = content.getvalue()
     svg = svg[svg.index("<svg") :]
     for mark in ('id="', 'xlink:href="#', "url(#"):

@@ -7,7 +7,6 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.comparison.tables import agreement_text
 from vibrokit.errors import StructureError, counted
 from vibrokit.report.assessment import noise_text
-from vibrokit.results.codes import Severity
 
 
 def answer_sentences(one: Assessment) -> tuple[str, ...]:
@@ -48,8 +47,7 @@ def _trust(one: Assessment) -> str:
         agreement = agreement_text(one.reconciliation)
     except StructureError as error:
         agreement = f"Methods could not be compared: {error}"
-    findings = [*one.structure.findings, *(f for part in one.results.values() for f in part.findings), *one.findings]
-    serious = sum(finding.severity is not Severity.INFO for finding in findings)
+    serious = sum(len(part.serious) for part in (one.structure, *one.results.values(), one))
     state = "The work was stopped before its end." if not one.complete else ""
     limits = f"{counted(serious, 'finding limits', 'findings limit')} the trust; see below." if serious else ""
     return " ".join(part for part in (agreement, state, limits) if part)

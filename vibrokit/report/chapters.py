@@ -45,7 +45,7 @@ def _parts(record: Record) -> list[Named]:
     """The records that have numbers of their own, by name."""
     if isinstance(record, Assessment):
         return [(STRUCTURE, record.structure), *record.results.items()]
-    return [(str(record.settings.get("analyzer") or record.kind), record)]
+    return [(record.made_by, record)]
 
 
 def _heading(name: str) -> str:

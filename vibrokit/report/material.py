@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 
 from vibrokit.assessment.assessment import Assessment
-from vibrokit.errors import ArgumentError, StructureError, shown
-from vibrokit.results.comparable import check_comparable, differences, noiseless
+from vibrokit.errors import ArgumentError, shown
+from vibrokit.results.comparable import check_comparable, check_scene
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section
@@ -29,9 +29,7 @@ def gathered(records: Sequence[Record]) -> list[Record]:
     for one in records:
         if not isinstance(one, Record):
             raise ArgumentError(f"a report is made of records, such as an assessment or a result, got {shown(one)}.")
-        changed = differences(noiseless(records[0].scene), noiseless(one.scene))
-        if changed:
-            raise StructureError(f"the records are of different scenes: {changed}. Report one scene at a time.")
+        check_scene("a record", one, records[0].scene)
     whole = next((one for one in records if isinstance(one, Assessment)), None)
     structure = next((one for one in records if isinstance(one, Structure)), whole.structure if whole else None)
     results = [one for one in records if isinstance(one, Result)]
@@ -46,7 +44,7 @@ def _assessment(whole: Assessment | None, structure: Structure, results: Sequenc
     named = dict(whole.results) if whole else {}
     for one in results:
         check_comparable("a result", one, structure.scene, Section.of(structure))
-        named[_free_name(str(one.settings.get("analyzer") or one.kind), named)] = one
+        named[_free_name(one.made_by, named)] = one
     if whole is not None:
         return dataclasses.replace(whole, results=named)
     return Assessment(

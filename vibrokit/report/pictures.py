@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial, singledispatch
+from functools import singledispatch
 from typing import Any
 
 from vibrokit.assessment.assessment import Assessment
@@ -28,7 +28,7 @@ def pictures_of(record: Record, name: str) -> list[Picture]:
     found = []
     for index, (caption, draw) in enumerate(_drawings(record)):
         try:
-            found.append(Picture(inline_svg(draw, f"{name}-{index}"), caption))
+            found.append(Picture(inline_svg(draw(), f"{name}-{index}"), caption))
         except VibrokitError:
             continue
     return found
@@ -36,15 +36,14 @@ def pictures_of(record: Record, name: str) -> list[Picture]:
 
 def scene_picture(osc: Oscillator) -> Picture:
     """Return the drawing of a scene with its values."""
-    draw = partial(
-        scene_drawing,
+    drawn = scene_drawing(
         spring=f"ω_n = {osc.natural_frequency:.6g} s⁻¹" if osc.spring is None else _part_text(osc.spring),
         damper=f"ζ = {osc.damping_ratio:.6g}",
         stops=[(one.side, f"at x = {one.position:.6g} m\n{_part_text(one.law)}") for one in osc.barriers],
         forces=[_part_text(part) for part in osc.excitations],
         noise="" if osc.noise is None else _part_text(osc.noise),
     )
-    return Picture(inline_svg(draw, "scene"), "The scene, not to scale.")
+    return Picture(inline_svg(drawn, "scene"), "The scene, not to scale.")
 
 
 @singledispatch

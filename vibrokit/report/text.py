@@ -39,7 +39,7 @@ def record_text(title: str, record: Record, *, brief: bool = False) -> str:
     """
     heading = title if record.complete else f"{title} (incomplete)"
     texts = (block.text for block in blocks_of(record) if not (brief and block.detail))
-    findings = [finding for finding in record.findings if not (brief and finding.severity is Severity.INFO)]
+    findings = record.serious if brief else record.findings
     work = f"{record.seconds:.1f} s." if brief else stats_text(record)
     sections = [heading, *texts, findings_text(findings, record.names), work]
     return "\n\n".join(section for section in sections if section)

@@ -60,10 +60,7 @@ def total_rates(times: RatedResult) -> list[ExitRate]:
     found = []
     for source, intensity in dict.fromkeys((rate.source, rate.intensity) for rate in times.rates):
         own = [rate for rate in times.rates if (rate.source, rate.intensity) == (source, intensity)]
-        logs, errors = np.array([rate.log_value for rate in own]), np.array([rate.log_error for rate in own])
-        total = float(np.logaddexp.reduce(logs))
-        error = float(np.linalg.norm(np.exp(logs - total) * errors))
-        found.append(ExitRate(source, own[0].target, intensity, total, error, own[0].event, own[0].method))
+        found.append(ExitRate.total(own))
     return found
 
 

@@ -101,8 +101,9 @@ def _drawn(one: Figure, folder: Path) -> list[Picture | Sentences]:
     """A figure for the page, and saved as a picture; a sentence where there is nothing to draw."""
     title = f"Figure {one.number}, {one.scene}. {one.caption}"
     try:
-        save_figure(one.draw(), folder / f"{one.name}.png")
-        return [Picture(inline_svg(one.draw, one.name), title)]
+        drawn = one.draw()
+        save_figure(drawn, folder / f"{one.name}.png")
+        return [Picture(inline_svg(drawn, one.name), title)]
     except VibrokitError as error:
         return [Sentences((f"{title} It could not be drawn: {error}",))]
 

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from enum import StrEnum
 
 from vibrokit.reproduction.published import Published
+from vibrokit.results.sentenced import Sentenced
 
 _SAMPLES = 1e9  # the states of a simulation that fills a histogram, at most
 
 
-class Match(StrEnum):
-    """Whether a published number is met; `reason` is a sentence with the fields of a `Verdict`."""
-
-    reason: str
-
-    def __new__(cls, value: str, reason: str) -> Match:
-        member = str.__new__(cls, value)
-        member._value_ = value
-        member.reason = reason
-        return member
+class Match(Sentenced):
+    """Whether a published number is met; its sentence has the fields of a `Verdict`."""
 
     MET = "met", "It lies within the interval."
     RING = (
@@ -72,7 +64,7 @@ class Verdict:
     def sentence(self) -> str:
         """Why the number is met or not."""
         below = 1 - self.certified / self.published.value
-        return self.match.reason.format(
+        return self.match.sentence.format(
             below=below, beside=self.beside, depth=self.depth, samples=_SAMPLES, certified=self.certified
         )
 

@@ -6,6 +6,8 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from vibrokit.construction import Constructed
 from vibrokit.results.labels import exit_between
 
@@ -50,6 +52,14 @@ class ExitRate(metaclass=Constructed):
         for name, side in (("log_lower", -_DEVIATIONS), ("log_upper", _DEVIATIONS)):
             if math.isnan(getattr(self, name)):
                 object.__setattr__(self, name, self.log_value + side * self.log_error)
+
+    @classmethod
+    def total(cls, rates: Sequence[ExitRate]) -> ExitRate:
+        """Return the rate of leaving an attractor at all, of its rates to each target at one noise intensity."""
+        logs, errors = np.array([rate.log_value for rate in rates]), np.array([rate.log_error for rate in rates])
+        total = float(np.logaddexp.reduce(logs))
+        error = float(np.linalg.norm(np.exp(logs - total) * errors))
+        return dataclasses.replace(rates[0], log_value=total, log_error=error, log_lower=math.nan, log_upper=math.nan)
 
     def exit_between(self, names: Sequence[str]) -> str:
         """Return the names of the attractors between which the exit leads: ``"hammering → clear"``."""

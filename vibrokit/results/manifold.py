@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import counted
+from vibrokit.results.sentenced import Sentenced
 
 
-class ManifoldEnd(StrEnum):
+class ManifoldEnd(Sentenced):
     """Why a branch ends at the last point of its curve; each has a sentence."""
-
-    sentence: str
-
-    def __new__(cls, value: str, sentence: str) -> ManifoldEnd:
-        member = str.__new__(cls, value)
-        member._value_ = value
-        member.sentence = sentence
-        return member
 
     LEAVES_REGION = "leaves-region", "The branch leaves the region, widened by its own size on every side."
     AT_REST = "at-rest", "The branch converges to a point."

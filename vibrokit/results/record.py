@@ -105,6 +105,11 @@ class Record(ABC, metaclass=Constructed):
         """Make a record of its arrays, which may come from a stranger's file; raises ResultFileError."""
 
     @property
+    def made_by(self) -> str:
+        """Name of the analyzer that made it; the kind of a record that no analyzer made."""
+        return str(self.settings.get("analyzer") or self.kind)
+
+    @property
     def status(self) -> str:
         """The findings as sentences, a line each."""
         return "\n".join(finding.sentence(self.names) for finding in self.findings)
@@ -124,6 +129,11 @@ class Record(ABC, metaclass=Constructed):
 
     def _repr_html_(self) -> str:
         return self.summary.html(self.findings, self.names)
+
+    @property
+    def serious(self) -> tuple[Finding, ...]:
+        """The warnings and errors among the findings."""
+        return tuple(finding for finding in self.findings if finding.severity is not Severity.INFO)
 
     @property
     def failed(self) -> bool:
