@@ -8,7 +8,7 @@ import numpy as np
 
 from vibrokit.errors import StructureError
 from vibrokit.reproduction.published import STATES, Method, Published, paper, published_energies
-from vibrokit.reproduction.verdicts import Verdict, of_action_plot, of_density, of_exit_times
+from vibrokit.reproduction.verdicts import Verdict, of_action_plot, of_density, of_exit_times, unknown
 from vibrokit.reproduction.work import Records
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.energy import ActivationEnergy
@@ -23,7 +23,13 @@ _DEVIATIONS = 1.96  # of the normal law, for intervals of 95 %
 
 def verdicts(records: Records) -> list[Verdict]:
     """Return a verdict for each published number whose records are there."""
-    return [verdict for one in published_energies() for verdict in _verdict(one, records.get(one.scene, {}))]
+    found: list[Verdict] = []
+    for one in published_energies():
+        try:
+            found += _verdict(one, records.get(one.scene, {}))
+        except StructureError as error:
+            found.append(unknown(one, str(error)))
+    return found
 
 
 def target_of(state: str) -> str | None:

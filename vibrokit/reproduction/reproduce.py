@@ -21,6 +21,7 @@ from vibrokit.reproduction.steps import Step, steps
 from vibrokit.reproduction.verdicts import Match, Verdict
 from vibrokit.reproduction.work import Records, do
 from vibrokit.results.pictures import save_figure
+from vibrokit.text_table import number_text
 
 PAGE = "reproduction.html"
 PUBLISHED = "published"
@@ -113,7 +114,8 @@ def verdict_table(found: list[Verdict]) -> Table:
     rows = tuple(
         (
             one.published.scene, one.published.state, str(one.published.method), f"{one.published.value:.4g}",
-            f"{one.value:.4g} ({one.lower:.4g} to {one.upper:.4g})", f"{one.certified:.6g}", str(one.match),
+            f"{number_text(one.value, '.4g')} ({number_text(one.lower, '.4g')} to {number_text(one.upper, '.4g')})",
+            number_text(one.certified, ".6g"), str(one.match),
             one.sentence,
         )
         for one in found

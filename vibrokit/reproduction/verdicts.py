@@ -31,6 +31,7 @@ class Match(Sentenced):
         "the limit.",
     )
     NOT_MET = "not-met", "It lies outside the interval."
+    UNKNOWN = "unknown", "There is no number of our own: {missing}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +50,8 @@ class Verdict:
     match : Match
     depth : float
         ΔU/D at the noise of the published number; NaN where it does not matter.
+    missing : str
+        Why there is no number of our own; empty if there is one.
     """
 
     published: Published
@@ -59,14 +62,25 @@ class Verdict:
     match: Match
     beside: float = math.nan
     depth: float = math.nan
+    missing: str = ""
 
     @property
     def sentence(self) -> str:
         """Why the number is met or not."""
         below = 1 - self.certified / self.published.value
         return self.match.sentence.format(
-            below=below, beside=self.beside, depth=self.depth, samples=_SAMPLES, certified=self.certified
+            below=below,
+            beside=self.beside,
+            depth=self.depth,
+            samples=_SAMPLES,
+            certified=self.certified,
+            missing=self.missing,
         )
+
+
+def unknown(one: Published, missing: str) -> Verdict:
+    """Return that nothing of our own can be compared, and why."""
+    return Verdict(one, math.nan, math.nan, math.nan, math.nan, Match.UNKNOWN, missing=missing)
 
 
 def _within(one: Published, lower: float, upper: float) -> bool:
