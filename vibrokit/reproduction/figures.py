@@ -104,9 +104,9 @@ def _times(scene: str, times: dict[str, Any], least: LeastActionResult) -> Artis
 
 
 def _escapes(scene: str, escapes: MFETResult, least: LeastActionResult) -> Artists:
-    source, target = STATES["I"], STATES["N"]
+    source, target, last = STATES["I"], STATES["N"], _LAST * load_scene(scene).section_interval
     path = least.energy(source, target).path
     return escapes.plot_escapes(
-        source=label_of(source, escapes.names), target=target, path=None if path is None else path.q,
-        last=_LAST * load_scene(scene).section_interval,
+        source=label_of(source, escapes.names), target=target, last=last,
+        path=None if path is None else path.q[path.t >= path.t[-1] - last],
     )  # fmt: skip
