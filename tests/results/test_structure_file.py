@@ -182,7 +182,7 @@ LIES = {
     "a stop on top": (stop(side="top"), "side 'top'"),
     "a kind in a list": (say("kind", ["structure"]), "kind = "),
     "another kind of result": (say("kind", "action_plot"), "no dimension 'chaotic_saddle'"),
-    "a newer format": (say("format", 4), "format 4, written by version"),
+    "a newer format": (say("format", 4), r"format 4, and format 3 is read\. It was written by vibrokit 0"),
     "no list of empty arrays": (say("empty", ...), "no entry 'empty'"),
     "an empty array that is not": (say("empty", {"x": {"dims": ["x"], "shape": [0], "dtype": "f"}}), "contradict"),
     "an empty array of no type": (say("empty", {"q": {"dims": ["q"], "shape": [0], "dtype": "V"}}), "contradict"),

@@ -280,9 +280,11 @@ class Assessment(Record):
         if not isinstance(structure, Structure):
             raise ResultFileError("it holds no structure")
         results = {name: one for name, one in records.items() if isinstance(one, Result)}
-        shape = len(results), len(structure.names)
-        table = Arrays(dataset).numbers("reached", shape, 0.0, finite=False)
-        return cls(structure=structure, results=results, reached=dict(zip(results, table, strict=True)), **provenance)
+        arrays, shape = Arrays(dataset), (len(results), len(structure.names))
+        if "reached" in arrays:  # without it no analysis counts as finished, and an assessment that goes on repeats it
+            table = arrays.numbers("reached", shape, 0.0, finite=False)
+            provenance["reached"] = dict(zip(results, table, strict=True))
+        return cls(structure=structure, results=results, **provenance)
 
     def parts(self, name: str) -> dict[int, tuple[Result, float]]:
         """What one result says of each attractor that was analyzed, by its label, and for what accuracy that is."""

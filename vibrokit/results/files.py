@@ -30,6 +30,7 @@ ATTRIBUTES = ("title", "Conventions", "source", "history", "status", HEADER)
 
 _READINGS = 2  # a sound file is read once, to the byte
 _MAGIC = b"CDF"  # how netCDF 3 files begin
+_NO_WRITER = "Give a file written by save."
 _INT32 = np.iinfo(np.int32)
 
 
@@ -63,10 +64,12 @@ def load_result(path: str | os.PathLike[str]) -> Any:
     NoSuchFileError
         There is no such file.
     """
-    where = path_of(path)
+    where, advice = path_of(path), _NO_WRITER
     try:
         content = _read(where)
         dataset, header = _opened(content)
+        advice = _advice(header)
+        dataset = _checked(dataset, header)
         kind = taken(header, "kind", str)
         provenance = provenance_from(header)
         try:
@@ -76,7 +79,7 @@ def load_result(path: str | os.PathLike[str]) -> Any:
         return record.from_dataset(dataset, **provenance)
     except ResultFileError as error:
         raise ResultFileError(
-            f"{where} is no result that this vibrokit can open: {str(error).rstrip('.')}. Give a file written by save."
+            f"{where} is no result that this vibrokit can open: {str(error).rstrip('.')}. {advice}"
         ) from error
 
 
@@ -183,14 +186,24 @@ def _opened(content: bytes) -> tuple[xarray.Dataset, Any]:
     if HEADER not in dataset.attrs:
         raise ResultFileError(f"it has no attribute {HEADER!r}")
     header = json_data(dataset.attrs[HEADER])
-    if taken(header, "format", int) != FORMAT:
+    return dataset, header
+
+
+def _advice(header: Any) -> str:
+    """What to do with a file that cannot be opened, by who wrote it."""
+    try:
         writer = taken(taken(header, "versions", dict), "vibrokit", str)
-        raise ResultFileError(
-            f"it is of format {shown(header['format'])}, written by version {writer}, and this version reads format "
-            f"{FORMAT}"
-        )
+    except ResultFileError:
+        return _NO_WRITER
+    return f"It was written by vibrokit {writer}: open it with that version, or compute it again."
+
+
+def _checked(dataset: xarray.Dataset, header: Any) -> xarray.Dataset:
+    """The arrays of a record, if this version reads the format."""
+    if taken(header, "format", int) != FORMAT:
+        raise ResultFileError(f"it is of format {shown(header['format'])}, and format {FORMAT} is read")
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in ATTRIBUTES}
-    return _with_empty(dataset, taken(header, "empty", dict)).drop_encoding(), header
+    return _with_empty(dataset, taken(header, "empty", dict)).drop_encoding()
 
 
 def _with_empty(dataset: xarray.Dataset, empty: dict[str, Any]) -> xarray.Dataset:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vibrokit.results.record import Record
 
 FORMAT = 3
-"""Format of the files that this version writes and reads."""
+"""Format of the files that this version writes and reads: a change after which a file no longer opens raises it."""
 
 _NOT_FINITE = "float"  # {"float": "nan"} stands for a number that JSON does not have
 _CODES = {code.value: code for code in Code}
