@@ -56,6 +56,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="vibrokit",
         description="Stochastic stability of vibro-impact oscillators: how hard each state is to leave.",
+        epilog="Begin with 'vibrokit assess hertz-0.570 -o answer.nc' and 'vibrokit report answer.nc -o answer.html'; "
+        "'vibrokit COMMAND --help' explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"vibrokit {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -69,6 +71,8 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser(
         "run",
         help="find steady states and their activation energies",
+        description="Find the steady states of a scene and what its analyzers compute: activation energies, rates, "
+        "densities. 'vibrokit assess' makes one answer of them.",
         epilog="Each result is printed and saved when it is found. Ctrl-C, SIGTERM and the time limit stop the work; "
         "what was found is kept, marked incomplete.",
     )
@@ -108,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
 
     reconcile = commands.add_parser(
         "reconcile", help="compare saved results of one scene, exit by exit",
+        description="Say whether the methods of saved results agree, exit by exit, within their errors.",
         epilog="The exit status is 1 if two results disagree, or one is incomplete.",
     )  # fmt: skip
     reconcile.add_argument("file", type=Path, nargs="+", help="what run or save wrote, two files at least")

@@ -19,6 +19,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], sc
         "assess",
         parents=[scene],
         help="answer how long each state lasts, by all methods, and whether they agree",
+        description="Find the steady states of a scene, and answer how long noise leaves the mass in each of them, by "
+        "three methods. With -o FILE, 'vibrokit report FILE -o page.html' makes a page of the answer.",
         epilog="Ctrl-C, SIGTERM and the time limit stop the work; the answers that were reached are printed and kept.",
     )
     parser.add_argument("--accuracy", type=float, default=0.1, help="relative error that is wanted (default 0.1)")
