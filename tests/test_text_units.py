@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vibrokit.errors import ParameterError
-from vibrokit.text_units import number_in, size_of
+from vibrokit.text_units import familiar, number_in, size_of
 
 
 @pytest.mark.parametrize(
@@ -43,3 +43,16 @@ def test_what_is_no_number(text, base, words):
 def test_a_unit_that_is_unknown():
     with pytest.raises(ParameterError, match="rpm"):
         size_of("rpm", "s^-1")
+
+
+def test_familiar_units():
+    given = [
+        (80 * math.pi, "s^-1"),
+        (4e3 * math.pi, "s^-1"),
+        (3.0, "s^-1"),
+        (-2.5e-4, "m"),
+        (0.1, "m"),
+        (2.0, "m"),
+        (5.0, "s"),
+    ]
+    assert [familiar(*one) for one in given] == ["40 Hz", "2 kHz", "", "-250 µm", "100 mm", "", ""]

@@ -30,6 +30,13 @@ def size_of(unit: str, base: str | None) -> float:
     return known[unit]
 
 
+def familiar(value: float, base: str | None) -> str:
+    """Return a number in SI base units in the largest other unit in which it is 1 at least, such as ``"40 Hz"``."""
+    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if abs(value) >= size}
+    name = max(fitting, key=fitting.__getitem__, default="")
+    return "" if fitting.get(name, 1.0) == 1.0 else f"{value / fitting[name]:.6g} {name}"
+
+
 def number_in(text: str, base: str | None) -> tuple[float, str | None]:
     """Return the number that a text such as ``"42 Hz"`` stands for, in SI base units, and its unit if it has one.
 

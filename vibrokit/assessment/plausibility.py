@@ -66,9 +66,13 @@ class Row:
     value: float
     subject: str = ""
 
+    @property
+    def heading(self) -> str:
+        """The quantity, and what it belongs to."""
+        return self.measure.heading + (f" ({self.subject})" if self.subject else "")
+
     def __str__(self) -> str:
-        of = f" ({self.subject})" if self.subject else ""
-        return f"{self.measure.heading}{of}: {self.value:.4g} {self.measure.unit}".rstrip()
+        return f"{self.heading}: {self.value:.4g} {self.measure.unit}".rstrip()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,10 +94,7 @@ class Plausibility:
         return next((row.value for row in self.rows if (row.measure, row.subject) == (measure, subject)), math.nan)
 
     def __str__(self) -> str:
-        cells = [
-            (row.measure.heading + (f" ({row.subject})" if row.subject else ""), f"{row.value:.4g} {row.measure.unit}")
-            for row in self.rows
-        ]
+        cells = [(row.heading, f"{row.value:.4g} {row.measure.unit}") for row in self.rows]
         return "\n".join([*(text_table(cells) if cells else []), *map(str, self.oddities)])
 
 

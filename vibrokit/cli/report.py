@@ -11,6 +11,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = commands.add_parser(
         "report",
         help="print what saved results of one scene say, or write a page to hand on",
+        description="Print what saved results of one scene say; with -o, write a page that begins with the answer in "
+        "plain words and ends with all settings. A file that exists is replaced.",
         epilog="The page needs nothing else: no script, no file, no network. The exit status is 1 if a result is "
         "incomplete.",
     )
@@ -25,7 +27,8 @@ def report_files(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     from vibrokit.assessment.assessment import Assessment
     from vibrokit.report.assessment import assessment_text
-    from vibrokit.report.report import Report, checked_page
+    from vibrokit.report.material import gathered
+    from vibrokit.report.report import Report, checked_page, made_folder
     from vibrokit.report.tables import input_table
     from vibrokit.report.text import record_text
     from vibrokit.results.atomic import checked_target
@@ -33,14 +36,17 @@ def report_files(options: argparse.Namespace) -> int:
 
     if options.output is not None:
         checked_target(checked_page(options.output))
+    if options.tables is not None:
+        made_folder(options.tables)
     records = [load_result(path) for path in options.file]
     if options.output is None and options.tables is None:
+        material = gathered(records)
+        for one in material:
+            title = f"{', '.join(map(str, options.file))}: {one.kind}"
+            text = assessment_text(title, one) if isinstance(one, Assessment) else record_text(title, one)
+            print(text, end="\n\n")
         print(input_table(records[0].oscillator).text)
-        for path, record in zip(options.file, records, strict=True):
-            title = f"{path}: {record.kind}"
-            whole = isinstance(record, Assessment)
-            print(f"\n{assessment_text(title, record) if whole else record_text(title, record)}")
-        return 0
+        return 0 if all(one.complete for one in material) else 1
     report = Report.of(*records, title=options.title or options.file[0].stem)
     if options.output is not None:
         report.save(options.output)

@@ -53,16 +53,24 @@ def overview_text(one: Reconciliation) -> str:
 
 def agreement_text(one: Reconciliation) -> str:
     """Return whether the methods agree, and what could not be compared."""
-    left = _not_compared(one)
-    wrong = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is Agreement.DISAGREE)
-    open_ = dict.fromkeys(v.about(one.names) for v in one.verdicts if v.code is not Agreement.AGREE)
+    open_ = _about(one, (code for code in Agreement if code not in (Agreement.AGREE, Agreement.DISAGREE)))
+    return " ".join([agreement_sentence(one), *([f"Not settled: {open_}."] if open_ else []), *_not_compared(one)])
+
+
+def agreement_sentence(one: Reconciliation) -> str:
+    """Return whether the methods agree."""
+    wrong = _about(one, [Agreement.DISAGREE])
     if wrong:
-        found = f"Methods disagree on {', '.join(wrong)}."
-    elif open_:
-        found = f"No methods disagree. What is not settled: {', '.join(open_)}."
-    else:
-        found = "The methods agree where they were compared." if left else "All methods agree."
-    return " ".join([found, *left])
+        return f"Methods disagree on {wrong}: do not rely on its numbers yet."
+    if _not_compared(one) or any(verdict.code is not Agreement.AGREE for verdict in one.verdicts):
+        return "No methods disagree, but not every number is confirmed by a second method."
+    return "All methods agree."
+
+
+def _about(one: Reconciliation, codes: Iterable[Agreement]) -> str:
+    """What the verdicts with these codes are about, each once."""
+    wanted = tuple(codes)
+    return ", ".join(dict.fromkeys(verdict.about(one.names) for verdict in one.verdicts if verdict.code in wanted))
 
 
 def _not_compared(one: Reconciliation) -> list[str]:

@@ -59,6 +59,7 @@ def draw(ax: Axes, points: ArrayLike, **style: Any) -> Line2D:
 def phase_plane(ax: Axes) -> None:
     """Label the axes with displacement and velocity; very small and very large numbers have a common power of ten."""
     ax.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+    ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel(r"displacement $x$ (m)")
     ax.set_ylabel(r"velocity $v$ (m s$^{-1}$)")
 

@@ -121,7 +121,7 @@ def quasi_potential_map(
     )  # fmt: skip
     bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.legend(
-        handles=named((attractor, *more, *crosses, *dots)), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=4,
+        handles=named((attractor, *more, *crosses, *dots)), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4,
         fontsize=8, frameon=False,
     )  # fmt: skip
     return QuasiPotentialArtists(axes, image, contours, attractor, tuple(more), crosses, dots, bar)

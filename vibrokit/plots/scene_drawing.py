@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,11 +18,12 @@ from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new
 
 # Places in the drawing.
-_WALL, _SIDE, _TOP = -5.4, 1.2, 2.0  # the wall, half the width of the mass, and its upper face
+_WALL, _SIDE, _TOP = -6.6, 1.2, 2.0  # the wall, half the width of the mass, and its upper face
 _TONGUE = 0.12  # half the width of what touches the stops
 _FACE = 1.5  # distance of a stop from the middle
 _SPRING, _DAMPER = 1.5, 0.75  # heights
-_FIRST_FORCE, _BETWEEN_FORCES = 1.7, 0.6  # heights of arrows
+_FIRST_FORCE, _LAST_FORCE, _BETWEEN_FORCES = 1.9, 0.4, 0.6  # heights of arrows, and the most between two
+_LINE = 40  # characters that have room beside the mass
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,24 +73,26 @@ def scene_drawing(
     SceneArtists
     """
     axes = axes_or_new(ax, 8.0, 3.9)
+    if ax is None and (figure := axes.get_figure(root=True)) is not None:
+        figure.set_layout_engine("none")  # a layout would shrink the drawing, but no words, to make room for words
     ink = str(axes.xaxis.label.get_color())
     mass = _mass(axes, ink)
     (zigzag,) = axes.plot(*_zigzag(), color=ink, lw=1.2)
     rods = tuple(line for xs, ys in _dash_pot() for line in axes.plot(xs, ys, color=ink, lw=1.2))
-    middle = (_WALL - _SIDE) / 2
-    texts = [_text(axes, middle, _SPRING + 0.6, spring), _text(axes, middle, -0.35, damper)]
+    texts = [_text(axes, (_WALL, -0.2), _wrapped(f"{spring}\n{damper}"), "left", "top")]
     blocks = []
     for side, words in stops:
         blocks.append(_stop(axes, side, ink))
-        place = (_FACE + 0.6) * (1 if side == "right" else -1)
-        texts.append(axes.text(place, 3.4, words, ha="left" if side == "right" else "right", va="center", fontsize=9))
+        place, align = (_FACE + 0.6, "left") if side == "right" else (-_FACE - 0.6, "right")
+        texts.append(_text(axes, (place, 3.2), _wrapped(words), align, "bottom"))
     arrows = [(force, "solid") for force in forces] + ([(noise, "dotted")] if noise else [])
+    between = min(_BETWEEN_FORCES, (_FIRST_FORCE - _LAST_FORCE) / max(1, len(arrows) - 1))
     for index, (words, style) in enumerate(arrows):
-        height = _FIRST_FORCE - _BETWEEN_FORCES * index
+        height = _FIRST_FORCE - between * index
         _arrow(axes, (_SIDE, height), (_SIDE + 1.0, height), ink, style)
-        texts.append(axes.text(_SIDE + 1.15, height, words, ha="left", va="center", fontsize=9))
-    axes.set_xlim(_WALL - 0.6, 8.0)
-    axes.set_ylim(min(-0.8, _FIRST_FORCE - _BETWEEN_FORCES * len(arrows)), 4.2)
+        texts.append(_text(axes, (_SIDE + 1.15, height), words, "left", "center"))
+    axes.set_xlim(_WALL - 0.6, 3.0)
+    axes.set_ylim(-0.8, 4.2)
     axes.set_aspect("equal")
     axes.set_axis_off()
     return SceneArtists(axes, mass, zigzag, rods, tuple(blocks), tuple(texts))
@@ -110,8 +114,12 @@ def _mass(axes: Axes, ink: str) -> Rectangle:
     return mass
 
 
-def _text(axes: Axes, x: float, y: float, words: str) -> Text:
-    return axes.text(x, y, words, ha="center", va="center", fontsize=9)
+def _text(axes: Axes, place: tuple[float, float], words: str, across: str, up: str) -> Text:
+    return axes.text(*place, words, ha=across, va=up, fontsize=9)
+
+
+def _wrapped(words: str) -> str:
+    return "\n".join(textwrap.fill(line, _LINE) for line in words.splitlines())
 
 
 def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], ink: str, style: str) -> None:

@@ -11,14 +11,13 @@ from typing import Any
 from vibrokit.assessment.answers import Answer
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.durations import duration_text
+from vibrokit.assessment.plausibility import Measure
 from vibrokit.comparison.tables import agreement_text, verdicts_text
 from vibrokit.errors import StructureError
 from vibrokit.report.blocks import Sentences, Table
 from vibrokit.report.data import findings_data, plain, run_data
 from vibrokit.report.text import findings_text
-from vibrokit.results.codes import Severity
 from vibrokit.results.energy import bounds_text
-from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_name
 
 
@@ -42,60 +41,38 @@ def assessment_text(title: str, one: Assessment, question: Question = Question()
     """Return the answers, the verdicts on the methods, and what is left open."""
     heading = title if one.complete else f"{title} (incomplete)"
     sections = [heading, states_text(one), *_questions(one, question), trust_text(one)]
-    parts = {"states": one.structure.findings, **{name: part.findings for name, part in one.results.items()}}
-    sections += [
-        _open_text(name, findings, one.names) for name, findings in {**parts, "assessment": one.findings}.items()
-    ]
+    parts = {"states": one.structure, **one.results, "assessment": one}
+    serious = {name: findings_text(part.serious, one.names) for name, part in parts.items()}
+    sections += [f"{name}:\n{text}" for name, text in serious.items() if text]
     return "\n\n".join(section for section in sections if section) + f"\n\n{one.seconds:.1f} s."
-
-
-def _open_text(name: str, findings: Sequence[Finding], names: Sequence[str]) -> str:
-    """What limits the numbers, each sentence once; what only explains them is in the records."""
-    serious = [finding for finding in findings if finding.severity is not Severity.INFO]
-    text = findings_text(list({finding.sentence(names): finding for finding in serious}.values()), names)
-    return f"{name}:\n{text}" if text else ""
 
 
 def states_text(one: Assessment) -> str:
     """Return how long each state lasts, its activation energy and its share of time: a table of each."""
     if not one.names:
         return "No steady state was found."
-    shares, why = _shares(one)
-    texts = ["\n".join([f"At {noise_text(one)}:", *lasting_table(one).lines]), "\n".join(barrier_table(one).lines)]
-    if not why:
-        texts.append("\n".join(share_table(one, shares).lines))
-    return "\n\n".join([*texts, *why])
+    tables = "\n\n".join("\n".join(block.lines) for block in states_blocks(one))
+    return f"Under {noise_text(one)}:\n{tables}"
 
 
 def noise_text(one: Assessment) -> str:
-    """Return the noise intensity of the scene, and its spectral density where that has a value."""
-    density = one.psd_ratio * one.intensity
-    psd = "" if math.isnan(density) else f", a PSD of {density:.4g} (m/s²)²/Hz"
-    return f"D = {one.intensity:g} m² s⁻³{psd}"
+    """Return the spectral density of the noise of the scene, where it has one, and its intensity."""
+    density, in_g = (one.plausibility.value(measure) for measure in (Measure.PSD, Measure.PSD_G))
+    if math.isnan(density):
+        return f"noise of intensity D = {one.intensity:g} m² s⁻³"
+    return f"noise with a PSD of {density:.4g} (m/s²)²/Hz = {in_g:.4g} g²/Hz (D = {one.intensity:g} m² s⁻³)"
 
 
 def states_blocks(one: Assessment) -> list[Table | Sentences]:
     """Return the tables of how long each state lasts, of its activation energy and of its share of time."""
-    shares, why = _shares(one)
-    last = Sentences(tuple(why)) if why else share_table(one, shares)
-    return [lasting_table(one), barrier_table(one), last]
-
-
-def lasting_table(one: Assessment) -> Table:
-    """Return how long each state lasts."""
-    rows = tuple((name, *_lasting(one, label)) for label, name in enumerate(one.names))
-    return Table("lasting", "How long each state lasts", ("state", "mean time until it is left", "by"), rows)
-
-
-def barrier_table(one: Assessment) -> Table:
-    """Return the activation energy of each state."""
-    rows = tuple((name, *_barrier(one, label)) for label, name in enumerate(one.names))
-    return Table("barriers", "Activation energies", ("state", "ΔU (m² s⁻³)", "bounds", "to"), rows)
-
-
-def share_table(one: Assessment, shares: Sequence[str]) -> Table:
-    """Return the share of time of each state."""
-    return Table("shares", "Shares of time", ("state", "share of time"), tuple(zip(one.names, shares, strict=True)))
+    lasting, barriers = (
+        tuple((name, *told(one, label)) for label, name in enumerate(one.names)) for told in (_lasting, _barrier)
+    )
+    return [
+        Table("lasting", "Mean times", ("state", "mean time until it is left", "by"), lasting),
+        Table("barriers", "Activation energies", ("state", "ΔU (m² s⁻³)", "bounds", "to"), barriers),
+        *_shares(one),
+    ]
 
 
 def trust_text(one: Assessment) -> str:
@@ -143,20 +120,21 @@ def _answered(answer: Callable[[int], Answer], label: int) -> str:
         return str(error)
 
 
-def _shares(one: Assessment) -> tuple[list[str], list[str]]:
-    """The share of time of each state, and what limits it or why there is none."""
+def _shares(one: Assessment) -> list[Table | Sentences]:
+    """The share of time of each state and what limits it, or why there is none."""
     try:
         found = one.occupancy()
     except StructureError as error:
-        return ["–" for _ in one.names], [f"There are no shares of time: {error}"]
-    texts = []
+        return [Sentences((f"There are no shares of time: {error}",))]
+    rows = []
     for share, name in zip(found, one.names, strict=True):
         state = str(share["state"].item())
         interval = f"({float(share['lower']):.2g} to {float(share['upper']):.2g})"
-        texts.append(f"{float(share):.3g} {interval}" if state == name else f"with {state}")
+        rows.append((name, f"{float(share):.3g} {interval}" if state == name else f"with {state}"))
     time = float(found["log_escape_time"])
     until = f"Shares are of the time before motion escapes, after {duration_text(time)} on average."
-    return texts, [until] if math.isfinite(time) else []
+    note = [Sentences((until,))] if math.isfinite(time) else []
+    return [Table("shares", "Shares of time", ("state", "share of time"), tuple(rows)), *note]
 
 
 def _lasting(one: Assessment, label: int) -> Sequence[str]:

@@ -36,8 +36,9 @@ def chapters_of(records: Sequence[Record]) -> tuple[Chapter, ...]:
         Chapter(_heading(name), (*blocks_of(part), *pictures_of(part, f"r{number}")))
         for number, (name, part) in enumerate(parts)
     ]
-    made = work_chapter(parts, _scene_file(osc))
-    found = [*answers, _scene(osc), *evidence, *_agreement(records), _limits(parts, records), made]
+    own = [(record.kind, record) for record in records if isinstance(record, Assessment)]
+    made = _limits([*parts, *own]), work_chapter([*parts, *own], _scene_file(osc))
+    found = [*answers, _scene(osc), *evidence, *_agreement(records), *made]
     return tuple(chapter for chapter in found if chapter.blocks)
 
 
@@ -60,17 +61,16 @@ def _answers(one: Assessment) -> Iterator[Chapter]:
 def _scene(osc: Oscillator) -> Chapter:
     checked = plausibility(osc)
     oddities = (Sentences(tuple(map(str, checked.oddities)), listed=True),) if checked.oddities else ()
-    blocks = (scene_picture(osc), input_table(osc), Formulas(osc.model.mathml), _closed_forms(checked), *oddities)
+    told = Sentences(("Equations of the most probable paths, on which p₂ stands for the noise:",))
+    blocks = (scene_picture(osc), input_table(osc), told, Formulas(osc.model.mathml), _closed_forms(checked), *oddities)
     return Chapter("Scene", blocks)
 
 
 def _closed_forms(checked: Plausibility) -> Table:
-    rows = tuple(
-        (f"{row.measure.heading} ({row.subject})" if row.subject else row.measure.heading, f"{row.value:.4g}",
-         row.measure.unit or "1")
-        for row in checked.rows
-    )  # fmt: skip
-    return Table("closed-forms", "Closed forms", ("quantity", "value", "unit"), rows)
+    rows = tuple((row.heading, f"{row.value:.4g}", row.measure.unit or "1") for row in checked.rows)
+    return Table(
+        "closed-forms", "What formulas say of the scene, before any search", ("quantity", "value", "unit"), rows
+    )
 
 
 def _agreement(records: Iterable[Record]) -> Iterator[Chapter]:
@@ -82,19 +82,18 @@ def _agreement(records: Iterable[Record]) -> Iterator[Chapter]:
                 continue
 
 
-def _limits(parts: Sequence[Named], records: Iterable[Record]) -> Chapter:
-    """The findings of all parts, each sentence once."""
-    own = [(record.kind, record) for record in records if isinstance(record, Assessment)]
+def _limits(parts: Sequence[Named]) -> Chapter:
+    """The warnings and errors of all parts."""
     blocks: list[Sentences] = []
-    for name, part in [*parts, *own]:
-        lines = dict.fromkeys(findings_text(part.findings, part.names).splitlines())
+    for name, part in parts:
+        lines = tuple(findings_text(part.serious, part.names).splitlines())
         if lines:
-            blocks += [Sentences((f"{name}:",)), Sentences(tuple(lines), listed=True)]
+            blocks += [Sentences((f"{name}:",)), Sentences(lines, listed=True)]
     return Chapter("What limits the numbers", tuple(blocks))
 
 
 def work_chapter(parts: Sequence[Named], *more: Block) -> Chapter:
-    """Return how records were computed: work, versions and settings of each, and more."""
+    """Return how records were computed: work, versions, settings and remarks of each, and more."""
     rows = [
         (name, "yes" if part.complete else "no", "–" if part.seed is None else str(part.seed), stats_text(part))
         for name, part in parts
@@ -102,9 +101,13 @@ def work_chapter(parts: Sequence[Named], *more: Block) -> Chapter:
     versions = dict.fromkeys(pair for _, part in parts for pair in part.versions.items())
     blocks: list[Block] = [
         Table("work", "Work", ("part", "complete", "seed", "time"), tuple(rows)),
-        Table("versions", "Versions", ("program", "version"), tuple(versions)),
-        *(Listing(f"Settings of {name}", _settings_text(part)) for name, part in parts),
+        Sentences((f"Computed with {', '.join(' '.join(pair) for pair in versions)}.",)),
     ]
+    for name, part in parts:
+        remarks = [one for one in part.findings if one not in part.serious]
+        blocks.append(Listing(f"Settings of {name}", _settings_text(part)))
+        if remarks:
+            blocks.append(Listing(f"Remarks of {name}", findings_text(remarks, part.names)))
     return Chapter("How it was computed", (*blocks, *more))
 
 

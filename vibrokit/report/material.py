@@ -20,7 +20,7 @@ def gathered(records: Sequence[Record]) -> list[Record]:
     Raises
     ------
     ArgumentError
-        There is no record, or something is no record.
+        There is no record, something is no record, or there are two assessments or two structures.
     StructureError
         The records are of different scenes, or a result is of other steady states than the structure.
     """
@@ -30,8 +30,15 @@ def gathered(records: Sequence[Record]) -> list[Record]:
         if not isinstance(one, Record):
             raise ArgumentError(f"a report is made of records, such as an assessment or a result, got {shown(one)}.")
         check_scene("a record", one, records[0].scene)
-    whole = next((one for one in records if isinstance(one, Assessment)), None)
-    structure = next((one for one in records if isinstance(one, Structure)), whole.structure if whole else None)
+    wholes = [one for one in records if isinstance(one, Assessment)]
+    structures = [one for one in records if isinstance(one, Structure)]
+    if len(wholes) > 1 or len(structures) > 1:
+        raise ArgumentError(
+            f"a report is of one assessment and one structure at most, got {len(wholes)} and {len(structures)}; make a "
+            "report of each."
+        )
+    whole = wholes[0] if wholes else None
+    structure = structures[0] if structures else whole.structure if whole else None
     results = [one for one in records if isinstance(one, Result)]
     if structure is None or (whole is None and not results):
         return list(records)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import singledispatch
+from functools import partial, singledispatch
 from typing import Any
 
 from vibrokit.assessment.assessment import Assessment
@@ -14,10 +14,13 @@ from vibrokit.plots.inline_svg import inline_svg
 from vibrokit.plots.scene_drawing import scene_drawing
 from vibrokit.report.blocks import Picture
 from vibrokit.report.tables import number, symbol_text
+from vibrokit.results.mfet import MFETResult
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
+from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure
 from vibrokit.text_table import unit_text
+from vibrokit.text_units import familiar
 
 Drawing = tuple[str, Callable[[], Any]]
 """What a picture shows, and what draws it."""
@@ -37,9 +40,9 @@ def pictures_of(record: Record, name: str) -> list[Picture]:
 def scene_picture(osc: Oscillator) -> Picture:
     """Return the drawing of a scene with its values."""
     drawn = scene_drawing(
-        spring=f"ω_n = {osc.natural_frequency:.6g} s⁻¹" if osc.spring is None else _part_text(osc.spring),
+        spring=_value_text("ω_n", osc.natural_frequency, "s^-1") if osc.spring is None else _part_text(osc.spring),
         damper=f"ζ = {osc.damping_ratio:.6g}",
-        stops=[(one.side, f"at x = {one.position:.6g} m\n{_part_text(one.law)}") for one in osc.barriers],
+        stops=[(one.side, f"at {_value_text('x', one.position, 'm')}\n{_part_text(one.law)}") for one in osc.barriers],
         forces=[_part_text(part) for part in osc.excitations],
         noise="" if osc.noise is None else _part_text(osc.noise),
     )
@@ -59,9 +62,22 @@ def _of_structure(structure: Structure) -> Iterator[Drawing]:
 
 @_drawings.register
 def _of_result(result: Result) -> Iterator[Drawing]:
-    yield "", result.plot
     if any(energy.path is not None for energy in result.energies):
+        yield "Exit paths from section to section, over the basins.", result.plot
         yield "Momentum and action along the exit paths.", result.plot_history
+    else:
+        yield "", result.plot
+
+
+@_drawings.register
+def _of_exit_times(result: MFETResult) -> Iterator[Drawing]:
+    yield "Mean exit times against 1/D.", result.plot
+
+
+@_drawings.register
+def _of_densities(result: SGCMResult) -> Iterator[Drawing]:
+    for label, name in enumerate(result.names):
+        yield f"Density at {name}, as −D ln p at the least noise intensity.", partial(result.plot, source=label)
 
 
 @_drawings.register
@@ -72,5 +88,10 @@ def _of_assessment(one: Assessment) -> Iterator[Drawing]:
 def _part_text(part: Part) -> str:
     """The class of a part and its parameters with units."""
     values = part.parameters
-    texts = [f"{symbol_text(d.symbol)} = {number(values[d.name])} {unit_text(d.unit or '')}" for d in part.declared()]
-    return f"{type(part).__name__}: {', '.join(text.rstrip() for text in texts)}"
+    texts = [_value_text(symbol_text(one.symbol), values[one.name], one.unit or "") for one in part.declared()]
+    return f"{type(part).__name__}: {', '.join(texts)}"
+
+
+def _value_text(symbol: str, value: float, unit: str) -> str:
+    other = familiar(value, unit)
+    return f"{symbol} = {number(value)} {unit_text(unit)}".rstrip() + (f" ({other})" if other else "")

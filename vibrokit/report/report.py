@@ -95,11 +95,7 @@ class Report:
         FileError
             A file cannot be written.
         """
-        target, files = path_of(folder), list[Path]()
-        try:
-            target.mkdir(exist_ok=True)
-        except OSError as error:
-            raise FileError(f"{target} cannot be made a folder ({error.strerror}); give another one.") from error
+        target, files = made_folder(folder), list[Path]()
         for chapter in self.chapters:
             for block in chapter.blocks:
                 if isinstance(block, Table) and block.rows:
@@ -107,6 +103,16 @@ class Report:
                     files.append(target / f"{name}.csv")
                     write_atomically(files[-1], block.csv.encode("utf-8"))
         return tuple(files)
+
+
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a folder, which is made if there is none; raises FileError if that is not possible."""
+    target = path_of(path)
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{target} cannot be made a folder ({error.strerror}); give another one.") from error
+    return target
 
 
 def checked_page(path: str | os.PathLike[str]) -> Path:

@@ -21,6 +21,7 @@ from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.results.sweep import Sweep
 from vibrokit.text_table import number_text, power_text, unit_text
+from vibrokit.text_units import familiar
 
 
 def input_table(osc: Oscillator) -> Table:
@@ -28,9 +29,10 @@ def input_table(osc: Oscillator) -> Table:
     symbols, rows = osc.model.symbols, []
     for path, declared, value in osc.entries:
         unit = "not declared" if declared.unit is None else unit_text(declared.unit) or "1"
-        rows.append((path, symbol_text(str(symbols[path])) if path in symbols else "", number(value), unit))
-    rows += [(f"barriers.{index}.side", "", one.side, "") for index, one in enumerate(osc.barriers)]
-    return Table("inputs", "Inputs", ("parameter", "symbol", "value", "unit"), tuple(rows))
+        symbol = symbol_text(str(symbols[path])) if path in symbols else ""
+        rows.append((path, symbol, number(value), unit, familiar(value, declared.unit)))
+    rows += [(f"barriers.{index}.side", "", one.side, "", "") for index, one in enumerate(osc.barriers)]
+    return Table("inputs", "Inputs", ("parameter", "symbol", "value", "unit", "that is"), tuple(rows))
 
 
 def attractor_table(structure: Structure) -> Table:
@@ -64,7 +66,7 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> Table:
     rows = []
     for e in energies:
         ratio = number_text(e.value / intensity if intensity else math.nan, ".4g")
-        bounds = f"{e.lower:.6g}", "unknown" if math.isinf(e.upper) else f"{e.upper:.6g}", str(e.bound)
+        bounds = number_text(e.lower, ".6g"), "unknown" if math.isinf(e.upper) else f"{e.upper:.6g}", str(e.bound)
         errors = number_text(e.numerical_error, ".1e"), number_text(e.residual, ".1e")
         saddle = str(e.saddle) if e.saddle >= 0 else "–"
         value = f"{e.value:.{_digits(e)}g}"
@@ -143,4 +145,4 @@ def _digits(energy: ActivationEnergy) -> int:
 
 
 def _place(points: Any, digits: int) -> str:
-    return f"({points[0, 0]:+.{digits}f}, {points[0, 1]:+.{digits}f})"
+    return f"({points[0, 0]:.{digits}g}, {points[0, 1]:.{digits}g})"

@@ -88,28 +88,26 @@ def _result_blocks(result: Result) -> list[Block]:
         title = "All paths, the cheapest of each exit first"
         found.append(dataclasses.replace(energy_table(result, ranked), name="paths", title=title, detail=True))
     found += [dataclasses.replace(sensitivity_table(result), detail=True), rate_table(result)]
-    if any(energy.target >= 0 for energy in result.energies):
-        text = transitions_text(Transitions.of(result), noise_intensity(result))
-        found.append(Listing("Transitions", text, detail=True))
-    return found
+    return [*found, *_transitions(result)] if any(energy.target >= 0 for energy in result.energies) else found
 
 
-def transitions_text(transitions: Transitions, intensity: float) -> str:
-    """Return energies between all attractors and what follows, or what is missing for that."""
+def _transitions(result: Result) -> list[Block]:
+    """Energies between all attractors with what follows from them, if enough of them are known."""
+    transitions, intensity = Transitions.of(result), noise_intensity(result)
     if not transitions.known:
-        return transitions.verdict
+        return []
     weights = [str(transitions.stationary_weights(intensity))] if intensity > 0 else []
-    return "\n".join([str(transitions), *weights])
+    return [Listing("Transitions", "\n".join([str(transitions), *weights]), detail=True)]
 
 
 def findings_text(findings: Sequence[Finding], names: Sequence[str] = ()) -> str:
-    """Return the findings as sentences: errors and warnings with advice, then information."""
+    """Return the findings as sentences, each once: errors and warnings with advice, then information."""
     lines = []
     for severity in (Severity.ERROR, Severity.WARNING, Severity.INFO):
         for finding in (one for one in findings if one.severity is severity):
             advice = "" if severity is Severity.INFO else f" {finding.advice}"
             lines.append(f"{severity}: {finding.sentence(names)}{advice}".rstrip())
-    return "\n".join(lines)
+    return "\n".join(dict.fromkeys(lines))
 
 
 def stats_text(record: Record) -> str:
