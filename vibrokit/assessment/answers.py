@@ -8,6 +8,7 @@ import math
 from vibrokit.assessment.durations import interval_text
 from vibrokit.comparison.mean_times import LogTime
 from vibrokit.results.rated import METASTABLE
+from vibrokit.text_table import power_text
 
 _READABLE = math.log(1e6)  # ln of numbers of periods up to which they are written
 _LARGEST = 709.0  # exponent of the largest floating-point number
@@ -87,7 +88,7 @@ class MeanTime(Answer):
         """The time with its interval in the unit that reads best, and as a number of periods where that is readable."""
         text = interval_text(self.log_value, self.log_lower, self.log_upper)
         periods = self.log_value - math.log(self.period)
-        return f"{text}, {math.exp(periods):.3g} periods" if periods < _READABLE else text
+        return f"{text}, {power_text(periods)} periods" if periods < _READABLE else text
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
