@@ -34,8 +34,8 @@ _SENTENCES = {
     Agreement.ARRHENIUS_NOT_REACHED: "The slopes of {other} still drift, from {first:.4g} to {last:.4g} m² s⁻³ as D "
     "falls, towards the ΔU = {energy:.5g} of {one}. Its limit for D → 0 misses that by {deviation:.1f} errors and is "
     "not ΔU yet: {remedy}. Its mean times are not affected.",
-    Agreement.NOT_METASTABLE: "Source or target is no state of its own at these noise intensities: {reason}. No rate "
-    "describes such an exit: lower the noise intensity.",
+    Agreement.NOT_METASTABLE: "{one} and {other} cannot be compared in {what}, since source or target is no state of "
+    "its own at these noise intensities: {reason}. No rate describes such an exit: lower the noise intensity.",
     Agreement.EVENTS_DIFFER: "{one} and {other} count different events ({event_one}; {event_other}), so that their "
     "numbers differ by definition: give both the same exit.",
     Agreement.UNDER_RESOLVED: "{reason}, so that {one} and {other} cannot be compared in {what}: {remedy} of "

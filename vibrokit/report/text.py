@@ -22,7 +22,7 @@ from vibrokit.report.tables import (
     sensitivity_table,
 )
 from vibrokit.results.codes import Severity
-from vibrokit.results.finding import Finding
+from vibrokit.results.finding import Finding, together
 from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -102,9 +102,9 @@ def _transitions(result: Result) -> list[Block]:
 
 def findings_text(findings: Sequence[Finding], names: Sequence[str] = ()) -> str:
     """Return the findings as sentences, each once: errors and warnings with advice, then information."""
-    lines = []
+    lines, shown = [], together(findings)
     for severity in (Severity.ERROR, Severity.WARNING, Severity.INFO):
-        for finding in (one for one in findings if one.severity is severity):
+        for finding in (one for one in shown if one.severity is severity):
             advice = "" if severity is Severity.INFO else f" {finding.advice}"
             lines.append(f"{severity}: {finding.sentence(names)}{advice}".rstrip())
     return "\n".join(dict.fromkeys(lines))

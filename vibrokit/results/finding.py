@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from vibrokit.construction import Constructed
@@ -90,6 +90,40 @@ def _named(label: int | None, names: Sequence[str]) -> str:
     if label is None or label < 0:
         return "motion that leaves the region" if label == ESCAPED else "the exit"
     return names[label] if label < len(names) else f"attractor {label}"
+
+
+def together(findings: Iterable[Finding]) -> list[Finding]:
+    """Return findings to show: those that differ in numbers only, at several noise intensities, as one with ranges."""
+    groups: dict[str, list[Finding]] = {}
+    for one in findings:
+        ranged = "intensity" in one.values
+        fixed = {name: value for name, value in one.values.items() if not (ranged and _is_number(value))}
+        groups.setdefault(repr((one.code, one.source, one.target, fixed)), []).append(one)
+    return [_with_ranges(group) for group in groups.values()]
+
+
+def _with_ranges(group: Sequence[Finding]) -> Finding:
+    values: dict[str, Any] = dict(group[0].values)
+    for name in (name for name, value in values.items() if _is_number(value)):
+        numbers: list[Any] = [one.values[name] for one in group]
+        values[name] = _Range(min(numbers), max(numbers))
+    return dataclasses.replace(group[0], values=values)
+
+
+def _is_number(value: Value) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Range:
+    """The least and the largest of some numbers; shown as one number if both read the same."""
+
+    least: float
+    largest: float
+
+    def __format__(self, form: str) -> str:
+        least, largest = (format(_listed(end), form) for end in (self.least, self.largest))
+        return least if least == largest else f"{least} to {largest}"
 
 
 class _Count(int):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from vibrokit.results.codes import Severity
-from vibrokit.results.finding import Finding
+from vibrokit.results.finding import Finding, together
 
 _ROWS = 3  # with the title and a finding, five lines
 _WIDTH = 160
@@ -32,7 +32,7 @@ class Summary:
         lines = [self.title, *(f"  {row[0]}: {', '.join(row[1:])}" for row in self.rows[:_ROWS])]
         if len(self.rows) > _ROWS:
             lines[-1] += f" … and {len(self.rows) - _ROWS} more"
-        serious = [finding for finding in findings if finding.severity is not Severity.INFO]
+        serious = [finding for finding in together(findings) if finding.severity is not Severity.INFO]
         lines += [f"  {one.severity}: {' '.join(one.sentence(names).split())}" for one in serious[:1]]
         return "\n".join(line if len(line) <= _WIDTH else f"{line[:_WIDTH]}…" for line in lines)
 
@@ -40,5 +40,5 @@ class Summary:
         """Return the title, the table and all findings as HTML."""
         body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
         table = f"<table>{body}</table>" if body else ""
-        items = "".join(f"<li>{one.severity}: {escape(one.sentence(names))}</li>" for one in findings)
+        items = "".join(f"<li>{one.severity}: {escape(one.sentence(names))}</li>" for one in together(findings))
         return f"<p><b>{escape(self.title)}</b></p>{table}{f'<ul>{items}</ul>' if items else ''}"
