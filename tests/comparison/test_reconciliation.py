@@ -452,7 +452,7 @@ RENAMED = dataclasses.replace(TWO, names=("clear", "other"))
         ((least_action(), rated(SGCMResult, section=MOVED)), "clear"),
         ((least_action(), rated(SGCMResult, section=RENAMED)), "other"),
         ((least_action(), full_structure()), "energies or rates"),
-        ((least_action(), "r.nc"), "energies or rates"),
+        ((least_action(), 3.0), "energies or rates"),
         ((least_action(energies=least_action().energies[:1]), least_action(energies=least_action().energies[1:])),
          "no exit in common"),
         ((least_action(energies=()), least_action()), "no exit in common"),
@@ -461,6 +461,17 @@ RENAMED = dataclasses.replace(TWO, names=("clear", "other"))
 def test_what_cannot_be_compared_is_refused(results, words):
     with pytest.raises(vk.errors.StructureError, match=words):
         vk.reconcile(*results)
+
+
+def test_files_are_compared_like_their_results(tmp_path):
+    both = least_action(), rated(SGCMResult)
+    paths = [tmp_path / f"{number}.nc" for number in range(2)]
+    for one, path in zip(both, paths, strict=True):
+        one.save(path)
+    found = vk.reconcile(paths[0], str(paths[1]))
+    assert [one.sentence() for one in found.verdicts] == [one.sentence() for one in vk.reconcile(*both).verdicts]
+    with pytest.raises(vk.errors.NoSuchFileError):
+        vk.reconcile(paths[0], tmp_path / "none.nc")
 
 
 @pytest.mark.parametrize("level", [0, 1, -0.1, 2.0, float("nan"), "0.1", True, None])

@@ -13,12 +13,11 @@ def reconcile_files(options: argparse.Namespace) -> int:
     from vibrokit.report.data import reconciliation_data
     from vibrokit.report.text import record_text
     from vibrokit.results.atomic import checked_target
-    from vibrokit.results.files import load_result
     from vibrokit.results.record import versions
 
     if options.output is not None:
         checked_target(options.output)
-    found = reconcile(*map(load_result, options.file), level=options.level)
+    found = reconcile(*options.file, level=options.level)
     if options.json:
         files = [str(path) for path in options.file]
         print(json.dumps({"files": files, **reconciliation_data(found), "versions": versions()}, allow_nan=False))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import os
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -20,13 +21,14 @@ from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, shown
 from vibrokit.results.codes import Code
 from vibrokit.results.comparable import check_comparable
+from vibrokit.results.files import load_result
 from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 
 
 @called
-def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
+def reconcile(*given: Result | str | os.PathLike[str], level: float = 0.01) -> Reconciliation:
     """Compare several results of one scene.
 
     Each pair of results is compared exit by exit: mean times at common noise intensities, which a χ² test takes
@@ -34,8 +36,8 @@ def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
 
     Parameters
     ----------
-    *results : Result
-        Two at least, such as those of `LeastAction`, `SGCM` and `MFET`, also saved ones.
+    *given : Result or path
+        Two at least, such as those of `LeastAction`, `SGCM` and `MFET`, or files of them.
     level : float
         Probability of a false alarm in each verdict, above 0 and below 1.
 
@@ -54,7 +56,7 @@ def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
     begun = time.monotonic()
     if not 0.0 < real(level) < 1.0:
         raise ParameterError(f"level must be a probability above 0 and below 1, got {shown(level)}.")
-    _check(results)
+    results = _results_of(given)
     methods = _method_names(results)
     named = list(zip(results, methods, strict=True))
     found = _with_totals([q for result, method in named for q in exit_quantities(result, method)], methods)
@@ -85,8 +87,9 @@ def reconcile(*results: Result, level: float = 0.01) -> Reconciliation:
     )
 
 
-def _check(results: Sequence[Any]) -> None:
-    """Raise StructureError unless these are two results or more on one structure."""
+def _results_of(given: Sequence[Any]) -> list[Result]:
+    """Return results and those of files; raises StructureError unless they are two or more on one structure."""
+    results = [load_result(one) if isinstance(one, str | os.PathLike) else one for one in given]
     for result in results:
         if not isinstance(result, Result):
             raise StructureError(
@@ -98,6 +101,7 @@ def _check(results: Sequence[Any]) -> None:
     first = results[0]
     for number, other in enumerate(results[1:], start=2):
         check_comparable(f"result {number}", other, first.scene, first.section)
+    return results
 
 
 def _method_names(results: Sequence[Result]) -> tuple[str, ...]:
