@@ -14,6 +14,9 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.progress import Stats
 from vibrokit.report.assessment import assessment_text
+from vibrokit.results.codes import Code
+from vibrokit.results.energy import Bound
+from vibrokit.results.finding import Finding
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.merging import merged, part_of
 from vibrokit.results.mfet import MFETResult
@@ -218,3 +221,25 @@ def test_parts_of_a_result_have_its_work_together():
     found = merged([part_of(whole, 0), more]).stats
     assert (found.trajectories, found.steps) == (3 + 4, 500)
     assert found.seconds == {"density": 1.5, "graph": 0.5, "splitting": 2.0}
+
+
+def test_a_state_is_left_by_the_least_of_its_energies_and_lasts_by_those_with_rates(assessment):
+    """The strongest bounds are of each exit; an exit without rates does not say how mean times go on."""
+    shallow = energy(0, -1, 1e-9, lower=0.0, upper=1e-9, bound=Bound.UPPER)
+    loose = energy(0, 1, 7e-5, lower=0.0, upper=7e-5, bound=Bound.UPPER)
+    paths = assessment.results["least-action"]
+    paths = dataclasses.replace(paths, energies=(shallow, loose, *paths.energies))
+    both = dataclasses.replace(assessment, results={**assessment.results, "least-action": paths})
+    assert both.energy(0).value == 1e-9
+    assert both.energy(0, 1).value == BARRIERS[0, 1]
+    assert both.mean_time(0, intensity=8e-6).value == pytest.approx(exact((0, 1), 8e-6), rel=1e-6)
+
+
+@pytest.mark.parametrize(("intensity", "words"), [(1e-5, "wider than its basin"), (2e-5, "not known")])
+def test_a_state_that_noise_makes_wider_than_its_basin_has_no_time(assessment, intensity, words):
+    found = Finding.of(Code.CORE_EXCEEDS_BASIN, 0, intensity=intensity, share=0.3)
+    part = dataclasses.replace(rated(sources=(1,)), findings=(found,))
+    one = dataclasses.replace(assessment, results={"mfet": part})
+    assert words in one.lasting(0)[0]
+    assert words in str(one.summary)
+    assert "mfet" in one.lasting(1)[1]

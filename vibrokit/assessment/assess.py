@@ -16,7 +16,7 @@ from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.arguments import members
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known, Part
-from vibrokit.assessment.ladder import ladder
+from vibrokit.assessment.ladder import barrier, ladder
 from vibrokit.assessment.request import Request
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, VibrokitError
@@ -247,17 +247,18 @@ class _Road:
         energy, own = self._energy(label), self.osc.noise.intensity
         if math.isinf(energy) or not energy > 0:
             return None
-        return ladder(energy, own, self.request.accuracy)
+        return ladder(energy, own)
 
     def _energy(self, label: int) -> float:
-        """ΔU of the cheapest exit of a state by methods without rates; infinite if none is known.
+        """ΔU of the exit that decides how long a state lasts, by methods without rates; infinite if none is known.
 
         An energy that follows from rates would give each method another ladder, and no intensity in common. One with an
         error as large as itself tells no intensity.
         """
         known = (one for (_, source), (one, _) in self.parts.items() if source == label)
         own = (e for one in known if not isinstance(one, RatedResult) for e in one.energies if e.source == label)
-        return min((e.value for e in own if not e.numerical_error >= e.value), default=math.inf)
+        assert self.osc.noise is not None
+        return barrier([e.value for e in own if not e.numerical_error >= e.value], self.osc.noise.intensity)
 
     def _assessment(self) -> Assessment:
         assert self.structure is not None

@@ -209,7 +209,7 @@ class Assessment(Record):
         """
         time, (start, end) = required_time(mean_time, self.period), self._labels(source, target)
         leaving = self.evidence.leaving(start, end)
-        solved = intensity_for(self.evidence.mean_times(start, end), math.log(time), self.evidence.energy(start, end))
+        solved = intensity_for(self.evidence.mean_times(start, end), math.log(time), self.evidence.slope(start, end))
         if solved is None:
             raise StructureError(
                 f"no noise intensity is known at which {leaving} after {time:g} s on average; give more time, or one "
@@ -250,15 +250,20 @@ class Assessment(Record):
         """
         return sensitivities(self.energy(source, target), self.oscillator.parameters, self.intensity, tied)
 
+    def lasting(self, label: int) -> tuple[str, str]:
+        """Return how long a state lasts at the noise of the scene, and by what methods that is known, as text."""
+        try:
+            found = self.mean_time(label)
+        except StructureError:
+            formless = self.evidence.exceeds_basin(label, self.intensity)
+            return "no time: noise makes it wider than its basin" if formless else "a time that is not known", "–"
+        remarks = ["extrapolated"] * found.extrapolated + ["left before it has formed"] * (not found.metastable)
+        return found.number, ", ".join([" and ".join(found.methods), *remarks])
+
     @property
     def summary(self) -> Summary:
         """How long each state lasts at the noise of the scene."""
-        rows = []
-        for name in self.names:
-            try:
-                rows.append((name, f"is left after {self.mean_time(name).number}"))
-            except StructureError:
-                rows.append((name, "is left after a time that is not known"))
+        rows = [(name, f"is left after {self.lasting(label)[0]}") for label, name in enumerate(self.names)]
         return Summary(f"Assessment at D = {self.intensity:g} m² s⁻³", tuple(rows))
 
     @called

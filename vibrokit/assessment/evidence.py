@@ -13,6 +13,7 @@ from vibrokit.comparison.mean_times import LogTime, MeanTimes, most_certain
 from vibrokit.comparison.occupancies import Balance
 from vibrokit.comparison.verdicts import exit_name
 from vibrokit.errors import StructureError
+from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.labels import goal_name
 from vibrokit.results.rated import RatedResult
@@ -50,11 +51,23 @@ class Evidence:
         return {rate.target for one in self.rated for rate in one.rates if rate.source == start}
 
     def energy(self, start: int, end: int | None) -> ActivationEnergy | None:
-        """Return the energy of an exit with the strongest kind of bounds, the least of several; None without one."""
-        known = [
-            e for one in self.results.values() for e in one.energies if e.source == start and end in (None, e.target)
-        ]
-        return min(known, key=lambda e: (_TRUST.index(e.bound), e.value)) if known else None
+        """Return the energy of an exit with the strongest kind of bounds; of several exits the least; None without."""
+        best: dict[int, ActivationEnergy] = {}
+        for e in (e for one in self.results.values() for e in one.energies if e.source == start):
+            if end in (None, e.target):
+                pair = (best.get(e.target, e), e)
+                best[e.target] = min(pair, key=lambda one: (_TRUST.index(one.bound), one.value))
+        return min(best.values(), key=lambda one: one.value, default=None)
+
+    def slope(self, start: int, end: int | None) -> ActivationEnergy | None:
+        """Return the energy with which the mean times of an exit go on; without an end, of those that have rates."""
+        counted = [self.energy(start, one) for one in (self.targets(start) if end is None else {end})]
+        return min((one for one in counted if one is not None), key=lambda one: one.value, default=None)
+
+    def exceeds_basin(self, label: int, intensity: float) -> bool:
+        """Whether noise makes the core of an attractor so wide, as methods found, that it is no state of its own."""
+        found = (one for result in self.results.values() for one in result.found(Code.CORE_EXCEEDS_BASIN))
+        return any(one.source == label and one.values["intensity"] <= intensity for one in found)  # type: ignore[operator]
 
     def mean_times(self, start: int, end: int | None) -> list[MeanTimes]:
         """Return the mean times of an exit by each method; raises StructureError if there are none."""
@@ -70,7 +83,7 @@ class Evidence:
 
     def log_time(self, start: int, end: int | None, intensity: float) -> LogTime:
         """Return ln of the mean time of an exit at a noise intensity; raises StructureError if it is not known."""
-        found = most_certain(self.mean_times(start, end), intensity, self.energy(start, end))
+        found = most_certain(self.mean_times(start, end), intensity, self.slope(start, end))
         if found is None:
             raise StructureError(
                 f"no rate is known near D = {intensity:g}, and no activation energy from which to continue; give more "

@@ -65,9 +65,8 @@ def noise_text(one: Assessment) -> str:
 
 def states_blocks(one: Assessment) -> list[Table | Sentences]:
     """Return the tables of how long each state lasts, of its activation energy and of its share of time."""
-    lasting, barriers = (
-        tuple((name, *told(one, label)) for label, name in enumerate(one.names)) for told in (_lasting, _barrier)
-    )
+    lasting = tuple((name, *one.lasting(label)) for label, name in enumerate(one.names))
+    barriers = tuple((name, *_barrier(one, label)) for label, name in enumerate(one.names))
     return [
         Table("lasting", "Mean times", ("state", "mean time until it is left", "by"), lasting),
         Table("barriers", "Activation energies", ("state", "ΔU (m² s⁻³)", "bounds", "to"), barriers),
@@ -135,15 +134,6 @@ def _shares(one: Assessment) -> list[Table | Sentences]:
     until = f"Shares are of the time before motion escapes, after {duration_text(time)} on average."
     note = [Sentences((until,))] if math.isfinite(time) else []
     return [Table("shares", "Shares of time", ("state", "share of time"), tuple(rows)), *note]
-
-
-def _lasting(one: Assessment, label: int) -> Sequence[str]:
-    try:
-        found = one.mean_time(label)
-    except StructureError:
-        return "not known", "–"
-    remarks = ["extrapolated"] * found.extrapolated + ["left before it has formed"] * (not found.metastable)
-    return found.number, ", ".join([" and ".join(found.methods), *remarks])
 
 
 def _barrier(one: Assessment, label: int) -> Sequence[str]:
