@@ -1,13 +1,10 @@
-"""Tables, numbers and units as text."""
+"""Tables and numbers as text."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
-_EXPONENT = re.compile(r"\^\(?([-+]?[0-9]+(?:/[0-9]+)?)\)?")
-_RAISED = str.maketrans("-0123456789/", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ᐟ")
 _PLAIN = 1e6  # numbers up to a million are written out
 _LARGEST = 50 * math.log(10)  # above it, and below its inverse, powers of ten are written, which are read more easily
 
@@ -21,11 +18,6 @@ def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
 def number_text(value: float, form: str = ".3g") -> str:
     """Return a number in a format; a dash for NaN."""
     return "–" if math.isnan(value) else format(value, form)
-
-
-def unit_text(unit: str) -> str:
-    """Return a unit such as ``"m^2 s^(-1/2)"`` with raised exponents."""
-    return _EXPONENT.sub(lambda match: match[1].translate(_RAISED), unit)
 
 
 def power_text(logarithm: float) -> str:

@@ -36,7 +36,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.validation import check_belongs, check_means
 
-_WEAK = 3.0  # ΔU/D: below, exp(ΔU/D) varies no faster than the prefactor, and escape is no rare event
+WEAK = 3.0  # ΔU/D: below, exp(ΔU/D) varies no faster than the prefactor, and escape is no rare event
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -346,7 +346,7 @@ def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:
     """Findings where the noise is not weak against an energy."""
     energies = [energy for one in analyses.values() for energy in one.estimates]
     return [
-        Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=_WEAK)
+        Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=WEAK)
         for e in energies
-        if 0 < e.value < _WEAK * intensity and math.isfinite(e.upper)  # otherwise the value is not known
+        if 0 < e.value < WEAK * intensity and math.isfinite(e.upper)  # otherwise the value is not known
     ]

@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vibrokit.analyzers.energy_continuation import energy_continuation
+from vibrokit.analyzers.analyzer import WEAK
+from vibrokit.analyzers.energy_continuation import search_places
+from vibrokit.analyzers.energy_run import EnergyRun
 from vibrokit.analyzers.least_action import LeastAction
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.construction import called
 from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, advance, stage, working
+from vibrokit.progress import Progress, Work, advance, stage, working
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.finding import Finding
+from vibrokit.results.labels import goal_of, label_of
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.sweep import Prefactor, Sweep
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.continuation import continuation
-from vibrokit.structure.find import find_structure
-from vibrokit.structure.parameter_values import ParameterLine, parameter_line
-from vibrokit.structure.validation import seed_of
+from vibrokit.structure.continuation import ContinuationRun, request_of
+from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
+from vibrokit.structure.validation import check_means, seed_of
+from vibrokit.text_units import size_of
 
 _DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
 _ERROR = 0.2  # of a mean time: 25 exits
+_ALONG = (Code.BIFURCATION, Code.BRANCH_ENDS, Code.PATH_LOST, Code.LEAST_PATH_CHANGES, Code.NOTHING_AT)
+_VALUES = ("value", "error", "low", "high", "next")  # of the parameter, in findings of these codes
 
 
 @called
@@ -38,11 +45,11 @@ def sweep(
     parameter: str | Mapping[str, float],
     values: Sequence[float],
     *,
+    unit: str | None = None,
     source: int | str | None = None,
     energies: bool = True,
     search: Sequence[float] | None = None,
     region: Any = None,
-    cells: tuple[int, int] = (100, 100),
     starts: tuple[int, int] = (24, 24),
     rng: int = 0,
     progress: Progress = None,
@@ -52,7 +59,9 @@ def sweep(
 
     The steady states are those of `continuation`, the energies those of `energy_continuation`. The mean time is
     τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the values at which paths are searched for, at a noise that
-    makes ΔU/D = 5 there, and interpolated between them.
+    makes ΔU/D = 5 there, and interpolated between them. States, paths and mean times have the names of the branches.
+
+    A value at which the scene is refused is a gap. Along the noise intensity, states and energies are found once.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete.
 
@@ -62,14 +71,18 @@ def sweep(
     parameter : str or dict of str to float
         A parameter, or the factors of several that are tied, as of `continuation`.
     values : sequence of float
-        In SI base units.
+        Finite and distinct, one or more; they are taken in ascending order.
+    unit : str, optional
+        Unit of the values, in which tables and pictures show them too: ``"Hz"`` for a frequency, ``"mm"`` or ``"µm"``
+        for a length, ``"g"`` for a force per unit mass, ``"g²/Hz"`` for noise by its one-sided spectral density. By
+        default SI base units.
     source : int or str, optional
-        The state to leave; by default each.
+        Name or number of the branch to leave; by default each.
     energies : bool
         Whether to compute energies and mean times; a scene without noise has none.
     search : sequence of float, optional
         Those of the values at which exit paths are searched for, as of `energy_continuation`.
-    region, cells, starts
+    region, starts
         For the steady states, as of `continuation`.
     rng : int
     progress : bool or callable, optional
@@ -80,83 +93,158 @@ def sweep(
     Returns
     -------
     Sweep
+        Without basin fractions, which `continuation` finds.
 
     Raises
     ------
     ParameterError
-        An unknown or ambiguous parameter, one that shapes the equations, or values that are not numbers.
+        An unknown or ambiguous parameter, one that shapes the equations, values that are not numbers, or a unit of
+        another dimension.
     """
+    check_means(osc, None, None)
     line, seed = parameter_line("sweep", osc, parameter), seed_of(rng)
-    findings: list[Finding] = []
-    paths: EnergyContinuation | None = None
-    prefactors: list[Prefactor] = []
+    size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit)
+    numbers = size * ordered_values("sweep", values)
+    wanted = energies and osc.noise is not None
+    searched = None if search is None else (size * ordered_values("sweep: search", search)).tolist()
+    places = search_places(osc, line, numbers, searched) if wanted else []
+    states = ContinuationRun(
+        osc, line, numbers.tolist(), request_of(region, starts, seed), thorough=numbers[places].tolist()
+    )
+    settings = {"parameter": line.argument, "values": numbers.tolist(), "unit": unit, "source": source, "rng": seed}
     with working(progress, time_limit) as work:
-        states = continuation(osc, parameter, values, region=region, cells=cells, starts=starts, rng=seed)
-        complete = states.complete
-        if complete and energies and osc.noise is not None:
-            try:
-                paths = energy_continuation(
-                    osc, parameter, values, analyzer=LeastAction(source=source), search=search, rng=seed
-                )
-                complete = paths.complete
-            except StructureError as error:
-                findings.append(Finding.of(Code.REMARK, text=str(error)))
-        if complete and paths is not None:
-            complete = _add_prefactors(osc, line, paths, prefactors, findings)
-    declared = line.entry.declared
-    return Sweep(
-        parameter=line.path, symbol=declared.symbol, unit=declared.unit, states=states, energies=paths,
-        prefactors=tuple(prefactors), scene=scene_data(osc), complete=complete, seed=seed, seconds=work.seconds,
-        stats=work.stats, findings=(*_open(states, paths), *findings),
-        settings={"parameter": line.argument, "values": states.values.tolist(), "source": source, "rng": seed},
-    )  # fmt: skip
+        run = _Run(osc, line, numbers, places, source, states)
+        run.run()
+        return run.record(work, settings)
 
 
-def _open(states: Continuation, paths: EnergyContinuation | None) -> tuple[Finding, ...]:
-    """What the parts found."""
-    return (*states.findings, *(() if paths is None else paths.findings))
+@dataclasses.dataclass(eq=False)
+class _Run:
+    """Goes through the stages and keeps what each has found."""
 
+    osc: Oscillator
+    line: ParameterLine
+    values: NDArray[np.float64]
+    places: list[int]  # of the values at which exits are searched for
+    source: int | str | None
+    search: ContinuationRun
+    states: Continuation | None = None
+    paths: EnergyContinuation | None = None
+    complete: bool = False
+    prefactors: list[Prefactor] = dataclasses.field(default_factory=list)
+    findings: list[Finding] = dataclasses.field(default_factory=list)
 
-def _add_prefactors(
-    osc: Oscillator, line: ParameterLine, paths: EnergyContinuation, found: list[Prefactor], findings: list[Finding]
-) -> bool:
-    """Simulate exits at the searched values; return whether that came to its end."""
-    places = [int(np.argmin(np.abs(paths.values - value))) for value in paths.settings["search"]]
-    with Stoppable("mean times") as times, stage("mean times", unit="values", total=len(places)):
-        for place in places:
-            there = line.at(osc, float(paths.values[place]))
-            for result in _simulated(there, paths, place, findings):
-                if not result.complete:
-                    return False
-                found += _prefactor(result, float(paths.values[place]))
-            advance()
-    findings += times.findings
-    return not times.stopped
+    def run(self) -> None:
+        """Find the steady states, the exit paths, and the prefactors of the mean times."""
+        with working() as work:
+            self.search.run()
+            self.states = self.search.record(work)
+        self.complete = self.states.complete
+        if self.complete and self.places:
+            self._find_paths(self.states)
+        if self.complete and self.paths is not None:
+            self._find_prefactors(self.paths)
 
+    def record(self, work: Work, settings: Mapping[str, Any]) -> Sweep:
+        """Return the record of all that was found."""
+        assert self.states is not None
+        declared = self.line.entry.declared
+        found = Sweep(
+            parameter=self.line.path, symbol=declared.symbol, unit=declared.unit, states=self.states,
+            energies=self.paths, prefactors=tuple(self.prefactors), complete=self.complete, seed=settings["rng"],
+            scene=scene_data(self.osc), settings=dict(settings), seconds=work.seconds, stats=work.stats,
+        )  # fmt: skip
+        parts = self._of_parts(found.axis(found.shown_in)[1])
+        findings = (*parts, *_strong(found), *self.findings)
+        return dataclasses.replace(found, findings=findings)
 
-def _simulated(
-    there: Oscillator, paths: EnergyContinuation, place: int, findings: list[Finding]
-) -> Iterator[RatedResult]:
-    """Yield the exits from each state whose energy is known at a value, at a noise that is strong enough."""
-    structure = find_structure(there, manifolds=False, saddles=False, rng=int(paths.settings["rng"]))
-    for source in dict.fromkeys(branch.source for branch in paths.branches):
-        energy = float(paths.energy(source)[place])
-        if source not in structure.names or not energy > 0:
-            continue
-        analyzer = MFET(source=source, intensities=(energy / _DEPTH,), target_error=_ERROR)
+    def _of_parts(self, size: float) -> Iterator[Finding]:
+        """Yield what the parts found, in a unit; a path that was lost is named by the branch that it leaves."""
+        assert self.states is not None
+        yield from (_in_unit(one, size) for one in self.states.findings)
+        paths, names = self.paths, self.states.names
+        if paths is None:
+            return
+        for finding in paths.findings:
+            if finding.code is Code.PATH_LOST:
+                source = names.index(paths.branches[finding.source or 0].source)
+                yield dataclasses.replace(_in_unit(finding, size), source=source)
+            elif finding.source is None and finding not in self.states.findings:
+                yield _in_unit(finding, size)
+            elif finding.source is not None:
+                yield Finding.of(Code.REMARK, text=_in_unit(finding, size).sentence(paths.names))
+
+    def _find_paths(self, states: Continuation) -> None:
+        """Search for exit paths in the structures that are known, and follow them."""
         try:
-            result = analyzer.run(there, structure)
-        except VibrokitError as error:
-            findings.append(Finding.of(Code.REMARK, text=str(error)))
-            continue
-        if isinstance(result, RatedResult):
-            yield result
+            source = None if self.source is None else states.names[label_of(self.source, states.names, "branch")]
+            run = EnergyRun(
+                self.osc, self.line, self.values, LeastAction(source=source), self.places, states.seed or 0,
+                self.search.structures,
+            )  # fmt: skip
+            with working() as work:
+                run.run()
+                self.paths = run.record(work)
+            self.complete = self.paths.complete
+        except StructureError as error:
+            self.findings.append(Finding.of(Code.REMARK, text=str(error)))
+
+    def _find_prefactors(self, paths: EnergyContinuation) -> None:
+        """Simulate exits at the values at which paths were searched for."""
+        with Stoppable("mean times") as times, stage("mean times", unit="values", total=len(self.places)):
+            for place in self.places:
+                for name, result in self._simulated(paths, place):
+                    if result.rates:
+                        # The noise was chosen so that the energy is this many times D.
+                        left = ExitRate.total(result.rates)
+                        logarithm = -left.log_value - _DEPTH
+                        self.prefactors.append(Prefactor(name, float(self.values[place]), logarithm, left.log_error))
+                    self.complete = self.complete and result.complete
+                if not self.complete:
+                    return
+                advance()
+        self.findings += times.findings
+        self.complete = not times.stopped
+
+    def _simulated(self, paths: EnergyContinuation, place: int) -> Iterator[tuple[str, RatedResult]]:
+        """Yield the exits from each branch whose energy is known at a value, at a noise that is strong enough."""
+        value = float(self.values[place])
+        if value not in self.search.structures:
+            return
+        structure, names = self.search.structures[value]
+        left = {branch.source for branch in paths.branches}
+        for label, name in enumerate(names):
+            energy = float(paths.energy(name)[place]) if name in left else 0.0
+            if not energy > 0:
+                continue
+            analyzer = MFET(source=label, intensities=(energy / _DEPTH,), target_error=_ERROR)
+            try:
+                result = analyzer.run(self.line.at(self.osc, value), structure)
+            except VibrokitError as error:
+                self.findings.append(Finding.of(Code.REMARK, text=str(error)))
+                continue
+            if isinstance(result, RatedResult):
+                yield name, result
 
 
-def _prefactor(result: RatedResult, value: float) -> list[Prefactor]:
-    """The prefactor of leaving a state at all, if a rate was found."""
-    if not result.rates:
-        return []
-    left = ExitRate.total(result.rates)
-    # The noise was chosen so that the energy is this many times D.
-    return [Prefactor(result.names[left.source], value, -left.log_value - _DEPTH, left.log_error)]
+def _in_unit(finding: Finding, size: float) -> Finding:
+    """Return a finding with the values of the parameter in the unit of the user."""
+    if finding.code not in _ALONG:
+        return finding
+    values = {
+        name: value / size if name in _VALUES and isinstance(value, float) else value
+        for name, value in finding.values.items()
+    }
+    return dataclasses.replace(finding, values=values)
+
+
+def _strong(found: Sweep) -> Iterator[Finding]:
+    """Yield a finding for each exit along which the noise is not weak, with the least ratio ΔU/D."""
+    for branch in () if found.energies is None else found.energies.branches:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.where(branch.action > 0, branch.action / found.intensity, np.inf)
+        place = int(np.argmin(ratios))
+        if ratios[place] < WEAK and branch.source in found.names:
+            source, target = found.names.index(branch.source), goal_of(branch.target, found.names)
+            values = {"ratio": float(ratios[place]), "intensity": float(found.intensity[place]), "least": WEAK}
+            yield Finding.of(Code.NOISE_NOT_WEAK, source, target, **values)

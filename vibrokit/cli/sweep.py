@@ -24,6 +24,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], sc
     parser.add_argument("--source", metavar="STATE", help="name or label of the state to leave (default: each)")
     parser.add_argument("--states-only", action="store_true", help="no energies and mean times")
     parser.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
+    parser.add_argument("--verbose", action="store_true", help="also each branch at each value, and every finding")
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="save the sweep (netCDF)")
     parser.add_argument(
@@ -41,13 +42,12 @@ def sweep_scene(options: argparse.Namespace) -> int:
     from vibrokit.cli.run import scene_stem, source_of
     from vibrokit.errors import ParameterError
     from vibrokit.progress import working
-    from vibrokit.report.tables import coexistence_table
-    from vibrokit.report.text import findings_text
+    from vibrokit.report.text import record_text
     from vibrokit.results.atomic import checked_target
     from vibrokit.results.pictures import checked_picture, save_figure
     from vibrokit.scene_file import load_scene
     from vibrokit.structure.parameter_values import parameter_line
-    from vibrokit.text_units import number_in
+    from vibrokit.text_units import number_in, size_of
 
     if options.output is not None:
         checked_target(options.output)
@@ -60,21 +60,21 @@ def sweep_scene(options: argparse.Namespace) -> int:
     if unit != other:
         raise ParameterError(f"{options.start} and {options.stop} have different units; give both in one unit.")
     source = None if options.source is None else source_of(options.source)
+    size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit)
+    values = np.linspace(first / size, last / size, options.count).tolist()
     with Interrupts() as interrupts:
         with working(True, options.time_limit) as work:
             interrupts.stops(work)
             found = sweep(
-                osc, line.argument, np.linspace(first, last, options.count).tolist(), source=source,
-                energies=not options.states_only, rng=options.seed,
+                osc, line.argument, values, unit=unit, source=source, energies=not options.states_only,
+                rng=options.seed,
             )  # fmt: skip
         interrupts.finishing()
-        heading = f"{options.scene}: sweep{'' if found.complete else ' (incomplete)'}"
-        parts = (heading, coexistence_table(found, unit).text, findings_text(found.serious, found.names))
-        print("\n\n".join(part for part in parts if part), f"\n\n{found.seconds:.1f} s.")
+        print(record_text(f"{options.scene}: sweep", found, brief=not options.verbose))
         if options.output is not None:
             found.save(options.output)
             print(f"written: {options.output}")
-        save_figure(found.plot(unit=unit), picture)
+        save_figure(found.plot(), picture)
         print(f"figure: {picture}")
         if interrupts.requested:
             return interrupts.status

@@ -41,7 +41,7 @@ def sensitivities(
     intensity: float | None = None,
     tied: Mapping[str, Sequence[str]] | None = None,
 ) -> tuple[Sensitivity, ...]:
-    """Return the effect of 1 % more of each parameter, the largest first.
+    """Return the effect of 1 % more of each parameter, and of `twins` together, the largest first.
 
     Parameters
     ----------
@@ -67,6 +67,9 @@ def sensitivities(
     groups: dict[str, tuple[str, ...]] = {name: (name,) for name in energy.sensitivity}
     if not isinstance(tied, Mapping | None):
         raise ParameterError(f"tied must be a mapping of a name to names of parameters, got {shown(tied)}.")
+    given = {frozenset(each) for each in (tied or {}).values() if members(each)}
+    of_energy = {name: parameters[name] for name in energy.sensitivity if name in parameters}
+    groups |= {name: each for name, each in twins(of_energy).items() if frozenset(each) not in given}
     for name, each in (tied or {}).items():
         own = members(each)
         if not own:
@@ -86,6 +89,33 @@ def sensitivities(
         if power or _INTENSITY in listed:
             found.append(Sensitivity(name, power, error, time, time_error))
     return tuple(sorted(found, key=lambda one: -abs(one.energy)))
+
+
+def twins(parameters: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
+    """Return the parameters that several parts share, such as the gaps of two stops, by a name with ``*``.
+
+    Their paths differ in the number of the part, and their values at most in sign: ``"barriers.*.position"``.
+    """
+    alike: dict[tuple[str, float], list[str]] = {}
+    for path, value in parameters.items():
+        name = ".".join("*" if word.isdigit() else word for word in path.split("."))
+        if name != path and isinstance(value, int | float) and value:
+            alike.setdefault((name, abs(value)), []).append(path)
+    return {name: tuple(paths) for (name, _), paths in alike.items() if len(paths) > 1}
+
+
+def numbers_in(data: object, path: str = "") -> dict[str, float]:
+    """Return every number of a scene as plain data by its path, as ``osc.parameters`` has it."""
+    if isinstance(data, bool | str) or not isinstance(data, int | float | Mapping | Sequence):
+        return {}
+    if isinstance(data, int | float):
+        return {path: float(data)}
+    named = data.items() if isinstance(data, Mapping) else enumerate(data)
+    return {
+        place: number
+        for name, part in named
+        for place, number in numbers_in(part, f"{path}.{name}" if path else str(name)).items()
+    }
 
 
 def sensitivities_text(found: Sequence[Sensitivity]) -> str:

@@ -14,13 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import colour
+from vibrokit.plots.axes import colour, named, span
+from vibrokit.text_units import length_unit, size_of
 
 _PANELS: Mapping[str, str] = {
-    "low": "displacement $x$ (m)",
-    "push": r"largest push (m s$^{-2}$)",
-    "energy": r"$\Delta U$ (m$^2$ s$^{-3}$)",
-    "log_time": r"mean time $\ln(\tau / 1\,\mathrm{s})$",
+    "low": "displacement x ({length})",
+    "push": "largest push (m s⁻²)",
+    "energy": "ΔU (m² s⁻³)",
+    "log_time": "mean time, ln(τ / 1 s)",
 }
 _LINE: dict[str, Any] = {"marker": "o", "markersize": 2.8, "linewidth": 1.2}
 _DASHED = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "zorder": 0}
@@ -68,21 +69,26 @@ class SweepArtists(Artists):
         Those of the displacement, two for each branch.
     marks : tuple of Line2D
         Bifurcations.
+    lost : tuple of Line2D
+        Ends of exit paths that were lost.
     """
 
     axes: tuple[Axes, ...]
     curves: tuple[Line2D, ...]
     marks: tuple[Line2D, ...]
+    lost: tuple[Line2D, ...]
 
 
 def sweep(
     values: ArrayLike,
     branches: Sequence[Branch],
     *,
-    stops: Sequence[tuple[str, float]] = (),
+    stops: Sequence[ArrayLike] = (),
     marks: Sequence[tuple[str, float, int]] = (),
-    intensity: float = 0.0,
+    lost: Sequence[tuple[float, float, int]] = (),
+    intensity: ArrayLike = 0.0,
     label: str,
+    length: str | None = None,
     ax: Any = None,
 ) -> SweepArtists:
     """Draw panels over one parameter: displacement with the stops, push of the stops, ΔU with a line at D, ln τ.
@@ -93,14 +99,18 @@ def sweep(
     ----------
     values : array_like (values,)
     branches : sequence of Branch
-    stops : sequence of (side, position)
-        Lines at the positions (m).
+    stops : sequence of array_like (values,)
+        Position of each stop (m).
     marks : sequence of (kind, value, branch)
         Bifurcations.
-    intensity : float
+    lost : sequence of (value, action, branch)
+        Where exit paths were lost (m² s⁻³).
+    intensity : float or array_like (values,)
         D (m² s⁻³); 0 for none.
     label : str
         Of the parameter's axis.
+    length : str, optional
+        Unit of displacements; by default one in which they are read easily.
     ax : array of Axes, optional
         One for each panel.
 
@@ -118,30 +128,51 @@ def sweep(
     ]
     panels = dict(zip(shown, _panels(ax, len(shown)), strict=True))
     place, curves, first = np.asarray(values, dtype=float), list[Line2D](), panels["low"]
+    length = length or length_unit(span([one.high for one in branches] + [one.low for one in branches])[1])
+    metre = 1.0 / size_of(length, "m")
     for one in branches:
         style = {**_LINE, "color": colour(one.number)}
-        curves += first.plot(place, one.high, label=one.name, **style)
+        curves += first.plot(place, metre * np.asarray(one.high), label=one.name, **style)
+        curves += first.plot(place, metre * np.asarray(one.low), label=f"_{one.name}", **style)
         for name, panel in panels.items():
-            lines = panel.plot(place, getattr(one, name), label=f"_{one.name}", **style)
-            curves += lines if panel is first else []
-    for _, position in stops:
-        first.axhline(position, **_DASHED)
-    if intensity > 0 and "energy" in panels:
-        panels["energy"].axhline(intensity, **_DASHED)
-        panels["energy"].annotate("$D$", (1.01, intensity), xycoords=("axes fraction", "data"), va="center", fontsize=9)
+            if panel is not first:
+                panel.plot(place, getattr(one, name), label=f"_{one.name}", **style)
+    for number, position in enumerate(stops):
+        first.plot(place, metre * np.asarray(position), label="_stop" if number else "stops", **_DASHED)
+    strength = np.broadcast_to(np.asarray(intensity, dtype=float), place.shape)
+    if "energy" in panels and (strength > 0).any():
+        panels["energy"].plot(place, np.where(strength > 0, strength, np.nan), label="_D", **_DASHED)
+        beside: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": 9}
+        panels["energy"].annotate("D", (1.01, strength[-1]), **beside)
     drawn = [
         line for kind, value, branch in marks
         for line in first.plot(value, 0.02, "^", transform=first.get_xaxis_transform(), color=colour(branch),
-                                   markersize=5, label=f"_{kind}", clip_on=False)
+                               markersize=5, label=f"_{kind}", clip_on=False)
     ]  # fmt: skip
-    _label(panels, label)
-    first.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn))
+    ends = [
+        line for value, action, branch in lost if "energy" in panels
+        for line in panels["energy"].plot(value, action, "x", color=colour(branch), markersize=8, markeredgewidth=1.6,
+                                          label="_lost")
+    ]  # fmt: skip
+    _label(panels, label, length)
+    _explain(first, drawn, ends)
+    return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn), tuple(ends))
 
 
-def _label(panels: Mapping[str, Axes], label: str) -> None:
+def _explain(first: Axes, bifurcations: Sequence[Line2D], ends: Sequence[Line2D]) -> None:
+    """Add the legend, with the signs of bifurcations and of paths that were lost if there are any."""
+    signs = [
+        Line2D([], [], color="0.3", linestyle="", marker=mark, markersize=size, label=label)
+        for drawn, mark, size, label in ((bifurcations, "^", 5, "bifurcation"), (ends, "x", 8, "path lost"))
+        if drawn
+    ]
+    handles = [*named(first.lines), *signs]
+    first.legend(handles=handles, fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _label(panels: Mapping[str, Axes], label: str, length: str) -> None:
     for name, panel in panels.items():
-        panel.set_ylabel(_PANELS[name], fontsize=9)
+        panel.set_ylabel(_PANELS[name].format(length=length), fontsize=9)
         panel.tick_params(labelsize=8)
         if name == "energy":
             panel.set_yscale("log")

@@ -13,14 +13,13 @@ from vibrokit.parts.part import Part
 from vibrokit.plots.inline_svg import inline_svg
 from vibrokit.plots.scene_drawing import scene_drawing
 from vibrokit.report.blocks import Picture
-from vibrokit.report.tables import number, symbol_text
+from vibrokit.report.tables import number
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure
-from vibrokit.text_table import unit_text
-from vibrokit.text_units import familiar
+from vibrokit.text_units import familiar, symbol_text, unit_text
 
 Drawing = tuple[str, Callable[[], Any]]
 """What a picture shows, and what draws it."""

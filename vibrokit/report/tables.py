@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
-import unicodedata
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from vibrokit.comparison.sensitivities import numbers_in, sensitivities, twins
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.report.blocks import Table
@@ -20,8 +20,8 @@ from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.results.sweep import Sweep
-from vibrokit.text_table import number_text, power_text, unit_text
-from vibrokit.text_units import familiar
+from vibrokit.text_table import number_text, power_text
+from vibrokit.text_units import familiar, symbol_text, unit_text
 
 
 def input_table(osc: Oscillator) -> Table:
@@ -75,12 +75,23 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> Table:
 
 
 def sensitivity_table(result: Result) -> Table:
-    """Return the derivative of each energy in each parameter, a row for each parameter that has an effect."""
-    known = [energy for energy in result.energies if energy.sensitivity]
-    names = dict.fromkeys(name for energy in known for name, value in energy.sensitivity.items() if value)
-    header = ("parameter", *(energy.exit_between(result.names) for energy in known))
-    rows = [(name, *(number_text(energy.sensitivity.get(name, math.nan), ".5g") for energy in known)) for name in names]
-    return Table("sensitivities", "Change of ΔU per unit of each parameter", header, tuple(rows))
+    """Return what each parameter does to each energy: per unit, and in per cent by 1 %; a row if it has an effect.
+
+    Parameters that several parts share have a row together, per unit of their magnitude.
+    """
+    known = [energy for energy in result.energies if energy.sensitivity and energy.value > 0]
+    numbers, columns, header = numbers_in(result.scene), [], ["parameter"]
+    for energy in known:
+        powers = {one.parameter: one.energy for one in sensitivities(energy, numbers)}
+        slopes = dict(energy.sensitivity)
+        for name, paths in twins({path: numbers[path] for path in slopes}).items():
+            slopes[name] = math.fsum(math.copysign(slopes[path], slopes[path] * numbers[path]) for path in paths)
+        columns += [slopes, powers]
+        header += [energy.exit_between(result.names), "% by 1 %"]
+    names = dict.fromkeys(name for column in columns[::2] for name, value in column.items() if value)
+    rows = tuple((name, *(number_text(column.get(name, math.nan), ".5g") for column in columns)) for name in names)
+    title = "Change of ΔU per unit of each parameter, and in per cent by 1 % of it"
+    return Table("sensitivities", title, tuple(header), rows)
 
 
 def rate_table(result: Result) -> Table:
@@ -93,28 +104,36 @@ def rate_table(result: Result) -> Table:
     return Table("rates", "Exit rates at finite noise", header, tuple(rows))
 
 
-def coexistence_table(sweep: Sweep, unit: str | None = None) -> Table:
-    """Return from where to where each branch of a sweep exists, a row each, in a unit."""
-    scale = sweep.axis(unit)[1]
+def coexistence_table(sweep: Sweep) -> Table:
+    """Return from where to where each branch of a sweep exists, a row for each stretch without a gap."""
+    label, scale = sweep.axis(sweep.shown_in)
     rows = tuple((one.name, f"{one.first / scale:.8g}", one.begins, f"{one.last / scale:.8g}", one.ends)
                  for one in sweep.coexistence)  # fmt: skip
-    title = f"Steady states along {sweep.parameter} ({unit or unit_text(sweep.unit or '1')})"
-    return Table("coexistence", title, ("state", "from", "begins by", "to", "ends by"), rows)
+    header = ("state", "from", "begins by", "to", "ends by")
+    return Table("coexistence", f"Steady states along {label}", header, rows)
+
+
+def gap_table(sweep: Sweep) -> Table:
+    """Return the values at which there is no steady state, a row each with the reason."""
+    label, scale = sweep.axis(sweep.shown_in)
+    rows = tuple((f"{value / scale:.8g}", reason) for value, reason in sweep.gaps)
+    return Table("gaps", "Values without a steady state", (label, "reason"), rows)
 
 
 def along_table(sweep: Sweep) -> Table:
     """Return what each branch of a sweep does at each value, a row each; empty cells where nothing is known."""
     rows: list[tuple[str, ...]] = []
+    label, scale = sweep.axis(sweep.shown_in)
     for name in sweep.names:
         low, high, push = sweep.along(name)
-        energy = time = np.full(len(low), math.nan)
+        energy = power = time = np.full(len(low), math.nan)
         with contextlib.suppress(StructureError):
-            energy = sweep.energy(name)
+            energy, power = sweep.energy(name), sweep.sensitivity(name)
             time = sweep.log_mean_time(name)[0]
-        for value, *numbers in zip(sweep.values, low, high, push, energy, time, strict=True):
+        for value, *numbers in zip(sweep.values, low, high, push, energy, power, time, strict=True):
             if not math.isnan(numbers[0]):
-                rows.append((name, f"{value:.10g}", *("" if math.isnan(n) else f"{n:.8g}" for n in numbers)))
-    header = ("state", sweep.parameter, "least x (m)", "largest x (m)", "push (m s⁻²)", "ΔU (m² s⁻³)", "ln τ (s)")
+                rows.append((name, f"{value / scale:.10g}", *("" if math.isnan(n) else f"{n:.8g}" for n in numbers)))
+    header = ("state", label, "least x (m)", "largest x (m)", "push (m s⁻²)", "ΔU (m² s⁻³)", "ΔU, % by 1 %", "ln τ (s)")
     return Table("along", "Along the parameter", header, tuple(rows), detail=True)
 
 
@@ -126,14 +145,6 @@ def noise_intensity(record: Record) -> float:
 def number(value: Any) -> str:
     """Return the value of a parameter as text."""
     return f"{value:.10g}" if isinstance(value, float) else str(value)
-
-
-def symbol_text(name: str) -> str:
-    """Return the name of a symbol with a Greek letter as such: ``"omega_n"`` is ω_n."""
-    stem, *rest = name.split("_")
-    with contextlib.suppress(KeyError):  # no Greek letter has this name
-        stem = unicodedata.lookup(f"GREEK SMALL LETTER {stem}")
-    return "_".join((stem, *rest))
 
 
 def _digits(energy: ActivationEnergy) -> int:

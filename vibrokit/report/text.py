@@ -16,6 +16,7 @@ from vibrokit.report.tables import (
     attractor_table,
     coexistence_table,
     energy_table,
+    gap_table,
     noise_intensity,
     rate_table,
     saddle_table,
@@ -68,7 +69,7 @@ def _reconciliation_blocks(reconciliation: Reconciliation) -> list[Block]:
 
 @blocks_of.register
 def _sweep_blocks(sweep: Sweep) -> list[Block]:
-    return [coexistence_table(sweep), along_table(sweep)]
+    return [coexistence_table(sweep), gap_table(sweep), along_table(sweep)]
 
 
 @blocks_of.register

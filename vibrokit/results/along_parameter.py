@@ -7,12 +7,8 @@ from typing import Any
 
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.record import Record
-from vibrokit.text_units import size_of
+from vibrokit.text_units import parameter_text, size_of
 
-_GREEK = (
-    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda",
-    "mu", "nu", "xi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
-)  # fmt: skip
 _TEXTS = ("parameter", "symbol", "unit")
 
 
@@ -35,11 +31,8 @@ class AlongParameter(Record, ABC):
 
     @property
     def axis_label(self) -> str:
-        """Label of the parameter's axis, with symbol and unit in TeX."""
-        head, _, index = self.symbol.partition("_")
-        letter = f"\\{head}" if head in _GREEK else head
-        label = f"{self.parameter} ${letter}{f'_{{{index}}}' if index else ''}$"
-        return f"{label} ({_unit_in_tex(self.unit)})" if self.unit else label
+        """Label of the parameter's axis, with symbol and unit."""
+        return parameter_text(self.parameter, self.symbol, self.unit)
 
     def axis(self, unit: str | None = None) -> tuple[str, float]:
         """Return the label of the parameter's axis in a unit, and the size of that unit in SI.
@@ -51,8 +44,7 @@ class AlongParameter(Record, ABC):
         """
         if unit is None:
             return self.axis_label, 1.0
-        scale = size_of(unit, self.unit)
-        return f"{self.parameter} ({unit})", scale
+        return parameter_text(self.parameter, self.symbol, unit), size_of(unit, self.unit)
 
     def parameter_variables(self) -> dict[str, Any]:
         """Return the arrays that hold the parameter."""
@@ -67,11 +59,3 @@ class AlongParameter(Record, ABC):
         """Return the parameter of some arrays, by attribute; raises ResultFileError."""
         parameter, symbol, unit = (arrays.words(name, ())[0] for name in _TEXTS)
         return {"parameter": parameter, "symbol": symbol, "unit": unit or None}
-
-
-def _unit_in_tex(unit: str) -> str:
-    words = []
-    for word in unit.split():
-        base, _, power = word.partition("^")
-        words.append(f"{base}$^{{{power}}}$" if power else base)
-    return " ".join(words)

@@ -116,9 +116,24 @@ class EnergyContinuation(AlongParameter):
         StructureError
             No path of this exit was found at any value.
         """
-        actions = np.array([self.branches[number].action for number in self._of(source, target)])
-        least = np.where(np.isnan(actions), np.inf, actions).min(axis=0)
-        return np.where(np.isinf(least), np.nan, least)
+        return self._least(source, target)[0]
+
+    @called
+    def sensitivity(self, source: str, target: str | None = None) -> Array:
+        """Return by how many per cent 1 % of the parameter changes the least action at each value, to first order.
+
+        Parameters that are tied change together. Arguments and errors as of `energy`.
+        """
+        action, derivative = self._least(source, target)
+        with np.errstate(divide="ignore", invalid="ignore"):  # at rest, an action is 0
+            return self.values * derivative / action
+
+    def _least(self, source: str, target: str | None) -> tuple[Array, Array]:
+        """The least action of an exit at each value, and its derivative."""
+        own = [self.branches[number] for number in self._of(source, target)]
+        actions, slopes = (np.array([getattr(branch, name) for branch in own]) for name in ("action", "derivative"))
+        best = np.where(np.isnan(actions), np.inf, actions).argmin(axis=0)[None]
+        return np.take_along_axis(actions, best, axis=0)[0], np.take_along_axis(slopes, best, axis=0)[0]
 
     @called
     def changes(self, source: str, target: str | None = None) -> tuple[LeastPathChange, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -13,6 +15,7 @@ from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
 from vibrokit.results.fields import LARGEST, Number, Word
@@ -49,16 +52,17 @@ class Prefactor:
 
 @dataclasses.dataclass(frozen=True)
 class Existence:
-    """From where to where a branch of steady states exists.
+    """From where to where a branch of steady states exists without a gap.
 
     Attributes
     ----------
     name : str
     first, last : float
         Of the parameter: located where the branch ends in a bifurcation, otherwise between the last value at which it
-        was found and the next; the ends of the sweep where it goes on there.
+        was found and the next; the last value itself at an end of the sweep, and where there is no state at the next.
     begins, ends : str
-        The kind of the bifurcation; ``"goes on"`` at an end of the sweep, ``"not located"`` otherwise.
+        The kind of the bifurcation; ``"goes on"`` at an end of the sweep, ``"nothing beyond"`` where the scene is
+        refused at the next value or has no state there, ``"not located"`` otherwise.
     """
 
     name: str
@@ -97,21 +101,52 @@ class Sweep(AlongParameter):
         return self.states.values
 
     @property
-    def intensity(self) -> float:
-        """Noise intensity D of the scene (m² s⁻³); 0 without noise."""
-        return float((self.scene.get("noise") or {}).get("intensity", 0.0))
+    def shown_in(self) -> str | None:
+        """Unit in which the user gave the values; None for SI base units."""
+        unit: str | None = self.settings.get("unit")
+        return unit
+
+    @property
+    def intensity(self) -> Array:
+        """Noise intensity D of the scene at each value (m² s⁻³); 0 without noise."""
+        return self._along("noise.intensity", (self.scene.get("noise") or {}).get("intensity", 0.0))
+
+    @property
+    def stops(self) -> tuple[Array, ...]:
+        """Position of each stop at each value (m)."""
+        return tuple(
+            self._along(f"barriers.{index}.position", stop["position"])
+            for index, stop in enumerate(self.scene.get("barriers", ()))
+        )
+
+    def _along(self, path: str, own: float) -> Array:
+        """A parameter of the scene at each value, given what it is in the scene."""
+        given = self.settings.get("parameter", self.parameter)
+        factors = {given: 1.0} if isinstance(given, str) else given
+        return factors[path] * self.values if path in factors else np.full(len(self.values), float(own))
+
+    @property
+    def gaps(self) -> tuple[tuple[float, str], ...]:
+        """The values at which the scene is refused or has no steady state, each with the reason."""
+        return tuple(
+            (at.value, str(finding.values["reason"]))
+            for at in self.states.states
+            for finding in at.findings
+            if finding.code is Code.NOTHING_AT
+        )
 
     @property
     def coexistence(self) -> tuple[Existence, ...]:
-        """From where to where each branch exists, in the order of the branches."""
-        return tuple(self._existence(number) for number in range(len(self.names)))
+        """From where to where each branch exists, in the order of the branches; more than one entry if it has gaps."""
+        return tuple(one for number in range(len(self.names)) for one in self._stretches(number))
 
-    def _existence(self, number: int) -> Existence:
-        known = np.isin(self.values, [value for value, _ in self.states.branch(number)])
-        places = np.flatnonzero(known)
-        first, begins = self._end(number, int(places[0]), -1)
-        last, ends = self._end(number, int(places[-1]), 1)
-        return Existence(self.names[number], first, last, begins, ends)
+    def _stretches(self, number: int) -> Iterator[Existence]:
+        found = np.isin(self.values, [value for value, _ in self.states.branch(number)])
+        places = np.flatnonzero(found)
+        for stretch in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+            first, begins = self._end(number, int(stretch[0]), -1)
+            last, ends = self._end(number, int(stretch[-1]), 1)
+            yield Existence(self.names[number], first, last, begins, ends)
 
     def _end(self, number: int, place: int, direction: int) -> tuple[float, str]:
         """Where a branch ends beyond a value, and how."""
@@ -121,15 +156,17 @@ class Sweep(AlongParameter):
         there = float(self.values[beyond])
         low, high = sorted((here, there))
         met = [one for one in self.states.bifurcations if one.branch == number and low <= one.value <= high]
-        if not met:
-            return 0.5 * (here + there), "not located"
-        last = max(met, key=lambda one: direction * one.value)
-        return last.value, last.kind
+        if met:
+            last = max(met, key=lambda one: direction * one.value)
+            return last.value, last.kind
+        if any(value == there for value, _ in self.gaps):
+            return here, "nothing beyond"
+        return 0.5 * (here + there), "not located"
 
     def along(self, name: str) -> tuple[Array, Array, Array]:
         """Return the least and the largest x (m) and the largest push of a stop (m s⁻²) of a branch at each value.
 
-        NaN where the branch has no steady state.
+        NaN where the branch has no steady state; the push also without stops.
 
         Raises
         ------
@@ -139,7 +176,7 @@ class Sweep(AlongParameter):
         found = np.full((3, len(self.values)), np.nan)
         for value, attractor in self.states.branch(name):
             place = int(np.flatnonzero(self.values == value)[0])
-            push = max(attractor.peak_force.values(), default=0.0)
+            push = max(attractor.peak_force.values(), default=np.nan)
             found[:, place] = (*attractor.extent[0], push)
         return found[0], found[1], found[2]
 
@@ -155,6 +192,16 @@ class Sweep(AlongParameter):
         if self.energies is None:
             raise StructureError("the sweep has no exit paths; see its status.")
         return self.energies.energy(source)
+
+    @called
+    def sensitivity(self, source: str) -> Array:
+        """Return by how many per cent 1 % of the parameter changes ΔU at each value; errors as of `energy`.
+
+        Parameters that are tied change together.
+        """
+        if self.energies is None:
+            raise StructureError("the sweep has no exit paths; see its status.")
+        return self.energies.sensitivity(source)
 
     @called
     def log_mean_time(self, source: str, intensity: float | None = None) -> tuple[Array, Array]:
@@ -175,19 +222,22 @@ class Sweep(AlongParameter):
         places, logs, errors = (
             np.array([getattr(one, name) for one in own]) for name in ("value", "logarithm", "error")
         )
-        strength = self.intensity if intensity is None else intensity
+        strength = self.intensity if intensity is None else np.full(len(self.values), float(intensity))
         prefactor = np.interp(self.values, places, logs)
         nearest = np.abs(self.values[:, None] - places).argmin(axis=1)
         error = np.hypot(np.interp(self.values, places, errors), np.abs(prefactor - logs[nearest]))
-        return prefactor + self.energy(source) / strength, error
+        with np.errstate(divide="ignore"):  # without noise it never happens
+            return prefactor + self.energy(source) / strength, error
 
     @property
     def summary(self) -> Summary:
         """From where to where each branch exists."""
+        scale = self.axis(self.shown_in)[1]
         rows = tuple(
-            (one.name, f"{one.first:.8g} ({one.begins}) to {one.last:.8g} ({one.ends})") for one in self.coexistence
+            (one.name, f"{one.first / scale:.8g} ({one.begins}) to {one.last / scale:.8g} ({one.ends})")
+            for one in self.coexistence
         )
-        return Summary(f"Sweep of {self.parameter}", rows)
+        return Summary(f"Sweep of {self.parameter}{f' in {self.shown_in}' if self.shown_in else ''}", rows)
 
     @called
     def plot(self, ax: Any = None, unit: str | None = None) -> SweepArtists:
@@ -198,24 +248,38 @@ class Sweep(AlongParameter):
         ax : array of Axes, optional
             One for each panel.
         unit : str, optional
-            ``"Hz"`` for frequencies, ``"mm"`` and ``"µm"`` for lengths; by default that of the parameter, in SI.
+            Of the parameter, such as ``"Hz"`` or ``"mm"``; by default that in which the values were given.
         """
         from vibrokit.plots.sweeps import Branch, sweep
 
-        label, scale = self.axis(unit)
+        shown_in = self.shown_in if unit is None else unit
+        label, scale = self.axis(shown_in)
         branches = []
         for number, name in enumerate(self.names):
             energy = time = np.full(len(self.values), np.nan)
-            if self.energies is not None and any(branch.source == name for branch in self.energies.branches):
+            with contextlib.suppress(StructureError):  # what is not known of a branch is not drawn
                 energy = self.energy(name)
-                if any(one.source == name for one in self.prefactors):
-                    time = self.log_mean_time(name)[0]
+                time = self.log_mean_time(name)[0]
             branches.append(Branch(number, name, *self.along(name), energy=energy, log_time=time))
-        stops = [(one["side"], one["position"]) for one in self.scene.get("barriers", ())]
         marks = [(one.kind, one.value / scale, one.branch) for one in self.states.bifurcations]
+        lost = [(value / scale, energy, self.names.index(name)) for name, value, energy in self.lost]
         return sweep(
-            self.values / scale, branches, stops=stops, marks=marks, intensity=self.intensity, label=label, ax=ax
+            self.values / scale, branches, stops=self.stops, marks=marks, lost=lost, intensity=self.intensity,
+            label=label, length=shown_in if self.unit == "m" else None, ax=ax,
         )  # fmt: skip
+
+    @property
+    def lost(self) -> tuple[tuple[str, float, float], ...]:
+        """Where exit paths were lost: the state that is left, the last value of the parameter, and the action there."""
+        if self.energies is None:
+            return ()
+        values = self.energies.values
+        return tuple(
+            (branch.source, float(values[place]), float(branch.action[place]))
+            for finding in self.energies.found(Code.PATH_LOST)
+            for branch in (self.energies.branches[finding.source or 0],)
+            for place in np.flatnonzero(values == finding.values["value"])
+        )
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays of the parts."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -26,10 +26,12 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.stoppable import Stoppable
+from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
-from vibrokit.structure.basins.grid import CELL_CODES, basin_fractions
-from vibrokit.structure.find import find_structure
+from vibrokit.structure.basins.grid import CELL_CODES, SETTLING, basin_fractions
+from vibrokit.structure.basins.stop_cells import MARGIN
+from vibrokit.structure.find import structure_of
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.tracing.branches import (
@@ -43,8 +45,6 @@ from vibrokit.structure.tracing.branches import (
 from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_FEW = (2, 2)  # cells where only the attractors are wanted
-
 Array = NDArray[np.float64]
 
 
@@ -55,7 +55,7 @@ def continuation(
     values: Sequence[float],
     *,
     region: Any = None,
-    cells: tuple[int, int] = (100, 100),
+    cells: tuple[int, int] | None = (100, 100),
     starts: tuple[int, int] = (24, 24),
     stepper: Stepper | str | None = None,
     rng: int | np.random.Generator = 0,
@@ -87,8 +87,9 @@ def continuation(
         Region of the searches and of the basin fractions, the same at all values so that these can be compared. By
         default each search chooses its own region, and the fractions refer to the smallest region that contains
         the steady states of all values and the stops, with a margin around them.
-    cells : (int, int)
-        Cells of the basin grid in x and v.
+    cells : (int, int), optional
+        Cells of the basin grid in x and v; None for no basin fractions, which saves most of the time where basins are
+        intricate.
     starts : (int, int)
         Starts of each search in x and v.
     stepper : Stepper or str, optional
@@ -119,12 +120,17 @@ def continuation(
     chosen = stepper_of(stepper)
     check_means(osc, chosen, executor)
     line, numbers = parameter_line("continuation", osc, parameter), ordered_values("continuation", values)
-    request = Request(region, cells, 0, None, starts, 0.5, None, None, False, False, chosen, seed_of(rng))
+    request = request_of(region, starts, seed_of(rng), cells=cells, stepper=chosen)
     with working(progress, time_limit) as work:
-        run = _Run(osc, line, numbers.tolist(), request, executor)
+        run = ContinuationRun(osc, line, numbers.tolist(), request, executor)
         run.run()
         with put_off():
             return run.record(work)
+
+
+def request_of(region: Any, starts: Any, seed: int, *, cells: Any = None, stepper: Stepper | None = None) -> Request:
+    """Return what a continuation asks for at each value; without cells, it finds no basin fractions."""
+    return Request(region, cells, 0, MARGIN, starts, SETTLING, None, None, False, False, stepper, seed)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -137,20 +143,26 @@ class _Found:
     budget: int = 0
     findings: tuple[Finding, ...] = ()
     refused: bool = False  # whether there is no such scene, or none that can have attractors
+    structure: Structure | None = None  # where saddles were searched for
 
 
 @dataclasses.dataclass(eq=False)
-class _Run:
-    """Goes through the stages and keeps what each has found."""
+class ContinuationRun:
+    """Goes through the stages and keeps what each has found; arguments as of `continuation`.
+
+    At the values `thorough`, basins and saddles are found too, and the structures kept.
+    """
 
     osc: Oscillator
     line: ParameterLine
     values: list[float]
     request: Request
-    executor: concurrent.futures.Executor | None
+    executor: concurrent.futures.Executor | None = None
+    thorough: Collection[float] = ()
 
     def __post_init__(self) -> None:
         self.region = self.request.region
+        self.still = not self.line.enters(self.osc, self.osc.model.drift)  # motion is the same at all values
         self.found: list[_Found] = []
         self.cell_findings: dict[float, tuple[Finding, ...]] = {}
         self.work = Stoppable("values")
@@ -162,17 +174,18 @@ class _Run:
             work.doing = "branches"
             self.tracing.run()
             work.doing = "basin fractions"
-            self._find_fractions()
+            if self.request.cells is not None:
+                self._find_fractions()
         if work.stopped:
             with put_off():
                 self.tracing.pair_off()
 
     def record(self, work: Work) -> Continuation:
         """Return the record of all that was found."""
-        tracing, declared, request = self.tracing, self.line.entry.declared, self.request
-        numbered = tracing.numbered()
+        tracing, declared, request, numbered = self.tracing, self.line.entry.declared, self.request, self.numbered
         bifurcations = bifurcations_of(tracing, numbered)
-        states = tuple(self._states(numbered))
+        states = tuple(self._states())
+        states += tuple(self._copies(states[-1])) if self.still and states and not self.work.stopped else ()
         arguments = {name: getattr(request, name) for name in ("region", "cells", "starts", "stepper", "rng")}
         arguments |= {"parameter": self.line.argument, "values": tuple(self.values)}
         nothing = [finding for at in states for finding in at.findings if finding.code is Code.NOTHING_AT]
@@ -196,14 +209,32 @@ class _Run:
 
     def _search(self) -> None:
         """Search for the steady states at each value."""
-        request = self.request
-        given = {"region": request.region, "starts": request.starts, "stepper": request.stepper, "rng": request.rng}
-        tasks = [(self.osc, self.line, value, given) for value in self.values]
+        thorough = self.values if self.still and self.thorough else self.thorough
+        tasks = [(self.osc, self.line, value, self.request, value in thorough) for value in self.values]
         with stage("values", unit="values", total=len(tasks)), contextlib.closing(self._each(_search, tasks)) as all_:
             for found in all_:
                 self.found.append(found)
                 current().stop_again()
                 advance()
+                if self.still and not found.refused:
+                    break
+
+    @cached_property
+    def numbered(self) -> list[list[int]]:
+        """The branch of each attractor, once the stages are over."""
+        return self.tracing.numbered()
+
+    @property
+    def structures(self) -> dict[float, tuple[Structure, tuple[str, ...]]]:
+        """Where saddles were searched for, the structure and the names of the branches of its attractors."""
+        names = branch_names(self.tracing, self.numbered)
+        branches = dict(zip(self.tracing.values, self.numbered, strict=True))
+        found = {
+            at.value: (at.structure, tuple(names[branch] for branch in branches[at.value][: len(at.attractors)]))
+            for at in self.found
+            if at.structure is not None
+        }
+        return dict.fromkeys(self.values, next(iter(found.values()))) if self.still and found else found
 
     @cached_property
     def tracing(self) -> Tracing:
@@ -239,12 +270,19 @@ class _Run:
                 self.cell_findings[tracing.values[index]] = findings
                 advance()
 
-    def _states(self, numbered: list[list[int]]) -> Generator[SteadyStates, None, None]:
-        """Yield the steady states at each value."""
+    def _copies(self, states: SteadyStates) -> Generator[SteadyStates, None, None]:
+        """Yield states that are the same at every value, at those values that were not searched."""
+        for value in self.values[len(self.found) :]:
+            reason = self.line.refusal(self.osc, value)
+            nothing = SteadyStates(value, (), (), (Finding.of(Code.NOTHING_AT, value=value, reason=reason),))
+            yield nothing if reason else dataclasses.replace(states, value=value)
+
+    def _states(self) -> Generator[SteadyStates, None, None]:
+        """Yield the steady states at each value that was searched."""
         places = {value: index for index, value in enumerate(self.tracing.values)}
         for at in self.found:
             index = places.get(at.value)
-            pairs = [] if index is None else list(zip(self.tracing.found[index], numbered[index], strict=True))
+            pairs = [] if index is None else list(zip(self.tracing.found[index], self.numbered[index], strict=True))
             pairs.sort(key=lambda pair: order_of(pair[0]))  # as find_structure does, for the same names
             named = labelled([attractor for attractor, _ in pairs], has_stops=bool(self.osc.barriers))
             yield SteadyStates(
@@ -258,19 +296,20 @@ class _Run:
         return (work(*task) for task in tasks) if self.executor is None else carry(work, tasks, self.executor)
 
 
-def _search(osc: Oscillator, line: ParameterLine, value: float, given: dict[str, Any]) -> _Found:
+def _search(osc: Oscillator, line: ParameterLine, value: float, request: Request, thorough: bool) -> _Found:
+    if reason := line.refusal(osc, value):
+        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=reason),), refused=True)
+    there = line.at(osc, value)
+    wanted = dataclasses.replace(request, cells=None, saddles=thorough)
     try:
-        there = line.at(osc, value)
-    except VibrokitError as error:
-        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)),), refused=True)
-    try:
-        structure = find_structure(there, cells=_FEW, saddles=False, manifolds=False, **given)
+        structure = structure_of(there, wanted, basins=thorough)
     except VibrokitError as error:
         nothing = Finding.of(Code.NOTHING_AT, value=value, reason=str(error))
         return _Found(value, findings=(nothing,), refused=there.model.undamped)
-    # The few cells of this grid do not resolve the basins, which are found once all attractors are known.
+    # Basins are found once all attractors are known.
     findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
-    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings)
+    kept = structure if thorough else None
+    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings, structure=kept)
 
 
 def _union(regions: list[Region]) -> Region | None:

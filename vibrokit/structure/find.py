@@ -110,9 +110,22 @@ def find_structure(
     request = Request(
         region, cells, refine, margin, starts, settling, budget, edge_budget, saddles, manifolds, chosen, seed_of(rng)
     )  # fmt: skip
+    return structure_of(osc, request, executor, progress=progress, time_limit=time_limit)
+
+
+def structure_of(
+    osc: Oscillator,
+    request: Request,
+    executor: concurrent.futures.Executor | None = None,
+    *,
+    basins: bool = True,
+    progress: Progress = None,
+    time_limit: float | None = None,
+) -> Structure:
+    """Return what a request asks for; without basins, the attractors only, and no cell is followed."""
     with working(progress, time_limit) as work:
         with put_off():
             finder = Finder(osc, request, executor)
-        finder.run()
+        finder.run(basins=basins)
         with put_off():
             return finder.structure(work)

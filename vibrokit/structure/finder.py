@@ -76,9 +76,9 @@ class Finder:
         self.without_manifolds: list[Finding] = []
         self.work = Stoppable("attractors")
 
-    def run(self) -> None:
-        """Go through the stages; an interrupt ends them, and what is known by then is kept."""
-        stages = {"attractors": self._find_attractors, "basins": self._find_basins}
+    def run(self, *, basins: bool = True) -> None:
+        """Go through the stages; an interrupt ends them, and what is known by then is kept. Saddles need basins."""
+        stages = {"attractors": self._find_attractors} | ({"basins": self._find_basins} if basins else {})
         stages |= {"saddles": self._find_saddles} if self.request.saddles else {}
         stages |= {"manifolds": self._grow_manifolds} if self.request.saddles and self.request.manifolds else {}
         with self.work:

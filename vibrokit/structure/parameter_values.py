@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.arguments import members, real
-from vibrokit.errors import ParameterError, shown
+from vibrokit.errors import ParameterError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
 
@@ -49,6 +49,18 @@ class ParameterLine:
     def at(self, osc: Oscillator, value: float) -> Oscillator:
         """Return the scene at a value."""
         return osc.replace({path: factor * value for path, factor in self.factors})
+
+    def enters(self, osc: Oscillator, expression: Any) -> bool:
+        """Whether an expression of the model of a scene depends on any of the parameters."""
+        return any(osc.model.symbols[path] in expression.free_symbols for path, _ in self.factors)
+
+    def refusal(self, osc: Oscillator, value: float) -> str:
+        """Return why there is no scene at a value; empty if there is one."""
+        try:
+            self.at(osc, value)
+        except VibrokitError as error:
+            return str(error)
+        return ""
 
     def begins(self, prefix: str) -> bool:
         """Whether the path of any of the parameters begins with a prefix."""

@@ -30,7 +30,7 @@ _MOST_FIRST = 20_000_000  # sections that the first grid may take by default
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
 _CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
 _FINEST = 2048  # cells along a side of a grid that is refined for an attractor in a cell of another basin
-_SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
+SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
     UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
     AT_COPY: Code.CELLS_AT_COPIES,
@@ -218,10 +218,8 @@ def basin_fractions(
     stepper: Stepper | None,
 ) -> tuple[tuple[Attractor, ...], tuple[Finding, ...]]:
     """Find the basin fraction of each attractor in a region, and findings about the cells that lead to none."""
-    chosen = stepper or persistent_stepper(
-        osc, attractors, ensemble_stepper(osc, Flow.STATE), _SETTLING * region.widths
-    )
+    chosen = stepper or persistent_stepper(osc, attractors, ensemble_stepper(osc, Flow.STATE), SETTLING * region.widths)
     circle = on_circle(osc, attractors, region)
-    classifier = BasinClassifier(osc, attractors, region, _SETTLING, budget, chosen, circle=circle)
+    classifier = BasinClassifier(osc, attractors, region, SETTLING, budget, chosen, circle=circle)
     basins = classify_grid(classifier, cells)
     return with_fractions(attractors, basins), cell_findings(basins)
