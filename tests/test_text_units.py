@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vibrokit.errors import ParameterError
-from vibrokit.text_units import familiar, number_in, size_of
+from vibrokit.text_units import familiar, length_unit, number_in, parameter_text, size_of
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,10 @@ from vibrokit.text_units import familiar, number_in, size_of
         ("3 rad/s", "s^-1", 3.0, "rad/s"),
         ("0.25mm", "m", 2.5e-4, "mm"),
         ("-1.5e2 µm", "m", -1.5e-4, "µm"),
+        ("2 g", "m s^-2", 19.6133, "g"),
+        ("4 (m/s²)²/Hz", "m^2 s^-3", 2.0, "(m/s²)²/Hz"),  # D is half the one-sided spectral density
+        ("0.01 g^2/Hz", "m^2 s^-3", 0.01 * 9.80665**2 / 2, "g^2/Hz"),
+        ("90 deg", "rad", math.pi / 2, "deg"),
         ("0.57", "s^-1", 0.57, None),
         ("1e-3", "", 1e-3, None),
     ],
@@ -56,3 +60,20 @@ def test_familiar_units():
         (5.0, "s"),
     ]
     assert [familiar(*one) for one in given] == ["40 Hz", "2 kHz", "", "-250 µm", "100 mm", "", ""]
+
+
+@pytest.mark.parametrize(
+    ("symbol", "unit", "text"),
+    [
+        ("omega_n", "s^-1", "a.b ω_n (s⁻¹)"),
+        ("lambda", "m^(-1/2) s^-2", "a.b λ (m⁻¹ᐟ² s⁻²)"),
+        ("k", "", "a.b k"),
+        ("", None, "a.b"),
+    ],
+)
+def test_parameters_as_text(symbol, unit, text):
+    assert parameter_text("a.b", symbol, unit) == text
+
+
+def test_lengths_that_are_read_easily():
+    assert [length_unit(size) for size in (0.5, 3e-4, 2e-7, 1e-10, 0.0)] == ["m", "mm", "µm", "nm", "m"]

@@ -49,6 +49,9 @@ def test_the_cheapest_exit_changes_where_two_stops_are_equally_far():
     response = amplitude / np.hypot(1 - frequency**2, 2 * zeta * frequency)
     exact = 2 * zeta * (0.5 - np.abs(found.values) - response) ** 2
     np.testing.assert_allclose(found.energy("clear", "exit"), exact, rtol=1e-6)
+    force = found.values  # which the action depends on as a power of this degree
+    degree = -2 * np.abs(force) / (0.5 - np.abs(force) - response)
+    np.testing.assert_allclose(found.sensitivity("clear"), degree, rtol=1e-4)
     (change,) = found.changes("clear")
     assert change.value == pytest.approx(0, abs=1e-6)
     (finding,) = found.found(Code.LEAST_PATH_CHANGES)
@@ -65,6 +68,17 @@ def test_a_path_that_ends_is_said_to_end():
     lost = found.found(Code.PATH_LOST)
     assert lost
     assert all(0.37 <= finding.values["value"] <= 0.385 for finding in lost)
+
+
+def test_values_at_which_the_scene_is_refused_are_gaps():
+    """As with damping below 0; the first and the last value are searched at only if there is a scene."""
+    found = vk.energy_continuation(WELLS, "damping_ratio", [-0.1, 0.1, 0.2], analyzer=QUICK)
+    assert found.settings["search"] == [0.1, 0.2]
+    for branch in found.branches:
+        np.testing.assert_allclose(branch.action, [np.nan, 0.1, 0.2], rtol=1e-7)
+    (gap,) = found.found(Code.NOTHING_AT)
+    assert gap.values["value"] == -0.1
+    assert not found.found(Code.PATH_LOST)
 
 
 def test_it_can_be_saved_and_reopened(wells, tmp_path):
@@ -103,6 +117,7 @@ def test_lines_cross_where_they_must_and_gaps_are_no_crossings():
         ({"values": []}, ParameterError, "one or more"),
         ({"values": [0.1, float("nan")]}, ParameterError, "finite"),
         ({"values": [0.1, 0.1]}, ParameterError, "more than once"),
+        ({"values": [-0.2, -0.1]}, StructureError, "damping_ratio must be"),
         ({"search": [0.3]}, ParameterError, "0.3 is none of them"),
         ({"analyzer": vk.ActionPlot()}, StructureError, "must be a LeastAction"),
         ({"osc": 3}, SceneError, "must be an Oscillator"),

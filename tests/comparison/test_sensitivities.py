@@ -34,6 +34,27 @@ def test_powers_are_per_cents_and_the_mean_time_follows():
     assert all(math.isnan(one.time) for one in sensitivities(energy, PARAMETERS))
 
 
+def test_parameters_that_parts_share_count_together():
+    """ΔU = (gap of both stops)⁶ / (stiffness of both); mirrored stops have positions of both signs."""
+    numbers = {
+        "barriers.0.position": 0.5, "barriers.1.position": -0.5, "barriers.0.law.stiffness": 4.0,
+        "barriers.1.law.stiffness": 4.0, "excitations.0.frequency": 1.0, "excitations.1.frequency": 2.0,
+    }  # fmt: skip
+    value = 0.5**6 / 4.0
+    slopes = {
+        name: power * value / numbers[name] for name, power in zip(numbers, (3, 3, -0.5, -0.5, 1, 1), strict=True)
+    }
+    energy = dataclasses.replace(power_law(), value=value, lower=value, upper=value, sensitivity=slopes,
+                                 sensitivity_error=dict.fromkeys(slopes, 0.0))  # fmt: skip
+    found = {one.parameter: one.energy for one in sensitivities(energy, numbers)}
+    assert found["barriers.*.position"] == pytest.approx(6.0)
+    assert found["barriers.*.law.stiffness"] == pytest.approx(-1.0)
+    assert "excitations.*.frequency" not in found  # they differ
+    named = {one.parameter for one in sensitivities(energy, numbers, tied={"gaps": PAIR})}
+    assert "gaps" in named
+    assert "barriers.*.position" not in named
+
+
 def test_what_has_no_sensitivities_is_refused():
     with pytest.raises(StructureError):
         sensitivities(dataclasses.replace(power_law(), sensitivity={}), PARAMETERS)

@@ -183,7 +183,7 @@ def test_saved_and_opened(paper, tmp_path):
 
 def test_pictures(paper):
     axes = paper.plot().ax
-    assert "omega" in axes.get_xlabel()
+    assert "ω (s⁻¹)" in axes.get_xlabel()
     assert len(paper.plot_fractions().areas) == len(paper.branches)
 
 
