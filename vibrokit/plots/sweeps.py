@@ -155,19 +155,22 @@ def sweep(
                                           label="_lost")
     ]  # fmt: skip
     _label(panels, label, length)
-    _explain(first, drawn, ends)
+    _explain(first, ax, drawn, ends)
     return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn), tuple(ends))
 
 
-def _explain(first: Axes, bifurcations: Sequence[Line2D], ends: Sequence[Line2D]) -> None:
-    """Add the legend, with the signs of bifurcations and of paths that were lost if there are any."""
+def _explain(first: Axes, given: Any, bifurcations: Sequence[Line2D], ends: Sequence[Line2D]) -> None:
+    """Add the legend beside all panels, or inside axes that were given, with signs of bifurcations and lost paths."""
     signs = [
         Line2D([], [], color="0.3", linestyle="", marker=mark, markersize=size, label=label)
         for drawn, mark, size, label in ((bifurcations, "^", 5, "bifurcation"), (ends, "x", 8, "path lost"))
         if drawn
     ]
     handles = [*named(first.lines), *signs]
-    first.legend(handles=handles, fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    if given is not None:
+        first.legend(handles=handles, fontsize=7, framealpha=0.85, loc="best")
+    elif isinstance(first.figure, Figure):
+        first.figure.legend(handles=handles, fontsize=8, frameon=False, loc="outside right upper")
 
 
 def _label(panels: Mapping[str, Axes], label: str, length: str) -> None:

@@ -159,6 +159,8 @@ class Tracing:
         costs = np.full((len(first), len(second)), 2 * _NEAR)
         for row, before in enumerate(first):
             for column, after in enumerate(second):
+                if before.repeats and after.repeats and not _doubled(before.period, after.period):
+                    continue
                 here = self._led_to.get((pair, row, pair + 1), before.points)
                 there = self._led_to.get((pair + 1, column, pair), after.points)
                 away = min(_apart(here, after.points, self.size), _apart(before.points, there, self.size))
@@ -194,6 +196,12 @@ class Tracing:
 def without_fraction(attractor: Attractor) -> Attractor:
     """Return an attractor whose basin fraction is unknown."""
     return dataclasses.replace(attractor, basin_fraction=np.nan, basin_fraction_error=np.nan)
+
+
+def _doubled(one: int, other: int) -> bool:
+    """Whether one period becomes the other by doubling or halving, any number of times."""
+    ratio, rest = divmod(max(one, other), min(one, other))
+    return rest == 0 and ratio & (ratio - 1) == 0
 
 
 def _apart(first: Array, second: Array, size: Array) -> float:
