@@ -20,6 +20,7 @@ from vibrokit.results.sweep import Prefactor, Sweep
 
 DAMPING = (0.08, 0.1, 0.12)
 D = 0.02
+SAMPLED = 0.5 * (math.pi / 256) ** 2  # of an amplitude: what samples of an orbit, 256 a period or more, may miss
 
 
 def empty():
@@ -103,8 +104,8 @@ def test_linear_response_and_grazing_along_a_frequency_in_hertz():
     found = vk.sweep(between_stops(gap), "frequency", hertz.tolist(), unit="Hz", starts=(4, 4))
     np.testing.assert_allclose(found.values, 2 * math.pi * np.sort(hertz), rtol=1e-15)
     low, high, push = found.along(found.names[0])
-    np.testing.assert_allclose(high[:2], amplitude(found.values[:2]), rtol=1e-7)
-    np.testing.assert_allclose(low, -high, rtol=1e-6)
+    np.testing.assert_allclose(high[:2], amplitude(found.values[:2]), rtol=SAMPLED)
+    np.testing.assert_allclose(low[:2], -high[:2], rtol=SAMPLED)
     assert (push > 0).tolist() == [False, False, True]
     (touch, *_) = (one for one in found.states.bifurcations if one.kind == "grazing")
     assert touch.value == pytest.approx(grazing, rel=1e-8)
@@ -120,11 +121,11 @@ def test_both_gaps_together_with_values_at_which_the_scene_is_refused():
     found = vk.sweep(between_stops(), tied, gaps, unit="mm", starts=(4, 4))
     assert found.gaps[0][0] == pytest.approx(-0.01)
     assert [value for value, _ in found.gaps] == [found.values[0]]
-    (span,) = found.coexistence
-    assert (span.begins, span.ends) == ("nothing beyond", "goes on")
+    assert {span.begins for span in found.coexistence} == {"nothing beyond"}
+    (on,) = (span.name for span in found.coexistence if span.ends == "goes on")
     (touch, *_) = (one for one in found.states.bifurcations if one.kind == "grazing")
     assert touch.value == pytest.approx(amplitude(0.6), rel=1e-8)
-    np.testing.assert_allclose(found.along(found.names[0])[1][2], amplitude(0.6), rtol=1e-7)
+    np.testing.assert_allclose(found.along(on)[1][2], amplitude(0.6), rtol=SAMPLED)
     assert found.plot().ax.get_ylabel().endswith("(mm)")
 
 
@@ -179,7 +180,7 @@ def test_an_interrupt_leaves_the_states_and_a_file(tmp_path):
     assert stop.values["reason"] == "interrupt"
     found.save(tmp_path / "sweep.nc")
     again = vk.load_result(tmp_path / "sweep.nc")
-    np.testing.assert_allclose(again.along("clear")[1], amplitude(0.6), rtol=1e-7)
+    np.testing.assert_allclose(again.along("clear")[1], amplitude(0.6), rtol=SAMPLED)
 
 
 def test_what_a_sweep_without_paths_cannot_say():
