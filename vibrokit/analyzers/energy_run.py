@@ -78,7 +78,8 @@ class EnergyRun:
                 advance()
         self.findings += work.findings
         if not (self.curves or work.stopped):
-            reasons = [str(finding) for finding in self.findings] or ["all paths lead from sets that are no orbits."]
+            refused = [] if self.places else [self.line.refusal(self.osc, float(self.values[0]))]
+            reasons = [*map(str, self.findings), *refused, "all paths lead from sets that are no orbits."]
             raise StructureError(f"no exit path was found at any searched value. {reasons[0]}")
 
     def _search(self, place: int) -> None:
