@@ -91,16 +91,16 @@ def test_duffing_has_two_branches_that_overlap_between_two_folds(duffing):
 
 
 def test_an_attractor_that_the_search_missed_is_found_from_its_neighbour(monkeypatch):
-    found, osc, at_middle = module.find_structure, vk.load_scene("duffing"), []
+    found, osc, at_middle = module.structure_of, vk.load_scene("duffing"), []
 
-    def forgetful(scene, **settings):
-        structure = found(scene, **settings)
+    def forgetful(scene, request, **settings):
+        structure = found(scene, request, **settings)
         if scene.parameters[FREQUENCY] != 1.4:
             return structure
         at_middle.extend(structure.attractors)
         return dataclasses.replace(structure, attractors=structure.attractors[1:])
 
-    monkeypatch.setattr(module, "find_structure", forgetful)
+    monkeypatch.setattr(module, "structure_of", forgetful)
     region = ((-3, 3), (-3, 3))
     result = continuation(osc, FREQUENCY, [1.35, 1.4, 1.45], region=region, **QUICK)
     assert len(at_middle) == 2
@@ -215,14 +215,14 @@ def test_values_that_the_scene_refuses_stand_with_the_reason():
 
 
 def test_what_was_found_before_an_interrupt_stays(monkeypatch, tmp_path):
-    found = module.find_structure
+    found = module.structure_of
 
-    def interrupted(scene, **settings):
+    def interrupted(scene, request, **settings):
         if scene.parameters[FREQUENCY] > 1.45:
             raise KeyboardInterrupt
-        return found(scene, **settings)
+        return found(scene, request, **settings)
 
-    monkeypatch.setattr(module, "find_structure", interrupted)
+    monkeypatch.setattr(module, "structure_of", interrupted)
     result = continuation(
         vk.load_scene("duffing"), FREQUENCY, [1.35, 1.4, 1.5, 1.6], region=((-3, 3), (-3, 3)), **QUICK
     )
