@@ -12,7 +12,7 @@ import vibrokit as vk
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.results.codes import Code
-from vibrokit.structure import continuation as module
+from vibrokit.structure import searched_value as module
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.continuation import continuation
 from vibrokit.structure.orbits import refine_orbit

@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
-from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, current, put_off, stage, working
-from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.finding import Finding
@@ -29,11 +27,11 @@ from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
-from vibrokit.structure.basins.grid import CELL_CODES, SETTLING, basin_fractions
+from vibrokit.structure.basins.grid import SETTLING, basin_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN
-from vibrokit.structure.find import structure_of
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
+from vibrokit.structure.searched_value import SearchedValue, searched_value
 from vibrokit.structure.tracing.branches import (
     Tracing,
     bifurcations_of,
@@ -133,19 +131,6 @@ def request_of(region: Any, starts: Any, seed: int, *, cells: Any = None, steppe
     return Request(region, cells, 0, MARGIN, starts, SETTLING, None, None, False, False, stepper, seed)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Found:
-    """Steady states found at one value."""
-
-    value: float
-    attractors: tuple[Attractor, ...] = ()
-    region: Region | None = None
-    budget: int = 0
-    findings: tuple[Finding, ...] = ()
-    refused: bool = False  # whether there is no such scene, or none that can have attractors
-    structure: Structure | None = None  # where saddles were searched for
-
-
 @dataclasses.dataclass(eq=False)
 class ContinuationRun:
     """Goes through the stages and keeps what each has found; arguments as of `continuation`.
@@ -163,7 +148,7 @@ class ContinuationRun:
     def __post_init__(self) -> None:
         self.region = self.request.region
         self.still = not self.line.enters(self.osc, self.osc.model.drift)  # motion is the same at all values
-        self.found: list[_Found] = []
+        self.found: list[SearchedValue] = []
         self.cell_findings: dict[float, tuple[Finding, ...]] = {}
         self.work = Stoppable("values")
 
@@ -211,7 +196,10 @@ class ContinuationRun:
         """Search for the steady states at each value."""
         thorough = self.values if self.still and self.thorough else self.thorough
         tasks = [(self.osc, self.line, value, self.request, value in thorough) for value in self.values]
-        with stage("values", unit="values", total=len(tasks)), contextlib.closing(self._each(_search, tasks)) as all_:
+        with (
+            stage("values", unit="values", total=len(tasks)),
+            contextlib.closing(self._each(searched_value, tasks)) as all_,
+        ):
             for found in all_:
                 self.found.append(found)
                 current().stop_again()
@@ -294,22 +282,6 @@ class ContinuationRun:
 
     def _each(self, work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Generator[Any, None, None]:
         return (work(*task) for task in tasks) if self.executor is None else carry(work, tasks, self.executor)
-
-
-def _search(osc: Oscillator, line: ParameterLine, value: float, request: Request, thorough: bool) -> _Found:
-    if reason := line.refusal(osc, value):
-        return _Found(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=reason),), refused=True)
-    there = line.at(osc, value)
-    wanted = dataclasses.replace(request, cells=None, saddles=thorough)
-    try:
-        structure = structure_of(there, wanted, basins=thorough)
-    except VibrokitError as error:
-        nothing = Finding.of(Code.NOTHING_AT, value=value, reason=str(error))
-        return _Found(value, findings=(nothing,), refused=there.model.undamped)
-    # Basins are found once all attractors are known.
-    findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
-    kept = structure if thorough else None
-    return _Found(value, structure.attractors, structure.basins.region, structure.budget, findings, structure=kept)
 
 
 def _union(regions: list[Region]) -> Region | None:
