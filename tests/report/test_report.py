@@ -1,5 +1,6 @@
 """What is printed of records, and the object for other programs."""
 
+import dataclasses
 import json
 import math
 from typing import ClassVar
@@ -12,7 +13,7 @@ from tests.builders import full_result, rewritten, say
 from vibrokit.cli import main
 from vibrokit.progress import Stats
 from vibrokit.report.data import plain, run_data
-from vibrokit.report.tables import energy_table, rate_table
+from vibrokit.report.tables import energy_table, rate_table, sensitivity_table
 from vibrokit.report.text import findings_text, record_text, stats_text
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -167,3 +168,22 @@ def test_the_object_has_energies_branches_and_transitions_by_analyzer():
     assert [cycle["members"] for cycle in transitions["cycle_hierarchy"]] == [[1], [0]]
     assert (data["attractors"], data["saddles"]) == ([], [])
     assert vk.Transitions.of(found).names == NAMES
+
+
+def test_sensitivities_are_also_in_per_cent_and_shared_parameters_stand_together():
+    """Of ΔU = ζ³ (gap of both stops)², whose powers are its sensitivities in per cent."""
+    result = full_result()
+    zeta, value = result.scene["damping_ratio"], result.energies[0].value
+    slopes = {
+        "damping_ratio": 3 * value / zeta,
+        "barriers.0.position": value / 0.5,
+        "barriers.1.position": -value / 0.5,
+    }
+    energy = dataclasses.replace(
+        result.energies[0], sensitivity=slopes, sensitivity_error=dict.fromkeys(slopes, 0.0)
+    )  # fmt: skip
+    table = sensitivity_table(dataclasses.replace(result, energies=(energy,)))
+    rows = {name: [float(number) for number in numbers] for name, *numbers in table.rows}
+    assert rows["damping_ratio"] == pytest.approx([3 * value / zeta, 3], rel=1e-4)
+    assert rows["barriers.1.position"] == pytest.approx([-value / 0.5, 1], rel=1e-4)
+    assert rows["barriers.*.position"] == pytest.approx([2 * value / 0.5, 2], rel=1e-4)
