@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from vibrokit.analyzers import energy_run
 from vibrokit.errors import ParameterError, ResultFileError, SceneError, StructureError
 from vibrokit.results.codes import Code
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation, LeastPathChange
 from vibrokit.scene_file import scene_data
+from vibrokit.structure.parameter_values import parameter_line
 
 QUICK = vk.LeastAction(graph=None, shooting=vk.Shooting(points=2000, rounds=6))
 WELLS = vk.load_scene("double-well")
@@ -79,6 +81,20 @@ def test_values_at_which_the_scene_is_refused_are_gaps():
     (gap,) = found.found(Code.NOTHING_AT)
     assert gap.values["value"] == -0.1
     assert not found.found(Code.PATH_LOST)
+
+
+def test_structures_that_are_known_are_not_searched_for_again(monkeypatch):
+    """Their attractors have the names that are given, also as the source; paths are followed from there."""
+    osc = WELLS.replace(damping_ratio=0.1)
+    structure = vk.find_structure(osc, starts=(8, 8), manifolds=False)
+    monkeypatch.setattr(energy_run, "find_structure", None)
+    line, analyzer = parameter_line("test", WELLS, "damping_ratio"), dataclasses.replace(QUICK, source="other")
+    known = {0.1: (structure, ("one", "other"))}
+    run = energy_run.EnergyRun(WELLS, line, np.array([0.1, 0.2]), analyzer, [0], 0, known)
+    run.run()
+    (curve,) = run.curves
+    assert (curve.source, curve.target) == ("other", "one")
+    assert [curve.action(place) for place in (0, 1)] == pytest.approx([0.1, 0.2], rel=1e-7)
 
 
 def test_it_can_be_saved_and_reopened(wells, tmp_path):
