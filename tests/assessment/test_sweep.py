@@ -10,6 +10,7 @@ import vibrokit as vk
 from tests.builders import PROVENANCE, assert_same, full_continuation
 from tests.klein_kramers import double_well_rate
 from tests.scenes import scene
+from vibrokit.assessment.sweep import among_others
 from vibrokit.cli import main
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.report.tables import along_table, coexistence_table, gap_table
@@ -49,7 +50,7 @@ def with_paths(unit=None):
     branch = EnergyBranch(
         "clear", "exit", np.array([0.5, math.nan, math.nan]), nan, np.array([2.0, math.nan, math.nan])
     )
-    lost = Finding.of(Code.PATH_LOST, 0, parameter="p", value=float(one.values[0]), next=0.5, reason="a fold.")
+    lost = Finding.of(Code.PATH_LOST, 0, parameter="p", value=float(one.values[0]) + 0.05, next=0.5, reason="a fold.")
     paths = EnergyContinuation(
         parameter=one.parameter, symbol=one.symbol, unit=one.unit, values=one.values, branches=(branch,),
         **PROVENANCE | {"findings": (lost,)},
@@ -73,6 +74,19 @@ def test_stops_move_along_gaps_and_a_lost_path_has_a_mark():
     assert "(Hz)" in artists.axes[-1].get_xlabel()
     (strength,) = (line for line in artists.axes[2].lines if line.get_label() == "_D")
     np.testing.assert_array_equal(strength.get_ydata(), [0.25] * 3)
+
+
+def test_values_where_other_states_coexist_than_where_exits_were_searched_for():
+    """Two states at the first value, where the search was, and one at the last."""
+    one = with_paths("Hz")
+    (branch,) = one.energies.branches
+    branch = dataclasses.replace(branch, action=np.array([0.5, math.nan, 0.7]))
+    paths = dataclasses.replace(one.energies, branches=(branch,), settings={"search": [float(one.values[0])]})
+    (finding,) = among_others(dataclasses.replace(one, energies=paths))
+    assert finding.code is Code.OTHER_STATES
+    assert finding.values["at"] == pytest.approx([0.75 / (2 * math.pi)])
+    paths = dataclasses.replace(paths, settings={"search": one.values[[0, 2]].tolist()})
+    assert not [*among_others(dataclasses.replace(one, energies=paths))]
 
 
 def test_tables_are_in_the_unit_of_the_user():
@@ -207,6 +221,7 @@ def test_a_file_holds_it(tmp_path):
         ["frequency", "1Hz", "2"],
         ["frequency", "1mm", "2mm"],
         ["frequency", "one", "2"],
+        ["frequency", "1Hz", "2Hz", "--search", "1"],
         ["barriers.0.position=x", "1", "2"],
         ["barriers.0.position=1,frequency=1", "1", "2"],
         ["frequenzy", "1", "2"],

@@ -155,7 +155,7 @@ class _Run:
             scene=scene_data(self.osc), settings=dict(settings), seconds=work.seconds, stats=work.stats,
         )  # fmt: skip
         parts = self._of_parts(found.axis(found.shown_in)[1])
-        findings = (*parts, *_strong(found), *self.findings)
+        findings = (*parts, *among_others(found), *_strong(found), *self.findings)
         return dataclasses.replace(found, findings=findings)
 
     def _of_parts(self, size: float) -> Iterator[Finding]:
@@ -236,6 +236,19 @@ def _in_unit(finding: Finding, size: float) -> Finding:
         for name, value in finding.values.items()
     }
     return dataclasses.replace(finding, values=values)
+
+
+def among_others(found: Sweep) -> Iterator[Finding]:
+    """Yield a finding if exits were searched for only where other states coexist than at some value with an energy."""
+    if found.energies is None or not found.energies.branches:
+        return
+    known = np.isfinite([branch.action for branch in found.energies.branches]).any(axis=0)
+    states = {at.value: frozenset(at.branches) for at in found.states.states}
+    among = {states[value] for value in found.searched.tolist()}
+    others = [value for value in found.values[known].tolist() if states[value] not in among]
+    if others:
+        at = [value / found.axis(found.shown_in)[1] for value in others]
+        yield Finding.of(Code.OTHER_STATES, parameter=found.parameter, at=at)
 
 
 def _strong(found: Sweep) -> Iterator[Finding]:

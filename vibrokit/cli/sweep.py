@@ -22,6 +22,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], sc
     parser.add_argument("stop", help="last value")
     parser.add_argument("--count", type=int, default=11, help="number of values (default 11)")
     parser.add_argument("--source", metavar="STATE", help="name or label of the state to leave (default: each)")
+    parser.add_argument(
+        "--search", metavar="VALUES", help="those of the values at which exits are searched for: 60Hz,65Hz"
+    )
     parser.add_argument("--states-only", action="store_true", help="no energies and mean times")
     parser.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
     parser.add_argument("--verbose", action="store_true", help="also each branch at each value, and every finding")
@@ -59,6 +62,9 @@ def sweep_scene(options: argparse.Namespace) -> int:
     (first, unit), (last, other) = (number_in(text, line.entry.declared.unit) for text in (options.start, options.stop))
     if unit != other:
         raise ParameterError(f"{options.start} and {options.stop} have different units; give both in one unit.")
+    search = options.search and [number_in(text, line.entry.declared.unit) for text in options.search.split(",")]
+    if search and any(own != unit for _, own in search):
+        raise ParameterError(f"--search {options.search} has another unit than {options.start}; give both in one unit.")
     source = None if options.source is None else source_of(options.source)
     size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit)
     values = np.linspace(first / size, last / size, options.count).tolist()
@@ -67,6 +73,7 @@ def sweep_scene(options: argparse.Namespace) -> int:
             interrupts.stops(work)
             found = sweep(
                 osc, line.argument, values, unit=unit, source=source, energies=not options.states_only,
+                search=search and [value / size for value, _ in search],
                 rng=options.seed,
             )  # fmt: skip
         interrupts.finishing()

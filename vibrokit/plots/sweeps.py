@@ -87,6 +87,7 @@ def sweep(
     marks: Sequence[tuple[str, float, int]] = (),
     lost: Sequence[tuple[float, float, int]] = (),
     intensity: ArrayLike = 0.0,
+    searched: ArrayLike = (),
     label: str,
     length: str | None = None,
     ax: Any = None,
@@ -107,6 +108,8 @@ def sweep(
         Where exit paths were lost (m² s⁻³).
     intensity : float or array_like (values,)
         D (m² s⁻³); 0 for none.
+    searched : array_like
+        Values at which exit paths were searched for, whose energies have full markers.
     label : str
         Of the parameter's axis.
     length : str, optional
@@ -136,7 +139,11 @@ def sweep(
         curves += first.plot(place, metre * np.asarray(one.low), label=f"_{one.name}", **style)
         for name, panel in panels.items():
             if panel is not first:
-                panel.plot(place, getattr(one, name), label=f"_{one.name}", **style)
+                hollow = {"markerfacecolor": "white"} if name == "energy" else {}
+                panel.plot(place, getattr(one, name), label=f"_{one.name}", **style | hollow)
+        if "energy" in panels:
+            full = np.isin(place, searched)
+            panels["energy"].plot(place[full], np.asarray(one.energy)[full], **style | {"linestyle": ""})
     for number, position in enumerate(stops):
         first.plot(place, metre * np.asarray(position), label="_stop" if number else "stops", **_DASHED)
     strength = np.broadcast_to(np.asarray(intensity, dtype=float), place.shape)

@@ -216,6 +216,11 @@ class Code(StrEnum):
         "least-path-changes", INFO,
         "Below {parameter} = {value:.8g} the path {state} has the least action, and above it the path {goal}.",
     )  # fmt: skip
+    OTHER_STATES = (
+        "other-states", WARNING,
+        "At {parameter} = {at} other states coexist than where exits were searched for: ΔU there is that of paths "
+        "found elsewhere, and a cheaper one may exist.", "Pass these values, or one of each kind, in search=.",
+    )  # fmt: skip
     NOTHING_AT = "nothing-at", WARNING, "At {value:g} nothing was found: {reason}", _SEE_REASON
 
     # Energies

@@ -126,6 +126,11 @@ class Sweep(AlongParameter):
         return factors[path] * self.values if path in factors else np.full(len(self.values), float(own))
 
     @property
+    def searched(self) -> Array:
+        """The values at which exit paths were searched for; at the others ΔU is an upper bound."""
+        return np.array([] if self.energies is None else self.energies.settings.get("search", ()), dtype=float)
+
+    @property
     def gaps(self) -> tuple[tuple[float, str], ...]:
         """The values at which the scene is refused or has no steady state, each with the reason."""
         return tuple(
@@ -243,12 +248,7 @@ class Sweep(AlongParameter):
     def plot(self, ax: Any = None, unit: str | None = None) -> SweepArtists:
         """Draw displacements, pushes, energies and mean times along the parameter; see `vibrokit.plots.sweeps.sweep`.
 
-        Parameters
-        ----------
-        ax : array of Axes, optional
-            One for each panel.
-        unit : str, optional
-            Of the parameter, such as ``"Hz"`` or ``"mm"``; by default that in which the values were given.
+        `ax` are axes, one for each panel; `unit` is that of the parameter, by default that of the values as given.
         """
         from vibrokit.plots.sweeps import Branch, sweep
 
@@ -265,7 +265,7 @@ class Sweep(AlongParameter):
         lost = [(value / scale, energy, self.names.index(name)) for name, value, energy in self.lost]
         return sweep(
             self.values / scale, branches, stops=self.stops, marks=marks, lost=lost, intensity=self.intensity,
-            label=label, length=shown_in if self.unit == "m" else None, ax=ax,
+            searched=self.searched / scale, label=label, length=shown_in if self.unit == "m" else None, ax=ax,
         )  # fmt: skip
 
     @property
@@ -273,13 +273,13 @@ class Sweep(AlongParameter):
         """Where exit paths were lost: the state that is left, the last value of the parameter, and the action there."""
         if self.energies is None:
             return ()
-        values = self.energies.values
-        return tuple(
-            (branch.source, float(values[place]), float(branch.action[place]))
-            for finding in self.energies.found(Code.PATH_LOST)
-            for branch in (self.energies.branches[finding.source or 0],)
-            for place in np.flatnonzero(values == finding.values["value"])
-        )
+        values, found = self.energies.values, []
+        for finding in self.energies.found(Code.PATH_LOST):
+            branch = self.energies.branches[finding.source or 0]
+            end = np.asarray(finding.values["value"], dtype=float)  # which may lie between two values
+            place = int(np.where(np.isfinite(branch.action), np.abs(values - end), np.inf).argmin())
+            found.append((branch.source, float(values[place]), float(branch.action[place])))
+        return tuple(found)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays of the parts."""
