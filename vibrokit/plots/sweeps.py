@@ -183,7 +183,7 @@ def _explain(first: Axes, given: Any, bifurcations: Sequence[Line2D], ends: Sequ
 def _label(panels: Mapping[str, Axes], label: str, length: str) -> None:
     for name, panel in panels.items():
         panel.set_ylabel(_PANELS[name].format(length=length), fontsize=9)
-        panel.tick_params(labelsize=8)
+        panel.tick_params(which="both", labelsize=8)
         if name == "energy":
             panel.set_yscale("log")
         else:
