@@ -232,7 +232,7 @@ MISLED = [
     ("never pulls", KelvinVoigt, {"clamped": False}),
     ("jump at first touch", KelvinVoigt, {"jumps": False}),
     ("leading power", Hertz, {"exponent": sympy.Integer(2)}),
-    ("smoothness at first touch", Hertz, {"rooted": False}),
+    ("smoothness at first touch", Hertz, {"root": 1}),
 ]
 
 LAWS = [

@@ -67,6 +67,12 @@ def contact(push):
         (stopped("50*depth**0.95"), contact(lambda d, r: 50 * d**0.95), 0.5),
         (stopped("5*log(1 + depth)**0.5"), contact(lambda d, r: 5 * math.sqrt(math.log1p(d))), 0.5),
         (stopped("5*depth**0.6*(1 + 0.3*rate)"), contact(lambda d, r: 5 * d**0.6 * (1 + 0.3 * r)), 0.5),
+        (stopped("5*depth**0.25"), contact(lambda d, r: 5 * d**0.25), 0.5),
+        (
+            stopped("k*depth**1.5 + c*depth**0.25*rate", k=50.0, c=1.4),
+            contact(lambda d, r: max(0.0, 50 * d**1.5 + 1.4 * d**0.25 * r)),
+            0.5,
+        ),
         (
             forced(spring=vk.CustomSpring("sign(x)*abs(x)**p", p=0.5)),
             lambda x, v, side: side * math.sqrt(abs(x)),

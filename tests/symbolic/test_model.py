@@ -79,15 +79,15 @@ def test_a_clamped_law_says_when_it_pushes():
 @pytest.mark.parametrize(
     ("law", "derived"),
     [
-        (vk.Hertz(50.0), {"conservative": True, "jumps": False, "clamped": False, "rooted": True, "smooth": True}),
-        (vk.Linear(50.0), {"conservative": True, "jumps": False, "clamped": False, "rooted": False, "smooth": True}),
+        (vk.Hertz(50.0), {"conservative": True, "jumps": False, "clamped": False, "root": 2, "smooth": True}),
+        (vk.Linear(50.0), {"conservative": True, "jumps": False, "clamped": False, "root": 1, "smooth": True}),
         (
             vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=0.2),
-            {"conservative": False, "jumps": False, "clamped": True, "rooted": True, "smooth": True},
+            {"conservative": False, "jumps": False, "clamped": True, "root": 2, "smooth": True},
         ),
         (
             vk.CustomLaw("k*depth + c*rate", k=50.0, c=0.2),
-            {"conservative": False, "jumps": True, "clamped": True, "rooted": False, "smooth": True},
+            {"conservative": False, "jumps": True, "clamped": True, "root": 1, "smooth": True},
         ),
         (vk.CustomLaw("k*depth**1.3", k=50.0), {"conservative": True, "jumps": False, "smooth": False}),
     ],

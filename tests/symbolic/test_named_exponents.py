@@ -21,7 +21,7 @@ def contact(law):
 
 def properties(law):
     derived = contact(law)
-    return derived.jumps, derived.clamped, derived.exponent, derived.rooted, derived.smooth, derived.bends
+    return derived.jumps, derived.clamped, derived.exponent, derived.root, derived.smooth, derived.bends
 
 
 def code(osc, flow=Flow.STATE):

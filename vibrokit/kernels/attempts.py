@@ -10,12 +10,19 @@ from typing import TYPE_CHECKING
 from vibrokit.kernels.error_blocks import error_blocks
 from vibrokit.kernels.rows import LANES
 from vibrokit.kernels.tableau import STAGES
+from vibrokit.symbolic.flow_kind import Flow
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
 
 _CLOCK = -1  # row of the time, before those of the variables
 _LEAST_DEPTH = 64.0 * 2.0**-52  # of the position of a stop
+# Slopes are extrapolated from depths d where both errors are small: that of the parabola, (d/D)^(3/4) in the fourth
+# root of the depth D of the step, and the rounding of x, ε/d. So d/D = (ε/D)^(5/8).
+_FARTHER = (
+    "_share = sqrt(sqrt((_least + 1e-300)/(_reach*abs(_along) + _least + 1e-300)))",
+    "_least = _least/(_share*sqrt(_share))",
+)
 _IMPORTS = """from numba import njit
 
 from vibrokit.kernels.options import LINKED_LANES
@@ -38,7 +45,7 @@ class AttemptWriter:
         # Rows of a state, enough for every flow of a scene with as many states: they share their drivers.
         self._rows = 2 + 2 * text.states + 4 * text.states**2
         states = ["STATE", "TRIAL", "POINT", "SIZES", "FIFTHS", "THIRDS"]
-        scalars = ["LENGTH", "ERROR", "FACTOR", "SIGMA", "COURSE", "WALL", "SIDE"]
+        scalars = ["LENGTH", "ERROR", "FACTOR", "SIGMA", "COURSE", "ROOT", "WALL", "SIDE"]
         scalars += ["GRAIN", "DEPTH", "NEAR", "ALLOWED", "HAZE"]
         blocks = [*((name, self._rows) for name in states), ("SLOPES", STAGES * self._rows)]
         self._places, self._numbers = {}, 0
@@ -59,7 +66,9 @@ class AttemptWriter:
         text = self._text
         blocks = error_blocks(text.states, text.states * text.flow.has_momenta, self._count).tolist()
         firsts = [0, *(1 + blocks.index(block) for block in blocks)]
-        hazy = 2 + 2 * text.states if text.curved else 1 + self._count
+        hazy = 1 + self._count
+        if text.curved:
+            hazy = 2 + 2 * text.states if text.flow is Flow.HAMILTONIAN_VARIATIONAL else 1 + text.states
         return f"FACTS = {(text.curved, hazy, *firsts)!r}\n"
 
     def slopes(self) -> list[str]:
@@ -97,17 +106,23 @@ class AttemptWriter:
         lines = [
             f"_sigma = {self._at('SIGMA')} + node*{self._at('LENGTH')}",
             f"_deep, _rooted = {self._at('COURSE')} > 1.5, {self._at('COURSE')} > 0.5",
+            f"_quartic, _reach = {self._at('ROOT')} > 3.0, {self._at('LENGTH')}*{self._at('LENGTH')}",
+            "_reach = _reach*_reach if _quartic else _reach",
+            "_square = _sigma*_sigma",
+            "_power = _square*_square if _quartic else _square",
             f"_wall, _side = {self._at('WALL')}, {self._at('SIDE')}",
-            "x = _wall + _side*_sigma*_sigma if _deep else x",
+            "x = _wall + _side*_power if _deep else x",
             "_rate = _side*v",
             "_along = 1.0 if _deep else _rate",
-            f"_least = {_LEAST_DEPTH!r}*abs(_wall) + 1e-16*{self._at('LENGTH')}*{self._at('LENGTH')}*abs(_along)",
+            f"_least = {_LEAST_DEPTH!r}*abs(_wall) + 1e-16*_reach*abs(_along)",
+            *(_FARTHER if self._text.curved else ()),
             "_shallow = _rooted and _side*(x - _wall) < _least",
             "x = _wall + _side*_least if _shallow else x",
-            "_weight = (2.0*_sigma if _rooted else 1.0)/(_rate if _deep else 1.0)",
+            "_weight = 4.0*_square*_sigma if _quartic else 2.0*_sigma",
+            "_weight = (_weight if _rooted else 1.0)/(_rate if _deep else 1.0)",
         ]
         if self._text.curved:
-            lines += ["_closes = _deep or (_rate > 0.0 and _sigma*_sigma*_rate <= 4.0*_least)"]
+            lines += ["_closes = _deep or (_rate > 0.0 and _power*_rate <= 4.0*_least)"]
             lines += [f"{self._at('NEAR')} = 1.0 if _shallow and _closes else 0.0"]
             lines += [f"{self._at('POINT')} = x"]
         return [f"        {line}" for line in lines]

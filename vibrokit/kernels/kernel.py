@@ -135,7 +135,7 @@ def _facts(module: types.ModuleType, theta: NDArray[np.float64]) -> NDArray[np.f
     """
     facts, places = list(module.FACTS), list(module.WALLS)
     if places:
-        rows = zip(theta[places], module.SIDES, module.ROOTED, module.CLAMPED, module.JUMPS, strict=True)
+        rows = zip(theta[places], module.SIDES, module.ROOTS, module.CLAMPED, module.JUMPS, strict=True)
         facts += reversed([fact for row in rows for fact in row])
         facts += reversed(module.CROSSING)
     return np.array([*facts, len(places)], dtype=float)

@@ -100,11 +100,11 @@ class LocatedStepper(Stepper):
 class Order8(LocatedStepper):
     """Dormand–Prince 8(5,3) with adaptive steps, trajectories packed in vector lanes; contacts are located.
 
-    Order 8 for linear and Hertz stops and every law that is smooth in the depth or in its square root, whose contact
-    is stepped in √time and √depth; other laws lose order at first touch, and the error control takes shorter
-    steps. The lanes of a block attempt their steps together, each of its own length and along its own course. Choose it
-    for orbits, certificates and accurate ensembles of any scene, and for stiff stops; choose `FreeFlight` for the same
-    with a linear spring at tolerances below 1e-11, `RK4` for large ensembles at moderate accuracy.
+    Order 8 for linear and Hertz stops and every law that is smooth in the depth or in its second or fourth root, whose
+    contact is stepped in that root of time and depth; other laws lose order at first touch, and the error control takes
+    shorter steps. The lanes of a block attempt their steps together, each of its own length and along its own course.
+    Choose it for orbits, certificates and accurate ensembles of any scene, and for stiff stops; choose `FreeFlight` for
+    the same with a linear spring at tolerances below 1e-11, `RK4` for large ensembles at moderate accuracy.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from vibrokit.symbolic.jumps import refuse_jumps
 DEPTH = sympy.Symbol("depth", positive=True)
 RATE = sympy.Symbol("rate", real=True)
 
+_ROOTS = (1, 2, 4)  # of time and depth, that contacts are stepped in
 _BRANCHES = (sympy.Max, sympy.Min, sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Piecewise)
 _ANALYTIC = (sympy.exp, sympy.sin, sympy.cos, sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan)  # on the real axis
 
@@ -33,11 +34,11 @@ class DerivedContact:
         True if the law may pull and the barrier is not adhesive, so that negative forces are set to zero.
     exponent : sympy.Expr or None
         Leading power of depth at first touch at non-zero rate; None if unknown.
-    rooted : bool
-        True if the force is not smooth in depth, so that its contacts are stepped in √time and √depth: those of a
-        force like depth^0.6 too, whose slope is infinite at touch.
+    root : int
+        The force is smooth in this root of the depth, 1, 2 or 4; 4 also where it is smooth in none. Contacts are
+        stepped in that root of time and depth.
     smooth : bool
-        True if the force is smooth in depth or √depth, so that located contacts keep the full order of a stepper.
+        True if the force is smooth in that root, so that located contacts keep the full order of a stepper.
     values : mapping
         Values of the parameters of the law.
     """
@@ -46,7 +47,7 @@ class DerivedContact:
     jumps: bool
     clamped: bool
     exponent: sympy.Expr | None
-    rooted: bool
+    root: int
     smooth: bool
     values: Mapping[sympy.Symbol, sympy.Expr]
 
@@ -78,37 +79,41 @@ def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_f
     refuse_jumps(barrier.law, law, (DEPTH, RATE), symbols, natural_frequency)
     law = law.xreplace({symbol: sympy.Integer(0) for symbol in values if symbol.is_zero})
     jumps = _jumps(law, values)
-    _refuse_steep_touch(law, values)
-    analytic = _analytic(law, DEPTH)
-    root = sympy.Symbol("root", positive=True)
-    smooth = analytic or _analytic(sympy.powdenest(law.subs(DEPTH, root**2), force=True), root)
+    root = next((root for root in _ROOTS if _smooth_in(law, root)), None)
     return DerivedContact(
         law=law,
         jumps=jumps,
         clamped=not barrier.adhesive and not law.is_nonnegative,
         exponent=_leading_power(law),
-        rooted=not analytic,
-        smooth=smooth,
+        root=root or _ROOTS[-1],
+        smooth=root is not None,
         values=values,
     )
 
 
-def _refuse_steep_touch(law: sympy.Expr, values: Mapping[sympy.Symbol, sympy.Expr]) -> None:
-    """Raise DerivationError for a force that rises more steeply at first touch than the root of the depth.
+def refuse_steep_touch(contact: DerivedContact) -> None:
+    """Raise DerivationError if derivatives of the motion cannot be followed under the force of a contact.
 
-    Steps in the root of time follow √depth to rounding, but not lower powers. A law depth^p of stiffness 50 left a
-    motion of one period off by 2e-5 for p = 0.33 and by 2e-3 for p = 0.1, at any tolerance.
+    They need the slope of the force times the rate of the fourth root of time, which is infinite at first touch for
+    powers of the depth below 1/4.
     """
-    slope = sympy.diff(law, DEPTH)
+    slope = sympy.diff(contact.law, DEPTH)
     if not slope.has(DEPTH):
         return
-    scaled = _at_touch(sympy.powsimp(sympy.expand(slope * sympy.sqrt(DEPTH))), values)
+    scaled = _at_touch(sympy.powsimp(sympy.expand(slope * DEPTH ** sympy.Rational(3, 4))), contact.values)
     if scaled is not None and scaled.has(sympy.oo, -sympy.oo, sympy.zoo):
         raise DerivationError(
-            f"the contact force {law} rises more steeply at first touch than the root of the depth, and no stepper "
-            "follows that accurately; give powers of depth of 0.5 or more, or a law that is smooth there, as "
+            f"the contact force {contact.law} rises more steeply at first touch than the fourth root of the depth, and "
+            "no stepper follows the derivatives of the motion across that, which orbits, their multipliers, saddles "
+            "and exit paths need; give powers of depth of 0.25 or more, or a law that is smooth there, as "
             "(depth + d)**p - d**p with a small d."
         )
+
+
+def _smooth_in(law: sympy.Expr, root: int) -> bool:
+    """Whether a law has a power series in a root of the depth."""
+    variable = sympy.Symbol("root", positive=True)
+    return _analytic(sympy.powdenest(law.subs(DEPTH, variable**root), force=True), variable)
 
 
 def _analytic(expression: sympy.Expr, variable: sympy.Symbol) -> bool:

@@ -70,7 +70,7 @@ def model_for(scene: Scene, flow: Flow) -> Model:
 
 def derive_flow(model: Model, flow: Flow) -> FlowEquations:
     """Derive the equations of a flow from its model, as returned by `model_for`."""
-    if flow.has_momenta or flow.has_covariance or flow.has_derivatives:
+    if flow.differentiates:
         model.check_derivatives()
     opaque = model.opaque_forces
     forcing = FORCING if model.forcing != 0 else sympy.Integer(0)

@@ -47,3 +47,8 @@ class Flow(enum.Enum):
     def has_derivatives(self) -> bool:
         """Whether M = ∂q/∂q₀, without momenta, is among the variables."""
         return self in (Flow.STATE_VARIATIONAL, Flow.LINEARISED)
+
+    @property
+    def differentiates(self) -> bool:
+        """Whether derivatives of forces are integrated."""
+        return self.has_momenta or self.has_covariance or self.has_derivatives

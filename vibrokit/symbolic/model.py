@@ -11,7 +11,7 @@ import sympy
 from vibrokit.errors import DerivationError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.borders import Border, borders_of
-from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact
+from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact, refuse_steep_touch
 from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.jumps import refuse_jumps
@@ -96,9 +96,11 @@ class Model:
         return roughness_of(self.scene.spring, self._spring_force, self.state[:2], self._symbols_of("spring"))
 
     def check_derivatives(self) -> None:
-        """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under the spring."""
+        """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under a force."""
         if self.scene.spring is not None:
             refuse_rough(self.scene.spring, self._spring_force, self.roughness, self._symbols_of("spring"))
+        for contact in self.contacts:
+            refuse_steep_touch(contact)
 
     @cached_property
     def excitations(self) -> tuple[sympy.Expr, ...]:

@@ -79,9 +79,8 @@ class SceneText:
     @property
     def steep(self) -> bool:
         """Whether an integrated variable depends on an infinite slope of a force."""
-        if not (self.flow.has_derivatives or self.flow.has_momenta or self.flow.has_covariance):
-            return False
-        return self._model.roughness.steep or any(contact.steep for contact in self._model.contacts)
+        infinite = self._model.roughness.steep or any(contact.steep for contact in self._model.contacts)
+        return infinite and self.flow.differentiates
 
     @property
     def preamble(self) -> str:
@@ -105,7 +104,7 @@ class SceneText:
             rows |= {
                 "SIDES": tuple(float(barrier.sign) for barrier in self._model.scene.barriers),
                 "CLAMPED": tuple(contact.clamped for contact in contacts),
-                "ROOTED": tuple(contact.rooted for contact in contacts),
+                "ROOTS": tuple(contact.root for contact in contacts),
                 "JUMPS": tuple(contact.jumps for contact in contacts),
             }
         rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders), "ROUGH": self._model.roughness.steep}
@@ -130,8 +129,10 @@ class SceneText:
 
     @property
     def curved(self) -> bool:
-        """Whether second derivatives of contact laws are integrated, which may be infinite at first touch."""
-        return bool(self._model.contacts) and self.flow is Flow.HAMILTONIAN_VARIATIONAL
+        """Whether derivatives of contact laws are integrated that may be infinite at first touch."""
+        if self.flow is Flow.HAMILTONIAN_VARIATIONAL:
+            return bool(self._model.contacts)
+        return self.flow.differentiates and any(contact.steep for contact in self._model.contacts)
 
     def _position(self, stop: int) -> sympy.Symbol:
         return self._model.symbols[f"barriers.{stop}.position"]

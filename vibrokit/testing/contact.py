@@ -26,6 +26,7 @@ _SIDES = (("right", 1), ("left", -1))
 _NEAREST = mpmath.mpf(10) ** -4000  # a depth whose 200th root is negligible
 _ORDERS_AT_TOUCH = range(1, 9)
 _TOUCH_DIGITS = 250
+_SMOOTH_IN = {1: "depth", 2: "√depth", 4: "depth^(1/4)"}
 _NEAR, _NEARER = mpmath.mpf("1e-6"), mpmath.mpf("1e-12")
 
 
@@ -158,15 +159,15 @@ class ContactLawChecks(PartChecks[ContactLaw]):
         return ", ".join(dict.fromkeys(results)) or "unknown"
 
     def smoothness(self) -> str:
-        """Near the stop the force has the derived power series, in depth or √depth."""
+        """Near the stop the force has the derived power series, in a root of the depth."""
         results = []
         for part, force in self.each():
             contact = self.contact(part)
-            results.append("not smooth" if not contact.smooth else "√depth" if contact.rooted else "depth")
+            results.append(_SMOOTH_IN[contact.root] if contact.smooth else "not smooth")
             if not contact.smooth:
                 continue
             for order in _ORDERS_AT_TOUCH:
-                slopes = [self._slope(force, order, size, rooted=contact.rooted) for size in (_NEARER, _NEAR)]
+                slopes = [self._slope(force, order, size, contact.root) for size in (_NEARER, _NEAR)]
                 if abs(slopes[0]) > 30 * abs(slopes[1]) + 1e-9 * abs(force(1, 1)):
                     raise ConformanceError(
                         f"The model derives a force smooth in {results[-1]} at first touch for {part!r}, but its "
@@ -176,13 +177,12 @@ class ContactLawChecks(PartChecks[ContactLaw]):
         return ", ".join(dict.fromkeys(results))
 
     @staticmethod
-    def _slope(force: Function, order: int, size: Any, *, rooted: bool) -> Any:
-        """Divided difference of the force over points 1, 2, … times `size`, in depth or in its root."""
+    def _slope(force: Function, order: int, size: Any, root: int) -> Any:
+        """Divided difference of the force over points 1, 2, … times `size`, in a root of the depth."""
         with mpmath.workdps(_TOUCH_DIGITS):
             total = mpmath.mpf(0)
             for k in range(order + 1):
-                root = size * (k + 1)
-                value = force(root**2 if rooted else root, mpmath.mpf(1) / 3, digits=_TOUCH_DIGITS)
+                value = force((size * (k + 1)) ** root, mpmath.mpf(1) / 3, digits=_TOUCH_DIGITS)
                 total += (-1) ** (order - k) * mpmath.binomial(order, k) * value
             return total / size**order
 

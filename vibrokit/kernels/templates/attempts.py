@@ -26,6 +26,7 @@ from vibrokit.kernels.templates.scene import (
     MOST,
     NEAR,
     POINT,
+    ROOT,
     ROW,
     SIDE,
     SIGMA,
@@ -37,7 +38,7 @@ from vibrokit.kernels.templates.scene import (
     TRIAL,
     WALL,
 )
-from vibrokit.kernels.templates.steps import CLOCK, EPSILON, ROOT_DEPTH, size_of
+from vibrokit.kernels.templates.steps import CLOCK, EPSILON, ROOT_DEPTH, power_of, size_of
 
 # --- scene above, stepper below ---
 
@@ -66,7 +67,7 @@ def attempt(lanes, pushing, theta, room, facts):
         for lane in range(LANES):
             if lanes[COURSE + lane] == ROOT_DEPTH:
                 sigma = lanes[SIGMA + lane] + lanes[LENGTH + lane]
-                lanes[TRIAL + lane] = lanes[WALL + lane] + lanes[SIDE + lane] * sigma * sigma
+                lanes[TRIAL + lane] = lanes[WALL + lane] + lanes[SIDE + lane] * power_of(lanes[ROOT + lane], sigma)
 
 
 @njit(**INNER_LANES)

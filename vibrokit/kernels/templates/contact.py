@@ -16,7 +16,7 @@ from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.kernels.templates.crossing import cross
 from vibrokit.kernels.templates.crossing_extremals import turn_law
 from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
-from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROW, SIGMA, STATE, TRIAL
+from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROOT, ROW, SIGMA, STATE, TRIAL
 from vibrokit.kernels.templates.settling import push_of
 from vibrokit.kernels.templates.steps import (
     AIM,
@@ -47,7 +47,9 @@ from vibrokit.kernels.templates.steps import (
     is_clamped,
     of,
     plan,
+    power_of,
     put,
+    root_of,
     shortened,
     side_of,
     size_of,
@@ -72,12 +74,12 @@ def press(i, lane, memory, pushing, theta, settings, lanes, room):
     course, sigma = course_of(i, lane, memory, pushing, theta, lanes, room)
     remaining, step = memory[END] - now, min(memory[CONTACT_STEP], settings[5])
     last = course != ROOT_DEPTH and step >= 0.99 * remaining
-    length = length_of(course, sigma, remaining if last else step, rate)
+    length = length_of(course, sigma, remaining if last else step, rate, lanes[ROOT + lane])
     if course == ROOT_DEPTH and memory[DEEP] == 0.0:
         length *= NEAR_TURN
     memory[DEEP] = 1.0 if course == ROOT_DEPTH else 0.0
     depth = max(depth_at(STATE, i, lane, lanes, theta), 1e-30)
-    grain = grain_of(i, depth, x, rate, theta)
+    grain = grain_of(i, depth, x, rate, step, theta)
     return plan(course, sigma, length, last, grain, depth, lane, memory, settings, lanes)
 
 
@@ -96,27 +98,32 @@ def course_of(i, lane, memory, pushing, theta, lanes, room):
         acceleration = side_of(i, theta) * slope[1]
         against = max(acceleration, acceleration + law(i, depth, rate, theta) - law(i, 1e-30, rate, theta))
         if rate * rate > max(-acceleration, 4.0 * against) * depth:
-            return ROOT_DEPTH, np.sqrt(depth)
+            return ROOT_DEPTH, root_of(lanes[ROOT + lane], depth)
     if memory[PULLED] == 0.0 and np.isfinite(memory[SINCE]):
-        return ROOT_TIME, np.sqrt(of(STATE, CLOCK, lane, lanes) - memory[SINCE])
+        return ROOT_TIME, root_of(lanes[ROOT + lane], of(STATE, CLOCK, lane, lanes) - memory[SINCE])
     return TIME, 0.0
 
 
 @njit(**INNER)
-def length_of(course, sigma, lapse, rate):
+def length_of(course, sigma, lapse, rate, root):
     """Length along a course of a step that lasts `lapse`."""
+    power = power_of(root, sigma)
     if course == ROOT_TIME:
-        return lapse / (np.sqrt(sigma * sigma + lapse) + sigma)
+        end = root_of(root, power + lapse)
+        return lapse / ((end + sigma) * (end * end + sigma * sigma if root > 3.0 else 1.0))
     if course == ROOT_DEPTH:
-        square = sigma * sigma + rate * lapse
-        return np.sqrt(square) - sigma if square > 0.02 * sigma * sigma else -sigma
+        left = power + rate * lapse
+        return root_of(root, left) - sigma if left > 0.02 * power else -sigma
     return lapse
 
 
 @njit(**INNER)
-def grain_of(i, depth, x, rate, theta):
-    """Uncertainty of the law due to the rounding of x, and its own rounding."""
-    more, force = 0.5 * depth + 64.0 * EPSILON * abs(x), law(i, depth, rate, theta)
+def grain_of(i, depth, x, rate, lapse, theta):
+    """Uncertainty of the law due to the rounding of x, and its own rounding, over a step that lasts `lapse`.
+
+    The slope is the mean one on the way of the step: that at first touch may be infinite, for no time.
+    """
+    more, force = 0.5 * depth + abs(rate) * lapse + 64.0 * EPSILON * abs(x), law(i, depth, rate, theta)
     return 3.0 * EPSILON * (abs(x) * abs(law(i, depth + more, rate, theta) - force) / more + abs(force))
 
 
@@ -141,7 +148,7 @@ def judge_contact(lane, memory, pushing, theta, settings, lanes, room):
     if length != memory[FIRST]:
         memory[LAST] = 0.0
     memory[FIRST] = length
-    plan_contact(course, lanes[SIGMA + lane], length, then - now, lanes[FACTOR + lane], memory)
+    plan_contact(course, lanes[SIGMA + lane], length, then - now, lanes[FACTOR + lane], memory, lanes[ROOT + lane])
     if is_clamped(i, theta):
         return turn(i, tiny, lane, memory, pushing, theta, settings, lanes, room)
     return conclude(i, length, False, lane, memory, pushing, theta, settings, lanes, room)
@@ -235,7 +242,7 @@ def meet(i, lane, memory, pushing, theta, settings, lanes, room):
 
 
 @njit(**INNER)
-def plan_contact(course, sigma, length, lapse, factor, memory):
+def plan_contact(course, sigma, length, lapse, factor, memory, root):
     """Choose how long the next step in contact shall last, after one that may still be shortened to end on an event.
 
     How early the event is must not matter: no time may pass before it, and the next step would last as long. Nor may
@@ -243,9 +250,9 @@ def plan_contact(course, sigma, length, lapse, factor, memory):
     """
     if course == ROOT_TIME:
         if sigma == 0.0:
-            memory[FIRST_STEP] = lapse * min(factor, 1.5) ** 2
-        longer = factor * length * (AFTER_TOUCH if sigma == 0.0 else 1.0)
-        lapse = longer * (2.0 * (sigma + length) + longer)
+            memory[FIRST_STEP] = lapse * power_of(root, min(factor, 1.5))
+        end, longer = sigma + length, factor * length * (AFTER_TOUCH if sigma == 0.0 else 1.0)
+        lapse = power_of(root, end + longer) - power_of(root, end)
     else:
         lapse = factor * (length if course == TIME else lapse)
     if lapse > 0.0 and not (memory[LAST] > 0.0 and lapse < memory[CONTACT_STEP]):

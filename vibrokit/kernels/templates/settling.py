@@ -17,8 +17,8 @@ from vibrokit.kernels.templates.steps import (
     TOUCHED,
     barriers,
     is_clamped,
-    is_rooted,
     side_of,
+    smoothing_of,
     stop,
 )
 
@@ -42,7 +42,7 @@ def settle(y, memory, pushing, theta, slope):
             seen = rate * rate > 8.0 * EPSILON * abs(wall) * abs(acceleration)
             seen = seen and abs(rate) * memory[SPAN] > EPSILON * abs(wall)
             touched = rate > 0.0 if seen else acceleration > 0.0
-            if touched and is_rooted(i, theta):
+            if touched and smoothing_of(i, theta) > 1.0:
                 memory[SINCE] = y[CLOCK]
         if touched:
             memory[TOUCHED] = i

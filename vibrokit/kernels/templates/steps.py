@@ -3,7 +3,7 @@
 A half-integer law makes the force go like (t − t_c)^(3/2) after a touch at t_c: every method loses its order there. In
 τ = √(t − t_c) the motion is analytic from the touch through the turning point, and in u = √depth it is analytic down
 to the moment the mass leaves, which is at u = 0 exactly. So the time is a component of the state, y = (t, z),
-and a step may run along any of three courses.
+and a step may run along any of three courses. Quarter powers, and others, take the fourth roots instead.
 
 Between attempts each lane decides for itself how its motion goes on. It keeps in its memory what it is about, and asks
 for the next attempt; so no lane waits for another, and what it does depends on its own state alone.
@@ -25,6 +25,7 @@ from vibrokit.kernels.templates.scene import (
     LENGTH,
     NUMBERS,
     PUSHES,
+    ROOT,
     ROW,
     SIDE,
     SIGMA,
@@ -102,9 +103,9 @@ def side_of(i, theta):
 
 
 @njit(**INNER)
-def is_rooted(i, theta):
-    """Whether the law of a stop is smooth in the root of the depth only."""
-    return theta[-7 - LINKS - 5 * i] > 0.0
+def smoothing_of(i, theta):
+    """The root of the depth that the law of a stop is smooth in: 1, 2 or 4."""
+    return theta[-7 - LINKS - 5 * i]
 
 
 @njit(**INNER)
@@ -117,6 +118,20 @@ def is_clamped(i, theta):
 def jumps_at(i, theta):
     """Whether the force of a stop jumps at first touch."""
     return theta[-9 - LINKS - 5 * i] > 0.0
+
+
+@njit(**INNER)
+def power_of(root, sigma):
+    """Sigma to a power of 2 or 4."""
+    square = sigma * sigma
+    return square * square if root > 3.0 else square
+
+
+@njit(**INNER)
+def root_of(root, number):
+    """The square root of a number, or its fourth root."""
+    first = np.sqrt(number)
+    return np.sqrt(first) if root > 3.0 else first
 
 
 @njit(**INNER)
@@ -204,3 +219,4 @@ def face(lane, memory, pushing, theta, lanes):
         lanes[PUSHES - i * LANES + lane] = 1.0 if pushing[i] else 0.0
     lanes[WALL + lane] = stop(touched, theta) if touched >= 0 else 0.0
     lanes[SIDE + lane] = side_of(touched, theta) if touched >= 0 else 1.0
+    lanes[ROOT + lane] = max(smoothing_of(touched, theta), 2.0) if touched >= 0 else 2.0
