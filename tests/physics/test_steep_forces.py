@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 import vibrokit as vk
 from vibrokit.errors import DerivationError, StepperError
 from vibrokit.kernels.choice import LOCATED, ensemble_stepper
+from vibrokit.kernels.kernel import kernel_for
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -127,6 +128,20 @@ def test_motion_under_a_jump_is_right_by_default():
     np.testing.assert_allclose(osc.section_map(STARTS), ends, atol=1e-4)
     with pytest.raises(DerivationError, match="stops with a constant law"):
         vk.find_structure(osc)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"barriers": (vk.Barrier(vk.CustomLaw("depth**1.5 + depth**0.25*rate"), 0.5, "right"),)},
+        {"barriers": (vk.Barrier(vk.CustomLaw("depth + depth**0.9"), 0.5, "right"),)},
+        {"spring": vk.CustomSpring("sign(x)*sqrt(abs(x))")},
+    ],
+)
+def test_derivatives_of_momenta_are_refused(parts):
+    osc = forced(noise=vk.WhiteNoise(1e-3), **parts)
+    with pytest.raises(StepperError, match="SGCM or MFET"):
+        kernel_for(osc, Flow.HAMILTONIAN_VARIATIONAL, vk.Order8())
 
 
 def test_fixed_steps_refuse_derivatives_across_an_infinite_slope():

@@ -67,7 +67,17 @@ class LocatedStepper(Stepper):
         return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, lapse, longest
 
     def scene_part(self, text: SceneText) -> list[str]:
-        """The right-hand side with switched stops, the stops, and the slopes of all lanes."""
+        """The right-hand side with switched stops, the stops, and the slopes of all lanes.
+
+        Raises StepperError for derivatives of the momenta under a force whose slope is infinite. They need its second
+        derivative, whose integral over time diverges.
+        """
+        if text.flow is Flow.HAMILTONIAN_VARIATIONAL and text.steep:
+            raise StepperError(
+                f"{type(self).__name__} cannot follow extremal paths and their derivatives across a place where the "
+                "slope of a force is infinite, as that of depth**0.25*rate at first touch; use SGCM or MFET, which "
+                "need none, or a force that is smooth there, as (depth + d)**p - d**p with a small d for depth**p."
+            )
         writer = AttemptWriter(text)
         crossing = f"CROSSING = {(_JUMPING[text.flow] if text.breaks else NOTHING, *text.places)!r}\n"
         constants = [text.constants, text.walls, writer.facts(), crossing]
