@@ -49,6 +49,11 @@ class Case:
             self._structure = vk.find_structure(self.osc, region=self.region, time_limit=self.limit)
         return self._structure
 
+    @property
+    def cut(self) -> str:
+        """What an answer lacks: shares and counts are of the starts that had settled."""
+        return "" if self._structure is None or self._structure.complete else "the search was stopped by its limit"
+
     def attractor(self, near: Any) -> Any:
         """The attractor with the point nearest to a place, in units of the spread of all points."""
         return _nearest(self.structure.attractors, near)
@@ -220,7 +225,7 @@ def answers(case: Case) -> list[dict[str, Any]]:
         asked = {key: value for key, value in check.items() if key not in _NOT_ASKED}
         began = time.perf_counter()
         try:
-            found, why = QUESTIONS[check["question"]](case, **asked), ""
+            found, why = QUESTIONS[check["question"]](case, **asked), case.cut
         except (VibrokitError, KeyboardInterrupt, ValueError) as error:
             found, why = math.nan, f"{type(error).__name__}: {error}"
         rows.append({"check": check, "found": found, "why": why, "seconds": time.perf_counter() - began})

@@ -7,15 +7,16 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.stats import beta
 
 import vibrokit as vk
 from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
+from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.basins.grid import BasinGrid, classify_grid
+from vibrokit.structure.basins.grid import BasinGrid, classify_grid, with_fractions
 from vibrokit.structure.orbits import refine_orbit
 
 PAPER_STATES = ((0.466551, 0.002566), (0.023582, -0.049071))
@@ -79,6 +80,15 @@ def test_duffing_fractions_are_those_of_two_other_codes(duffing):
 def test_the_double_well_is_symmetric_to_the_last_cell(wells, margin):
     labels = classify_grid(wells, (100, 100), margin=margin).labels
     np.testing.assert_array_equal(labels, 1 - labels[::-1, ::-1])
+
+
+@pytest.mark.parametrize(("cells", "count"), [(576, 576), (0, 576), (10, 10), (170, 576)])
+def test_no_share_is_without_an_error(cells, count):
+    """Beta(cells + 1/2, others + 1/2), against its standard deviation from SciPy."""
+    labels = np.where(np.arange(count) < cells, 0, 1).astype(np.int16)[:, None]
+    (found,) = with_fractions([attractor((0.0, 0.0))], Basins(Region((0, 1), (0, 1)), labels))
+    assert found.basin_fraction == cells / count
+    assert found.basin_fraction_error == pytest.approx(beta.std(cells + 0.5, count - cells + 0.5))
 
 
 def test_a_softening_spring_lets_go_beyond_its_saddles():

@@ -64,7 +64,7 @@ class Attractor:
     basin_fraction : float
         Share of the region's cells that lead to it.
     basin_fraction_error : float
-        Its standard error, if the cells are taken as independent draws.
+        Its standard error, if the cells are taken as independent draws; above 0 where all cells lead to one attractor.
     residual : float
         Distance between the first point and its image after one period of the orbit, in units of the scene's motions (a
         length and ω_n times it); NaN for motion that never repeats.

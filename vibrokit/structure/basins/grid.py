@@ -194,11 +194,15 @@ def _split(labels: Labels) -> Labels:
 
 
 def with_fractions(attractors: Sequence[Attractor], basins: Basins) -> tuple[Attractor, ...]:
-    """Return attractors with their basin fractions, and the standard errors of these."""
-    found = []
+    """Return attractors with their basin fractions, and the standard errors of these.
+
+    They are those of Jeffreys' posterior: cells that all lead to one attractor do not exclude a share of the others.
+    """
+    found, count = [], basins.labels.size
     for attractor in attractors:
         fraction = basins.fraction(attractor.label)
-        error = math.sqrt(fraction * (1 - fraction) / basins.labels.size)
+        cells, others = count * fraction + 0.5, count * (1 - fraction) + 0.5
+        error = math.sqrt(cells * others / (count + 2)) / (count + 1)
         found.append(dataclasses.replace(attractor, basin_fraction=fraction, basin_fraction_error=error))
     return tuple(found)
 
