@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
-from vibrokit.kernels.jumps import EXTREMALS, LINEARIZED, MOMENTA, NOTHING
+from vibrokit.kernels.jumps import DIVERGING, EXTREMALS, LINEARIZED, MOMENTA, NOTHING
 from vibrokit.kernels.pulses import changes_of
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.parts.scene import Scene
@@ -69,17 +69,18 @@ class LocatedStepper(Stepper):
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes.
 
-        Raises StepperError for derivatives of the momenta under a force whose slope is infinite. They need its second
-        derivative, whose integral over time diverges.
+        Where the slope of a force is infinite, derivatives of the momenta need its second derivative, whose integral
+        over time diverges. They end at the touch of such a stop; at such a spring a StepperError is raised.
         """
-        if text.flow is Flow.HAMILTONIAN_VARIATIONAL and text.steep:
+        if text.flow is Flow.HAMILTONIAN_VARIATIONAL and text.rough:
             raise StepperError(
                 f"{type(self).__name__} cannot follow extremal paths and their derivatives across a place where the "
-                "slope of a force is infinite, as that of depth**0.25*rate at first touch; use SGCM or MFET, which "
-                "need none, or a force that is smooth there, as (depth + d)**p - d**p with a small d for depth**p."
+                "slope of the force of a spring is infinite, as that of sqrt(abs(x)) at 0; use SGCM or MFET, which "
+                "need no such paths, or a force that is smooth there, as (x**2 + w**2)**(1/4) with a small w."
             )
         writer = AttemptWriter(text)
-        crossing = f"CROSSING = {(_JUMPING[text.flow] if text.breaks else NOTHING, *text.places)!r}\n"
+        jumping = DIVERGING if text.diverges else _JUMPING[text.flow] if text.breaks else NOTHING
+        crossing = f"CROSSING = {(jumping, *text.places)!r}\n"
         constants = [text.constants, text.walls, writer.facts(), crossing]
         return [*constants, text.forcing, text.rhs, text.stops, *writer.slopes()]
 

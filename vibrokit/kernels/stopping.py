@@ -12,7 +12,7 @@ LEFT_BASIN = 2  # in a cell of the basin grid that belongs to another attractor
 REACHED = 3  # in the ellipse around a known point
 DIVERGED = 4  # not finite
 STALLED = 5  # more steps in one interval than allowed
-GRAZED = 6  # the contact with a stop whose force jumps was too slow to determine the jump of the momenta
+GRAZED = 6  # at the touch of a stop, too slow to determine a jump of momenta, or at which their derivatives diverge
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -79,8 +79,18 @@ class SceneText:
     @property
     def steep(self) -> bool:
         """Whether an integrated variable depends on an infinite slope of a force."""
-        infinite = self._model.roughness.steep or any(contact.steep for contact in self._model.contacts)
+        infinite = self.rough or any(contact.steep for contact in self._model.contacts)
         return infinite and self.flow.differentiates
+
+    @property
+    def diverges(self) -> bool:
+        """Whether derivatives of momenta diverge at the touch of a stop."""
+        return self.flow is Flow.HAMILTONIAN_VARIATIONAL and any(contact.steep for contact in self._model.contacts)
+
+    @property
+    def rough(self) -> bool:
+        """Whether the force of the spring jumps or has an infinite slope."""
+        return self._model.roughness.steep
 
     @property
     def preamble(self) -> str:
@@ -107,7 +117,7 @@ class SceneText:
                 "ROOTS": tuple(contact.root for contact in contacts),
                 "JUMPS": tuple(contact.jumps for contact in contacts),
             }
-        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders), "ROUGH": self._model.roughness.steep}
+        rows |= {"FORCED": self.forced, "BORDERED": bool(self._model.borders), "ROUGH": self.rough}
         if contacts and self.flow is Flow.HAMILTONIAN_VARIATIONAL:
             rows["BENDS"] = self.breaks
         return "\n".join(f"{name} = {value!r}" for name, value in rows.items()) + "\n"

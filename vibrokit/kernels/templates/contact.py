@@ -218,7 +218,7 @@ def conclude(i, length, turned, lane, memory, pushing, theta, settings, lanes, r
         take(STATE, lane, lanes, y)
         memory[PULLED] = 1.0 - memory[PULLED]
         memory[SINCE] = np.nan
-        if what_jumps(theta) == EXTREMALS:
+        if what_jumps(theta) >= EXTREMALS:
             turn_law(i, y, pushing, theta, offset_by(room, ROW))
         else:
             pushing[i] = not pushing[i]

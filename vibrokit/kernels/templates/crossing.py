@@ -2,9 +2,9 @@
 
 from numba import njit
 
-from vibrokit.kernels.jumps import EXTREMALS, LINEARIZED, MOMENTA
+from vibrokit.kernels.jumps import DIVERGING, EXTREMALS, LINEARIZED, MOMENTA
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.stopping import COMPLETED
+from vibrokit.kernels.stopping import COMPLETED, GRAZED
 from vibrokit.kernels.templates.crossing_extremals import cross_extremals
 from vibrokit.kernels.templates.crossing_linear import cross_linear
 from vibrokit.kernels.templates.crossing_momenta import cross_momenta
@@ -23,5 +23,7 @@ def cross(i, y, memory, pushing, theta, settings, room):
         return cross_momenta(i, y, memory, pushing, theta, settings, room)
     if what_jumps(theta) == EXTREMALS:
         return cross_extremals(i, y, memory, pushing, theta, settings, room)
+    if what_jumps(theta) == DIVERGING:
+        return GRAZED
     settle(y, memory, pushing, theta, room)
     return COMPLETED
