@@ -37,6 +37,10 @@ def test_density_of_the_double_well_is_the_one_of_boltzmann(wells):
 def test_barrier_at_the_saddle(wells):
     barrier = float(wells.barrier("left-rest")[0])
     assert barrier == pytest.approx(4 * 0.2 * 0.25, abs=0.02)  # within D: half of the density of the saddle has left
+    both = vk.StationaryDensity.of(wells)
+    for source in (0, "right-rest"):  # Boltzmann's law has no prefactor, and each side has half of p at the saddle
+        assert float(both.barrier(source)[0]) == pytest.approx(4 * 0.2 * 0.25, abs=0.15 * 0.02)
+    assert barrier - float(both.barrier(0)[0]) == pytest.approx(0.02 * math.log(2), abs=0.15 * 0.02)
 
 
 def test_all_shares_and_barriers_of_a_density_are_reconciled(wells):

@@ -1,6 +1,7 @@
 """The reproduction of the paper: its data, its verdicts, and that stopped work goes on with the same bits."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -57,38 +58,59 @@ def test_verdicts(verdict, match):
     assert verdict.sentence.endswith(".")
 
 
-def test_work_that_was_stopped_goes_on_with_the_same_bits(tmp_path):
-    whole, again = tmp_path / "whole", tmp_path / "again"
-    whole.mkdir()
-    again.mkdir()
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
     with working():
-        found = do(STEPS, whole)
-    assert list(found["double-well"]) == ["structure", "density"]
+        return do(STEPS, tmp_path_factory.mktemp("whole"))["double-well"]
+
+
+def test_work_that_was_stopped_goes_on_with_the_same_bits(found, tmp_path):
+    assert list(found) == ["structure", "density"]
     with working():
-        do(STEPS[:1], again)
-    first = (again / STEPS[0].file).read_bytes()
-    (again / STEPS[1].file).write_bytes(b"half of a file")
+        do(STEPS[:1], tmp_path)
+    first = (tmp_path / STEPS[0].file).read_bytes()
+    (tmp_path / STEPS[1].file).write_bytes(b"half of a file")
     with working():
-        resumed = do(STEPS, again)
-    assert (again / STEPS[0].file).read_bytes() == first
-    one, other = (records["double-well"]["density"] for records in (found, resumed))
-    assert one.data.drop_attrs().equals(other.data.drop_attrs())
+        resumed = do(STEPS, tmp_path)["double-well"]
+    assert (tmp_path / STEPS[0].file).read_bytes() == first
+    assert found["density"].data.drop_attrs().equals(resumed["density"].data.drop_attrs())
     changed = (STEPS[0], Step("double-well", "density", SGCM(source=0, intensities=(3e-2,), nodes=(60, 60))))
     with working():
-        redone = do(changed, again)["double-well"]["density"]
+        redone = do(changed, tmp_path)["double-well"]["density"]
     assert redone.intensities == [3e-2]
+
+
+def test_records_of_another_kind_scene_or_version_are_done_again(found, tmp_path):
+    good = found["structure"]
+    louder = {**good.scene, "noise": {**good.scene["noise"], "intensity": 1.0}}
+    older = {**good.versions, "vibrokit": "0.0.1"}
+    for wrong in (found["density"], replace(good, scene=louder), replace(good, versions=older)):
+        wrong.save(tmp_path / STEPS[0].file)
+        with working():
+            again = do(STEPS[:1], tmp_path)["double-well"]["structure"]
+        assert (again.kind, again.scene, again.versions) == (good.kind, good.scene, good.versions)
 
 
 def test_a_limit_leaves_a_page(tmp_path):
     report = reproduce(tmp_path / "folder", quick=True, time_limit=1e-3)
     assert not report.complete
+    (table,) = [table for table in report.tables if table.name == PUBLISHED]
+    assert [row[6] for row in table.rows] == ["unknown"] * len(published_energies())
     assert "ncomplete" in (tmp_path / "folder" / PAGE).read_text(encoding="utf-8")
 
 
 def test_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(FileError):
-        reproduce(tmp_path / "file")
+    for wrong in (tmp_path / "file", tmp_path / "file" / "inside", "/proc", "/proc/inside"):
+        with pytest.raises(FileError):
+            reproduce(wrong)
+
+
+def test_a_file_that_cannot_be_written_is_found_before_any_work(tmp_path):
+    (tmp_path / STEPS[1].file).mkdir()
+    with working(), pytest.raises(FileError, match="is a folder"):
+        do(STEPS, tmp_path)
+    assert not (tmp_path / STEPS[0].file).exists()
 
 
 @pytest.mark.slow
@@ -101,6 +123,8 @@ def test_the_paper_in_short(tmp_path):
     energies = {row[:3]: float(row[5]) for row in table.rows}
     assert math.isclose(energies["hertz-0.570", "N", "action-plot"], 7.905215598e-05, rel_tol=1e-5)
     assert math.isclose(energies["hertz-0.525", "N", "action-plot"], 9.432543e-05, rel_tol=1e-5)
-    # Figures 2 to 9 of both scenes and 10; at ω = 0.525 the state that hits has no density, and Figures 6 to 8 need it.
-    assert len(list(tmp_path.glob("figure-*.png"))) == 2 * 8 + 1 - 3
+    assert len(list(tmp_path.glob("figure-*.png"))) == 2 * 8 + 1  # Figures 2 to 9 of both scenes, and 10
+    verdicts = {row[:3]: row[6] for row in table.rows}
+    assert verdicts["hertz-0.525", "I", "action-plot"] == verdicts["hertz-0.570", "I", "action-plot"] == "ring"
+    assert "unknown" not in verdicts.values()
     assert all(step.file in {file.name for file in tmp_path.iterdir()} for step in steps(quick=True))

@@ -27,9 +27,10 @@ def reproduce_paper(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     from vibrokit.cli.interrupts import Interrupts
     from vibrokit.progress import working
-    from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, made_folder, publish
+    from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, publish
     from vibrokit.reproduction.steps import steps
     from vibrokit.reproduction.work import do
+    from vibrokit.results.atomic import made_folder
 
     folder, wanted = made_folder(options.output), steps(quick=options.quick)
     with Interrupts() as interrupts:

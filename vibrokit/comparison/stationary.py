@@ -17,6 +17,7 @@ from vibrokit.arguments import pair
 from vibrokit.comparison.occupancies import balances, occupancies, shares_text
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import StructureError, shown
+from vibrokit.results.labels import label_of
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
 
@@ -74,17 +75,12 @@ class StationaryDensity(metaclass=Constructed):
         """
         if not isinstance(result, SGCMResult):
             raise StructureError(f"StationaryDensity.of needs a result of SGCM, got {shown(result)}.")
-        names, known = result.section.names, result.intensities
-        labels = result.data["source"].values.tolist() if "log_density" in result.data else []
-        absent = [name for label, name in enumerate(names) if label not in labels]
-        if absent:
-            raise StructureError(
-                f"SGCM has no density of {', '.join(absent)}; run it without source=, and see the result's findings."
-            )
+        if "log_density" not in result.data:
+            raise StructureError("SGCM has no density of any attractor; see the result's findings.")
         weights = np.array([balance.log_probabilities for balance in balances(result)])
         x, v, parts = _on_one_grid(result, pair("StationaryDensity.of: nodes", nodes, least=2))
         density = logsumexp(parts + weights[:, :, None, None], axis=1)
-        return cls(np.array(known), weights, density, x, v, result.section, occupancies(result))
+        return cls(np.array(result.intensities), weights, density, x, v, result.section, occupancies(result))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -102,6 +98,26 @@ class StationaryDensity(metaclass=Constructed):
         potential = -self.intensities[:, None, None] * self.log_density
         potential -= potential.min(axis=(1, 2), keepdims=True)
         return self._over_section(potential, "quasi_potential")
+
+    @called
+    def barrier(self, source: int | str) -> xarray.DataArray:
+        """Return −D ln p at the lowest point of the saddles, above that of an attractor, over intensity (m² s⁻³).
+
+        Near a saddle the density is the sum of those of the states on both sides. `SGCMResult.barrier` has that of one
+        state alone, which is higher.
+
+        Raises
+        ------
+        StructureError
+            The source is unknown, or there is no saddle.
+        """
+        if not self.section.saddles:
+            raise StructureError("the structure has no saddle.")
+        well, saddle = (
+            self.quasi_potential.interp(x=("point", points[:, 0]), v=("point", points[:, 1])).min("point")
+            for points in (self.section.points[label_of(source, self.names)], np.concatenate(self.section.saddles))
+        )
+        return (saddle - well).rename("barrier").assign_attrs(units="m2 s-3")
 
     def _over_section(self, values: Array, name: str) -> xarray.DataArray:
         coordinates = {"intensity": self.intensities, "x": self.x, "v": self.v}
@@ -168,7 +184,7 @@ def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Arr
     points = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
     known = np.nan_to_num(data["log_density"].values, nan=-np.inf)
     area = math.log((x[1] - x[0]) * (v[1] - v[0]))
-    parts = np.full((known.shape[1], known.shape[0], *nodes), -np.inf)
+    parts = np.full((known.shape[1], len(result.names), *nodes), -np.inf)
     for place, label in enumerate(data["source"].values.tolist()):
         own = tuple(axes[axis][place][np.isfinite(axes[axis][place])] for axis in ("x", "v"))
         for number, phi in enumerate(known[place]):

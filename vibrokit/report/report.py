@@ -11,11 +11,11 @@ import jinja2
 
 from vibrokit.arguments import path_of
 from vibrokit.construction import called
-from vibrokit.errors import FileError, VibrokitError
+from vibrokit.errors import VibrokitError
 from vibrokit.report.blocks import Chapter, Table
 from vibrokit.report.chapters import chapters_of
 from vibrokit.report.material import gathered
-from vibrokit.results.atomic import write_atomically
+from vibrokit.results.atomic import made_folder, write_atomically
 from vibrokit.results.record import Record
 
 _PAGES = jinja2.Environment(
@@ -93,7 +93,7 @@ class Report:
         Raises
         ------
         FileError
-            A file cannot be written.
+            The folder or a file cannot be written.
         """
         target, files = made_folder(folder), list[Path]()
         for chapter in self.chapters:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
+from vibrokit.comparison.stationary import StationaryDensity
 from vibrokit.errors import StructureError
-from vibrokit.reproduction.published import STATES, Method, Published, paper, published_energies
+from vibrokit.reproduction.published import STATES, Method, Published, paper, published_energies, target_of
+from vibrokit.reproduction.steps import METHODS
 from vibrokit.reproduction.verdicts import Verdict, of_action_plot, of_density, of_exit_times, unknown
 from vibrokit.reproduction.work import Records
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.merging import merged
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -22,38 +23,41 @@ _DEVIATIONS = 1.96  # of the normal law, for intervals of 95 %
 
 
 def verdicts(records: Records) -> list[Verdict]:
-    """Return a verdict for each published number whose records are there."""
+    """Return a verdict for each published number; it is unknown where its records are missing."""
     found: list[Verdict] = []
     for one in published_energies():
         try:
-            found += _verdict(one, records.get(one.scene, {}))
+            found.append(_verdict(one, records.get(one.scene, {})) or unknown(one, "the work ended before."))
         except StructureError as error:
             found.append(unknown(one, str(error)))
     return found
 
 
-def target_of(state: str) -> str | None:
-    """Return what a state is left for: from I the state N, from N whatever is nearest."""
-    return STATES["N"] if state == "I" else None
-
-
-def _verdict(one: Published, known: dict[str, Record]) -> Iterator[Verdict]:
-    least = known.get("least-action")
+def _verdict(one: Published, known: dict[str, Record]) -> Verdict | None:
+    least, ring, _, times = (known.get(f"{name}-{one.state}") for name in METHODS)
+    density = of_both(known, "density")
     if not isinstance(least, Result):
-        return
+        return None
     source, target = STATES[one.state], target_of(one.state)
     energy = least.energy(source, target)
     match one.method:
-        case Method.ACTION_PLOT if isinstance(ring := known.get("ring"), Result):
-            yield of_action_plot(one, energy.lower, energy.upper, _value(ring, source, target))
-        case Method.DENSITY if isinstance(density := known.get("density"), SGCMResult):
+        case Method.ACTION_PLOT if isinstance(ring, Result):
+            return of_action_plot(one, energy.lower, energy.upper, _value(ring, source, target))
+        case Method.DENSITY if isinstance(density, SGCMResult):
             intensity = paper()["density"]["intensity"]
-            value = float(density.barrier(source).sel(intensity=intensity, method="nearest"))
-            error = intensity * max((r.log_error for r in density.rates if r.source == energy.source), default=np.nan)
-            yield of_density(one, value, error, energy.value, intensity)
-        case Method.EXIT_TIMES if isinstance(times := known.get(f"exit-times-{one.state}"), RatedResult):
+            value = float(StationaryDensity.of(density).barrier(energy.source).sel(intensity=intensity))
+            error = intensity * max(rate.log_error for rate in density.rates)  # ln p is the sum of both states' parts
+            return of_density(one, value, error, energy.value, intensity)
+        case Method.EXIT_TIMES if isinstance(times, RatedResult):
             fit = total_fit(times, energy)
-            yield of_exit_times(one, fit.slope, _DEVIATIONS * fit.slope_error, energy.value)
+            return of_exit_times(one, fit.slope, _DEVIATIONS * fit.slope_error, energy.value)
+    return None
+
+
+def of_both(known: dict[str, Record], method: str) -> Result | None:
+    """Return what a method found for both states, as one result; None if one is missing."""
+    found = [one for state in STATES if isinstance(one := known.get(f"{method}-{state}"), Result)]
+    return merged(found) if len(found) == len(STATES) else None
 
 
 def total_fit(times: RatedResult, energy: ActivationEnergy) -> ArrheniusFit:

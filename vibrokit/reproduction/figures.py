@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 
 from vibrokit.comparison.stationary import StationaryDensity
+from vibrokit.oscillator import Oscillator
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.densities import density_map, sampled_density
 from vibrokit.plots.exit_times import ArrheniusLine, ExitTimes, reconciled_times
-from vibrokit.reproduction.comparison import target_of, total_fit
-from vibrokit.reproduction.published import STATES, Method, paper, published_energies
+from vibrokit.reproduction.comparison import of_both, total_fit
+from vibrokit.reproduction.published import STATES, Method, paper, published_energies, target_of
+from vibrokit.reproduction.steps import METHODS
 from vibrokit.reproduction.work import Records
-from vibrokit.results.labels import label_of
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.record import Record
@@ -24,7 +25,7 @@ from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import load_scene
 
-_WALKERS, _PERIODS, _SEED = 40_000, 200, 6  # of the simulation beside Figure 6
+_WALKERS, _SEED, _RELAXATIONS = 20_000, 6, 5.0  # of the simulation beside Figure 6; what is left of its start is e⁻⁵
 _LAST = 12  # periods before an exit that Figure 10 shows
 
 
@@ -50,7 +51,8 @@ def figures(records: Records) -> list[Figure]:
 
 
 def _of_scene(scene: str, known: dict[str, Record]) -> Iterator[Figure]:
-    structure, least, density = (known.get(name) for name in ("structure", "least-action", "density"))
+    structure = known.get("structure")
+    least, _, density, times = (of_both(known, name) for name in METHODS)
     if isinstance(structure, Structure):
         yield Figure(2, scene, "Attractors, saddles, manifolds and basins on the section.", structure.plot)
         yield Figure(3, scene, "Steady motions in the phase plane.", structure.plot_orbits)
@@ -58,29 +60,30 @@ def _of_scene(scene: str, known: dict[str, Record]) -> Iterator[Figure]:
         yield Figure(4, scene, "Most probable exit paths, on the section.", least.plot)
         yield Figure(5, scene, "Momentum and action along these paths; dots lie on the section.", least.plot_history)
     if isinstance(density, SGCMResult) and isinstance(structure, Structure):
-        stationary = cache(partial(StationaryDensity.of, density))
-        at = f"D = {paper()['density']['intensity']:g} m² s⁻³"
-        sampled = partial(_displacements, scene, structure, stationary)
+        stationary, intensity = cache(partial(StationaryDensity.of, density)), paper()["density"]["intensity"]
+        at = f"D = {intensity:g} m² s⁻³"
+        osc = load_scene(scene).replace({"noise.intensity": intensity})
+        sampled = partial(_displacements, osc, density, structure, stationary)
         yield Figure(6, scene, f"Density of displacement at {at}, and a simulation from the same shares.", sampled)
         yield Figure(7, scene, f"Stationary density at {at}.", lambda: _density(stationary()))
         yield Figure(8, scene, f"Quasi-potential −D ln p at {at}.", lambda: stationary().plot())
-    times = {state: known.get(f"exit-times-{state}") for state in STATES}
-    if isinstance(least, LeastActionResult) and all(isinstance(one, MFETResult) for one in times.values()):
-        yield Figure(
-            9, scene, "Mean exit times; lines have the published slopes.", partial(_times, scene, times, least)
-        )
-    escapes = known.get("escapes")
-    if isinstance(escapes, MFETResult) and isinstance(least, LeastActionResult):
-        caption = "Realizations before an exit, and the most probable exit path."
-        yield Figure(10, scene, caption, partial(_escapes, scene, escapes, least))
+    if isinstance(least, LeastActionResult) and isinstance(times, MFETResult):
+        caption = "Mean exit times; lines have the published slopes."
+        yield Figure(9, scene, caption, partial(_times, scene, times, least))
+        if scene == paper()["escapes"]["scene"]:
+            caption = "Realizations before an exit, and the most probable exit path."
+            yield Figure(10, scene, caption, partial(_escapes, scene, times, least))
 
 
-def _displacements(scene: str, structure: Structure, stationary: Callable[[], StationaryDensity]) -> Artists:
+def _displacements(
+    osc: Oscillator, density: SGCMResult, structure: Structure, stationary: Callable[[], StationaryDensity]
+) -> Artists:
     one, rng = stationary(), np.random.default_rng(_SEED)
-    shares = one.occupancies[0].values
+    shares = np.nan_to_num(one.occupancies[0].values)  # what counts with another state has none of its own
     starts = [a.points[rng.integers(len(a.points), size=round(_WALKERS * share)), :2] for a, share in
               zip(structure.attractors, shares / shares.sum(), strict=True)]  # fmt: skip
-    sample = load_scene(scene).section_map(np.concatenate(starts), _PERIODS, rng=_SEED)[:, 0]
+    periods = math.ceil(_RELAXATIONS * float(np.max(density.relaxations)) / osc.section_interval)
+    sample = osc.section_map(np.concatenate(starts), periods, rng=_SEED)[:, 0]
     marginal = one.density[0].integrate("v")
     return sampled_density(one.x, marginal.values, sample)
 
@@ -89,24 +92,25 @@ def _density(one: StationaryDensity) -> Artists:
     return density_map(one.x, one.v, one.density[0].values)
 
 
-def _times(scene: str, times: dict[str, Any], least: LeastActionResult) -> Artists:
+def _times(scene: str, times: MFETResult, least: LeastActionResult) -> Artists:
     slopes = {one.state: one.value for one in published_energies()
               if (one.scene, one.method) == (scene, Method.EXIT_TIMES)}  # fmt: skip
     series, lines = [], []
-    for state, result in times.items():
-        energy = least.energy(STATES[state], target_of(state))
-        fit, label = total_fit(result, energy), energy.source
+    for state, source in STATES.items():
+        energy = least.energy(source, target_of(state))
+        fit, label = total_fit(times, energy), energy.source
         title = f"{state}: slope {fit.slope:.3g} ± {fit.slope_error:.1g}"
         series.append(ExitTimes(fit.intensities, fit.log_times, fit.errors, label, title))
         start = float(np.mean(fit.log_times) - slopes[state] * np.mean(1 / fit.intensities))
         lines.append(ArrheniusLine(slopes[state], start, label, f"{state}: published slope {slopes[state]:.4g}"))
-    return reconciled_times(series, list(times), lines)
+    return reconciled_times(series, list(STATES), lines)
 
 
-def _escapes(scene: str, escapes: MFETResult, least: LeastActionResult) -> Artists:
-    source, target, last = STATES["I"], STATES["N"], _LAST * load_scene(scene).section_interval
+def _escapes(scene: str, times: MFETResult, least: LeastActionResult) -> Artists:
+    given, last = paper()["escapes"], _LAST * load_scene(scene).section_interval
+    source, target = STATES[given["state"]], target_of(given["state"])
     path = least.energy(source, target).path
-    return escapes.plot_escapes(
-        source=label_of(source, escapes.names), target=target, last=last,
+    return times.plot_escapes(
+        source=source, target=target, intensity=given["intensity"], last=last,
         path=None if path is None else path.q[path.t >= path.t[-1] - last],
     )  # fmt: skip

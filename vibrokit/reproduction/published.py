@@ -59,6 +59,11 @@ def scenes() -> tuple[str, ...]:
     return tuple(paper()["energies"])
 
 
+def target_of(state: str) -> str | None:
+    """Return what a state is left for: I for N, since other motion with impacts belongs to it, and N for any other."""
+    return STATES["N"] if state == "I" else None
+
+
 def published_energies() -> tuple[Published, ...]:
     """Return all published activation energies, scene by scene."""
     return tuple(

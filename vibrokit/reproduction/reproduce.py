@@ -6,9 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from vibrokit.arguments import path_of
 from vibrokit.construction import called
-from vibrokit.errors import FileError, VibrokitError
+from vibrokit.errors import VibrokitError
 from vibrokit.plots.inline_svg import inline_svg
 from vibrokit.progress import Progress, working
 from vibrokit.report.blocks import Chapter, Picture, Sentences, Table
@@ -20,6 +19,7 @@ from vibrokit.reproduction.published import STATES
 from vibrokit.reproduction.steps import Step, steps
 from vibrokit.reproduction.verdicts import Match, Verdict
 from vibrokit.reproduction.work import Records, do
+from vibrokit.results.atomic import made_folder
 from vibrokit.results.pictures import save_figure
 from vibrokit.text_table import number_text
 
@@ -61,16 +61,6 @@ def reproduce(
     with working(progress, time_limit):
         records = do(wanted, target)
     return publish(records, wanted, target)
-
-
-def made_folder(folder: str | os.PathLike[str]) -> Path:
-    """Return a folder, made if it is missing; raises FileError."""
-    target = path_of(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{target} cannot be made a folder ({error.strerror}); give another one.") from error
-    return target
 
 
 def publish(records: Records, wanted: Sequence[Step], folder: Path) -> Report:

@@ -7,13 +7,15 @@ from pathlib import Path
 
 from vibrokit.analyzers.settings import settings_of
 from vibrokit.errors import VibrokitError
+from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.reproduction.steps import Step
+from vibrokit.results.atomic import checked_target
 from vibrokit.results.files import load_result
-from vibrokit.results.record import Record
+from vibrokit.results.record import Record, versions
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
-from vibrokit.scene_file import load_scene
+from vibrokit.scene_file import load_scene, scene_data
 from vibrokit.structure.find import find_structure
 
 Records = dict[str, dict[str, Record]]
@@ -23,41 +25,54 @@ Records = dict[str, dict[str, Record]]
 def do(steps: Sequence[Step], folder: Path) -> Records:
     """Do the steps that have no complete record in a folder, and return the records of all that were reached.
 
-    A record is written whole or not at all, and read again, so that work which was stopped goes on with the same bits.
-    An interrupt or a time limit ends the work; the step under way is done again the next time.
+    A record is written whole or not at all, and read again, so that work which was stopped at any moment goes on with
+    the same bits: all arrays, energies and findings are those of work that was not stopped. Only times and the counts
+    of seconds differ. An interrupt or a time limit ends the work; the step under way is done again the next time.
+
+    Raises
+    ------
+    FileError
+        A file cannot be written; this is found before any work.
     """
     found: Records = {}
+    files = [checked_target(folder / step.file) for step in steps]
     with Stoppable("steps"), stage("steps", unit="steps", total=len(steps)):
-        for step in steps:
-            own = found.setdefault(step.scene, {})
-            record = _kept(folder / step.file, step)
+        for step, file in zip(steps, files, strict=True):
+            osc, own = load_scene(step.scene), found.setdefault(step.scene, {})
+            record = _kept(file, step, osc)
             if record is None:
-                made = _made(step, own)
-                if not made.complete:
-                    break
-                made.save(folder / step.file)
-                record = load_result(folder / step.file)
+                with stage(step.name, subject=step.scene, unit="step", total=1):
+                    made = _made(step, osc, own)
+                    if not made.complete:
+                        break
+                    made.save(file)
+                    advance()
+                record = load_result(file)
             own[step.name] = record
             advance()
     return found
 
 
-def _kept(path: Path, step: Step) -> Record | None:
-    """The record of a step in its file; None if there is none, or one with other settings."""
-    if not path.exists():
-        return None
+def _kept(file: Path, step: Step, osc: Oscillator) -> Record | None:
+    """What a step made before; None if its file is missing or damaged, or of another scene, other settings or versions.
+
+    All these are done again: the file of a step is the work's own.
+    """
     try:
-        record = load_result(path)
+        record: Record = load_result(file)
     except VibrokitError:
         return None
-    same = step.analyzer is None or record.settings == settings_of(step.analyzer)
+    if step.analyzer is None:
+        same = isinstance(record, Structure) and record.settings["cells"] == (step.cells and list(step.cells))
+    else:
+        same = record.settings == settings_of(step.analyzer)
+    same = same and (record.scene, record.versions) == (scene_data(osc), versions())
     return record if record.complete and same else None
 
 
-def _made(step: Step, before: dict[str, Record]) -> Record:
-    osc = load_scene(step.scene)
+def _made(step: Step, osc: Oscillator, before: dict[str, Record]) -> Record:
     if step.analyzer is None:
-        return find_structure(osc)
+        return find_structure(osc, cells=step.cells)
     structure = before["structure"]
     assert isinstance(structure, Structure)  # the first step of a scene
     return step.analyzer.run(osc, structure)

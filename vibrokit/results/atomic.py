@@ -1,4 +1,4 @@
-"""Writes files whole or not at all."""
+"""Writes files whole or not at all, into folders that it makes."""
 
 from __future__ import annotations
 
@@ -31,6 +31,19 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
         raise FileError(f"{target} is a folder; add the name of a file.")
     if not os.access(target.parent, os.W_OK):
         raise FileError(f"{target} cannot be written, because you may not write to {target.parent}; choose another.")
+    return target
+
+
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """Return a folder, made if it is missing; raises FileError unless files can be written there."""
+    target = path_of(path)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=target).close()  # permissions do not show a full disk, nor one that is read-only
+    except (OSError, ValueError) as error:
+        raise FileError(
+            f"{target} cannot be a folder for results ({reason(error)}); give another one, on a disk that has room."
+        ) from error
     return target
 
 

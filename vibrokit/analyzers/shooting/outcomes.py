@@ -41,7 +41,7 @@ class Outcomes:
     checks: Whole  # (count,): exit tests from the first section to the end
     targets: Whole  # (count,): label of the exit's cell, or once confirmed what is reached; −1 if unknown
     confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
-    returns: Whole  # (count,): how often the motion without noise settled on the source from where it seemed to exit
+    returns: Whole  # (count,): how often the motion without noise settled on no target from where it seemed to exit
 
     @property
     def actions(self) -> Array:
@@ -108,14 +108,15 @@ class Shooter:
     def _settle(self, outcomes: Outcomes, which: Whole) -> None:
         """Let the motion without noise decide about some exits, in place.
 
-        If it settles on another attractor, the exit is confirmed. If it settles on the source, the path only touched
-        coarse cells of the basin boundary and is continued, each time for twice as long before it is tested again: it
-        may stay in those cells. If it settles nowhere, the path is no exit.
+        If it settles on a target, the exit is confirmed. If it settles on the source, or on an attractor that is no
+        target, the path only touched coarse cells of the basin boundary and is continued, each time for twice as long
+        before it is tested again: it may stay in those cells. If it settles nowhere, the path is no exit.
         """
         states = outcomes.states[which]
         reached = self._classifier.labels(states[:, : (states.shape[1] - 1) // 2])
-        returned = reached == self.problem.source
-        exits = ~returned & ((reached >= 0) | ((reached == ESCAPED) & self.problem.ends_by_escape))
+        goals = [target.label for target in self.problem.targets]
+        exits = np.isin(reached, goals) | ((reached == ESCAPED) & self.problem.ends_by_escape)
+        returned = (reached >= 0) & ~exits
         outcomes.targets[which[exits]] = reached[exits]
         outcomes.confirmed[which[exits]] = True
         outcomes.status[which[exits]] = LEFT_BASIN
