@@ -14,7 +14,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         epilog="Each piece is kept when it ends; a second call goes on from there. The exit status is 1 if the work "
         "was stopped before its end.",
     )
-    parser.add_argument("--quick", action="store_true", help="fewer starts, nodes and exits")
+    parser.add_argument("--quick", action="store_true", help="coarser basins, fewer starts, nodes and exits")
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")
     parser.add_argument(
         "-o", "--output", type=Path, default=Path("reproduction"), metavar="FOLDER",

@@ -13,6 +13,7 @@ from vibrokit.comparison.stationary import StationaryDensity
 from vibrokit.oscillator import Oscillator
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.densities import density_map, sampled_density
+from vibrokit.plots.escapes import escapes
 from vibrokit.plots.exit_times import ArrheniusLine, ExitTimes, reconciled_times
 from vibrokit.reproduction.comparison import of_both, total_fit
 from vibrokit.reproduction.published import STATES, Method, paper, published_energies, target_of
@@ -26,7 +27,7 @@ from vibrokit.results.structure import Structure
 from vibrokit.scene_file import load_scene
 
 _WALKERS, _SEED, _RELAXATIONS = 20_000, 6, 5.0  # of the simulation beside Figure 6; what is left of its start is e⁻⁵
-_LAST = 12  # periods before an exit that Figure 10 shows
+_LAST, _SPENT = 4, 0.99  # periods that Figure 10 shows, and the share of the action that is spent at their end
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,9 +71,9 @@ def _of_scene(scene: str, known: dict[str, Record]) -> Iterator[Figure]:
     if isinstance(least, LeastActionResult) and isinstance(times, MFETResult):
         caption = "Mean exit times; lines have the published slopes."
         yield Figure(9, scene, caption, partial(_times, scene, times, least))
-        if scene == paper()["escapes"]["scene"]:
-            caption = "Realizations before an exit, and the most probable exit path."
-            yield Figure(10, scene, caption, partial(_escapes, scene, times, least))
+        if scene == paper()["escapes"]["scene"] and isinstance(structure, Structure):
+            caption = f"Realizations in the last {_LAST} periods before an exit, and the most probable exit path."
+            yield Figure(10, scene, caption, partial(_escapes, scene, structure, times, least))
 
 
 def _displacements(
@@ -106,11 +107,21 @@ def _times(scene: str, times: MFETResult, least: LeastActionResult) -> Artists:
     return reconciled_times(series, list(STATES), lines)
 
 
-def _escapes(scene: str, times: MFETResult, least: LeastActionResult) -> Artists:
-    given, last = paper()["escapes"], _LAST * load_scene(scene).section_interval
+def _escapes(scene: str, structure: Structure, times: MFETResult, least: LeastActionResult) -> Artists:
+    """Draw both up to the boundary: realizations settle behind it, and a path takes for ever to reach the saddle."""
+    given, unit = paper()["escapes"], load_scene(scene).section_interval
     source, target = STATES[given["state"]], target_of(given["state"])
-    path = least.energy(source, target).path
-    return times.plot_escapes(
-        source=source, target=target, intensity=given["intensity"], last=last,
-        path=None if path is None else path.q[path.t >= path.t[-1] - last],
+    energy, found = least.energy(source, target), times.escapes(source, target, given["intensity"])
+    interval = round(unit / float(np.diff(found["time"])[0]))  # samples in it
+    outside = structure.basins.at(found.values[:, ::-interval]) != energy.target
+    ends = found.shape[1] - interval * np.argmax(outside, axis=1)
+    kept = [one[max(end - _LAST * interval, 0) : end] for one, end in zip(found.values, ends, strict=True)]
+    shortest = min(map(len, kept))
+    path, drawn = energy.path, None
+    if path is not None:
+        end = path.section[path.action[path.section] >= _SPENT * path.action[-1]][0]
+        drawn = path.q[:end][path.t[:end] >= path.t[end] - _LAST * unit]
+    return escapes(
+        np.array([one[-shortest:] for one in kept]), path=drawn, points=times.section.points,
+        saddles=times.section.saddles,
     )  # fmt: skip

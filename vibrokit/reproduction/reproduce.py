@@ -35,14 +35,15 @@ def reproduce(
     """Compute the paper's numbers by all methods, draw its figures, and compare: a folder to look at.
 
     The folder gets each record (netCDF), each figure (PNG), the tables (CSV) and a page, ``reproduction.html``. Work
-    that was stopped goes on from the records that are there, with the same numbers to the last bit.
+    that was stopped, or killed at any moment, goes on from the records that are there, with the same numbers to the
+    last bit; records of other versions, settings or scenes are made again.
 
     Parameters
     ----------
     folder : str or path
         Is made if it is missing.
     quick : bool
-        Fewer starts, nodes and exits.
+        Coarser basins, fewer starts, nodes and exits.
     progress : bool or callable, optional
         As of `vibrokit.find_structure`.
     time_limit : float, optional
