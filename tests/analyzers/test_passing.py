@@ -13,8 +13,11 @@ from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
+from vibrokit.kernels.stopping import LEFT_BASIN
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
+from vibrokit.symbolic.flow_kind import Flow
 
 OVERDAMPED, UNDERDAMPED = 1.5, 0.3
 STEP = 2 * np.pi / 8  # of a candidate; ω_n = 1
@@ -153,3 +156,15 @@ def test_legs_are_left_out_where_a_path_leads_there_directly():
     found = polish(problem, [guess])
     assert [branch.value for branch in found.branches if branch.target == 2] == pytest.approx([1.375], rel=1e-9)
     assert not [one for one in found.findings if one.code is Code.PASSES_ORBITS]
+
+
+def test_a_path_that_settles_between_source_and_target_has_not_left():
+    """Cells of the basins are coarse: one of the target may hold states that settle in the middle well."""
+    problem = dataclasses.replace(problem_of(UNDERDAMPED), exit=vk.LeaveBasin(to="right-rest"))
+    shooter = Shooter(problem, problem.ensemble_stepper(Flow.HAMILTONIAN), budget=5)
+    states = np.array([[0.1, 0.0, 0.0, 0.0, 1.0], [2.1, 0.0, 0.0, 0.0, 2.0]])  # (q, p, S), in the middle and at right
+    none, goal = np.zeros(2, dtype=np.int64), problem.targets[0].label
+    outcomes = Outcomes(states, none, states, none + LEFT_BASIN, none + 1, none + goal, none.astype(bool), none.copy())
+    shooter.confirm(outcomes)
+    assert outcomes.confirmed.tolist() == [False, True]
+    assert outcomes.least(3)[goal] == 2.0
