@@ -17,8 +17,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import vibrokit as vk
-from tests.benchmarks.action_gallery import SCENES
 from tests.benchmarks.action_minimized import model_of
+from tests.benchmarks.gallery import SCENES
 
 STEP = 1e-7  # of central differences, in units of the path's extent: a saddle may stretch it by 1e4
 PARTS = 2000  # of a period: where steps are 300 in a period, one contact of "linear stops" is passed over

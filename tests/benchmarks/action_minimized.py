@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 import vibrokit as vk
-from tests.benchmarks.action_gallery import SCENES
+from tests.benchmarks.gallery import SCENES
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
 

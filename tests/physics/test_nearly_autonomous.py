@@ -8,8 +8,8 @@ import functools
 import pytest
 
 import vibrokit as vk
-from tests.benchmarks.action_gallery import SCENES
 from tests.benchmarks.action_minimized import SAMPLES, model_of
+from tests.benchmarks.gallery import SCENES
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
 

@@ -58,7 +58,7 @@ class Shooting(metaclass=Constructed):
         Maximum number of refinement rounds; the ring is not refined.
     tolerance : float
         Relative change of the least actions over three rounds (eight without forcing) that ends the refinement. The
-        default is for paths that are polished afterwards. On the scenes of ``tests/benchmarks/action_gallery.py``,
+        default is for paths that are polished afterwards. On the scenes of ``tests/benchmarks/gallery.py``,
         1e-4 leads to the same polished paths, and takes up to five times as long.
     """
 
