@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vibrokit.analyzers.agreement import combined
+from vibrokit.analyzers.agreement import compared
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
 
@@ -30,6 +30,12 @@ def graph(value, error, target=1):
     return ActivationEnergy(
         0, target, value, max(0.0, value - error), value + error, "graph", Bound.ESTIMATE, numerical_error=error
     )  # fmt: skip
+
+
+def combined(*given, **more):
+    """Energies and findings."""
+    found = compared(*given, **more)
+    return tuple(one.energy for one in found), tuple(one.finding for one in found)
 
 
 def only(attractor, paths, estimates):

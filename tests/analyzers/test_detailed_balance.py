@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.agreement import combined
+from vibrokit.analyzers.agreement import compared
 from vibrokit.analyzers.paths.detailed_balance import least_actions, with_paths
 from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -195,7 +195,7 @@ def test_a_structure_without_its_saddles():
     assert bound.value == pytest.approx(4 * ZETA * (0.9**2 / 2 - 0.9**4 / 4), rel=1e-2)
     assert bound.bound is Bound.ESTIMATE
     low = dataclasses.replace(bound, value=0.5 * bound.value, lower=0.0, upper=0.6 * bound.value)
-    (energy,), _ = combined(structure.attractors[0], (), [low], least=[bound])
+    (energy,) = (one.energy for one in compared(structure.attractors[0], (), [low], least=[bound]))
     assert bound.lower <= energy.lower <= energy.value <= energy.upper
     high = dataclasses.replace(bound, value=2 * bound.value, lower=bound.value, upper=3 * bound.value)
-    assert combined(structure.attractors[0], (), [high], least=[bound])[0][0].value == high.value
+    assert compared(structure.attractors[0], (), [high], least=[bound])[0].energy.value == high.value

@@ -11,7 +11,6 @@ from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.action_graph import ActionGraphResult
-from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable
@@ -45,6 +44,5 @@ class ActionGraph(GraphSearch, Analyzer):
         if found is None:
             return Analysis(findings=work.findings, complete=False)
         found = found.bounded(problem)
-        findings = (*found.findings, *work.findings)
-        complete = all(finding.code is not Code.STOPPED for finding in findings)
+        findings, complete = (*found.findings, *work.findings), found.complete and not work.stopped
         return Analysis(found.estimates, found.dataset(), findings, found.energies, complete)

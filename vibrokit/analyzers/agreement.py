@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
 
 import numpy as np
 
@@ -17,14 +18,47 @@ VAGUE = 0.5
 _SAME = 1e-6  # relative difference of the actions of a path and of its mirror image
 
 
-def combined(
+class ExitState(Enum):
+    """How the energy of one exit is known. The value is the code of the finding that reports it."""
+
+    ATTAINED = Code.DETAILED_BALANCE
+    """A path attains the proven minimum."""
+    BARRIER = Code.BARRIER_ENERGY
+    """The proven minimum is attained, and no polished path shows it."""
+    MIRRORED = Code.MIRROR_IMAGE
+    BRACKETED = Code.BRACKET
+    """Between the graph and a path from or to an orbit inside a set."""
+    AGREED = Code.AGREEMENT
+    CHEAPER_EXPECTED = Code.CHEAPER_PATH_EXPECTED
+    TOO_COARSE = Code.GRAPH_TOO_COARSE
+    NOT_SEARCHED = Code.NOT_SEARCHED
+    """A path, and no graph."""
+    SHOT_ONLY = Code.NOT_POLISHED
+    GRAPH_ONLY = Code.NO_POLISHED_PATH
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ComparedExit:
+    """The energy of one exit, how it is known, and the numbers that were compared."""
+
+    energy: ActivationEnergy
+    state: ExitState
+    values: Mapping[str, float]
+
+    @property
+    def finding(self) -> Finding:
+        """For reports."""
+        return Finding(self.state.value, self.energy.source, self.energy.target, self.values)
+
+
+def compared(
     attractor: Attractor,
     branches: Sequence[ActivationEnergy],
     estimates: Iterable[ActivationEnergy],
     mirrored: Mapping[int, ActivationEnergy] | None = None,
     least: Iterable[ActivationEnergy] = (),
     shots: Iterable[ActivationEnergy] = (),
-) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+) -> tuple[ComparedExit, ...]:
     """Combine the polished paths of an attractor with the graph's estimates, target by target.
 
     The upper bound is the action of the best path and its numerical error. The lower bound rests on the graph, which
@@ -36,8 +70,7 @@ def combined(
     polished is an upper bound within its own error.
 
     Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
-    attractor are mirror images of, the least possible actions, and the action plot's energies. Returns an energy and a
-    finding for each target.
+    attractor are mirror images of, the least possible actions, and the action plot's energies.
     """
     path: dict[int, ActivationEnergy] = {}
     for branch in branches:
@@ -45,11 +78,10 @@ def combined(
     graph, lowest, shot = ({each.target: each for each in some} for some in (estimates, least, shots))
     images = mirrored or {}
     known = [target for target, each in lowest.items() if each.bound is Bound.EXACT]
-    pairs = [
+    return tuple(
         _of_target(attractor, _Known(*(some.get(target) for some in (path, graph, images, lowest, shot))))
         for target in sorted({*path, *graph, *known, *shot}, key=lambda target: (target < 0, target))
-    ]
-    return tuple(energy for energy, _ in pairs), tuple(finding for _, finding in pairs)
+    )
 
 
 def cost_the_same(one: ActivationEnergy, other: ActivationEnergy) -> bool:
@@ -75,39 +107,38 @@ class _Known:
         return values | {name: energy.value for name, energy in named.items() if energy is not None}
 
 
-def _of_target(attractor: Attractor, known: _Known) -> tuple[ActivationEnergy, Finding]:
+def _of_target(attractor: Attractor, known: _Known) -> ComparedExit:
     path, least = known.path, known.least
     if path is None or (least is not None and least.bound is Bound.EXACT and not _attains(path, least)):
-        code, energy = _without_path(known)
+        state, energy = _without_path(known)
     else:
-        code, energy = _with_path(attractor, path, known)
-    energy = energy if least is None else _raised(energy, least)
-    return energy, Finding(code, attractor.label, energy.target, known.values)
+        state, energy = _with_path(attractor, path, known)
+    return ComparedExit(energy if least is None else _raised(energy, least), state, known.values)
 
 
-def _without_path(known: _Known) -> tuple[Code, ActivationEnergy]:
+def _without_path(known: _Known) -> tuple[ExitState, ActivationEnergy]:
     graph, least, shot = known.graph, known.least, known.shot
     if least is not None and least.bound is Bound.EXACT:
-        return Code.BARRIER_ENERGY, least
+        return ExitState.BARRIER, least
     if shot is not None:
-        return Code.NOT_POLISHED, shot if graph is None else _bracket(shot, graph, Bound.UPPER)
+        return ExitState.SHOT_ONLY, shot if graph is None else _bracket(shot, graph, Bound.UPPER)
     assert graph is not None
-    return Code.NO_POLISHED_PATH, graph
+    return ExitState.GRAPH_ONLY, graph
 
 
-def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[Code, ActivationEnergy]:
+def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[ExitState, ActivationEnergy]:
     graph, image, least = known.graph, known.image, known.least
     if least is not None and _attains(path, least):
         without = Bound.EXACT if least.bound is Bound.EXACT else path.bound
         bound = without if path.certificate is None else Bound.CERTIFIED
-        return Code.DETAILED_BALANCE, dataclasses.replace(path, bound=bound)
+        return ExitState.ATTAINED, dataclasses.replace(path, bound=bound)
     if image is not None and cost_the_same(path, image):
         lower = min(image.lower, path.value)
-        return Code.MIRROR_IMAGE, dataclasses.replace(path, lower=lower, bound=image.bound)
+        return ExitState.MIRRORED, dataclasses.replace(path, lower=lower, bound=image.bound)
     if graph is None:
-        return Code.NOT_SEARCHED, path
+        return ExitState.NOT_SEARCHED, path
     if not attractor.repeats or path.bound is Bound.BRACKET:
-        return Code.BRACKET, _bracket(path, graph, Bound.BRACKET)
+        return ExitState.BRACKETED, _bracket(path, graph, Bound.BRACKET)
     return _compared(path, graph)
 
 
@@ -136,17 +167,17 @@ def _raised(energy: ActivationEnergy, least: ActivationEnergy) -> ActivationEner
     )
 
 
-def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[Code, ActivationEnergy]:
+def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[ExitState, ActivationEnergy]:
     """The path's energy with the lower bound that the graph supports, and how the two compare."""
     difference = abs(graph.value - path.value)
     if difference > graph.numerical_error:
-        code = Code.CHEAPER_PATH_EXPECTED if graph.value < path.value else Code.GRAPH_TOO_COARSE
+        state = ExitState.CHEAPER_EXPECTED if graph.value < path.value else ExitState.TOO_COARSE
         lower = min(path.value, graph.value) - difference
     else:
-        code = Code.GRAPH_TOO_COARSE if graph.numerical_error > VAGUE * path.value else Code.AGREEMENT
+        state = ExitState.TOO_COARSE if graph.numerical_error > VAGUE * path.value else ExitState.AGREED
         lower = min(path.value - path.numerical_error, graph.value - graph.numerical_error)
-    bound = Bound.CERTIFIED if code is Code.AGREEMENT and path.certificate is not None else Bound.UPPER
-    return code, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
+    bound = Bound.CERTIFIED if state is ExitState.AGREED and path.certificate is not None else Bound.UPPER
+    return state, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
 
 
 def _bracket(path: ActivationEnergy, graph: ActivationEnergy, bound: Bound) -> ActivationEnergy:

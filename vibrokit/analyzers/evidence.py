@@ -7,23 +7,18 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
-from vibrokit.analyzers.agreement import VAGUE, combined
+from vibrokit.analyzers.agreement import VAGUE, ComparedExit, ExitState, compared
 from vibrokit.analyzers.graph.around_paths import LOOSE
 from vibrokit.analyzers.graph.coverage import BELOW
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.results.finding import Finding
 from vibrokit.structure.boundaries.edges import meeting_cells
 
-_EXACT = (Code.MIRROR_IMAGE, Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
+_EXACT = (ExitState.MIRRORED, ExitState.ATTAINED, ExitState.BARRIER)
 """Energies with bounds that no graph gave."""
-_WITHOUT_PATH = (Code.NO_POLISHED_PATH, Code.NOT_POLISHED)
-_AGREED = (Code.AGREEMENT, *_EXACT, Code.BRACKET, Code.NO_POLISHED_PATH, Code.NOT_SEARCHED)
-"""What more nodes do not change, however many there are."""
 _GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
 
 
@@ -55,25 +50,24 @@ class Evidence:
         """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
         return self._estimates_of(self.graph)
 
-    def combined(
-        self, shots: Sequence[ActivationEnergy] = ()
-    ) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
-        """Return an energy and a finding for each exit; `shots` are the action plot's energies."""
-        return combined(self.attractor, self.branches, self.estimates, self.images, self.least_possible, shots)
+    def compared(self, shots: Sequence[ActivationEnergy] = ()) -> tuple[ComparedExit, ...]:
+        """Return the energy of each exit; `shots` are the action plot's energies."""
+        return compared(self.attractor, self.branches, self.estimates, self.images, self.least_possible, shots)
 
     @property
     def exact(self) -> set[int]:
         """Exits that cost what no path can cost less than."""
-        return self._found(Code.DETAILED_BALANCE, Code.BARRIER_ENERGY)
+        return self._in(ExitState.ATTAINED, ExitState.BARRIER)
 
     def settled(self, accuracy: float) -> set[int]:
         """Return the exits on which an accurate graph and a path agree, or for which finer grids are of no use."""
         if self.graph is None:
             return set()
         if self.graph.last_for_all:
-            found = self._accurate(VAGUE) & self._found(Code.AGREEMENT, Code.BRACKET) | self._found(*_WITHOUT_PATH)
+            found = self._accurate(VAGUE) & self._in(ExitState.AGREED, ExitState.BRACKETED)
+            found |= self._in(ExitState.GRAPH_ONLY)
         else:
-            found = self._accurate(accuracy) & self._found(Code.AGREEMENT)
+            found = self._accurate(accuracy) & self._in(ExitState.AGREED)
         return found | (self._useless if self.attractor.repeats else self.unresolvable | self.beyond)
 
     def _accurate(self, accuracy: float) -> set[int]:
@@ -118,7 +112,7 @@ class Evidence:
     @property
     def graph_error(self) -> float:
         """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
-        if any(code not in _AGREED for target, code in self._codes.items() if target not in self._useless):
+        if self._in(ExitState.CHEAPER_EXPECTED, ExitState.TOO_COARSE) - self._useless:
             return math.inf
         estimates = [each for each in self.estimates if each.target not in self._useless]
         return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
@@ -131,19 +125,18 @@ class Evidence:
         refined further once its error is below its value. Mirror images have their bounds, and so have paths that cost
         the least possible.
         """
-        agreed, exact = self._found(Code.AGREEMENT), self._found(*_EXACT)
+        agreed, exact = self._in(ExitState.AGREED), self._in(*_EXACT)
         rough = {each.target for each in self.estimates if each.numerical_error < each.value} - self.cheapest.keys()
         beyond = self.beyond & (agreed | rough)
         return self.unresolvable | exact | beyond
 
     @cached_property
-    def _codes(self) -> dict[int, Code]:
+    def _states(self) -> dict[int, ExitState]:
         """By label: how graph and path compare."""
-        _, findings = self.combined()
-        return {finding.target: finding.code for finding in findings if finding.target is not None}
+        return {one.energy.target: one.state for one in self.compared()}
 
-    def _found(self, *codes: Code) -> set[int]:
-        return {target for target, code in self._codes.items() if code in codes}
+    def _in(self, *states: ExitState) -> set[int]:
+        return {target for target, state in self._states.items() if state in states}
 
     def _estimates_of(self, graph: GraphSolution | None) -> tuple[ActivationEnergy, ...]:
         if graph is None:

@@ -50,6 +50,8 @@ class ExitSearch:
         self._shots_follow = analyzer.shooting is not None and problem.attractor.is_fixed
         self._shots: Search | None = None
         self._searched = self._reversed = False  # whether there are no more solutions, and no more relaxations
+        self._cut = False  # whether a step was stopped
+        self._polishings: list[Polishing] | None = None  # one for each orbit that paths leave; None before the first
         self.findings: list[Finding] = []
 
     def run(self) -> Analysis:
@@ -68,19 +70,16 @@ class ExitSearch:
             with Stoppable(doing, self.problem.source) as work:
                 step()
             self.findings += work.findings
+            self._cut |= work.stopped
             if self.stopped or self._is_exact:
                 break
         return self.analysis()
 
     @property
     def stopped(self) -> bool:
-        return any(
-            finding.code is Code.STOPPED for finding in (*self.findings, *self._graph_findings, *self._polished()[1])
-        )
-
-    @property
-    def _graph_findings(self) -> tuple[Finding, ...]:
-        return () if self.graph is None else self.graph.findings
+        """Whether the work was stopped anywhere before its end."""
+        parts = (self.graph, self._shots, *(self._polishings or ()))
+        return self._cut or not all(part.complete for part in parts if part is not None)
 
     @property
     def _is_exact(self) -> bool:
@@ -133,7 +132,7 @@ class ExitSearch:
             self.findings += found.findings
         except (StructureError, StepperError) as error:
             self._failed("action plot", error, only=self.analyzer.graph is None)
-        if candidates or self._polishing_begun:  # candidates of the first graph may wait
+        if candidates or self._polishings is not None:  # candidates of the first graph may wait
             self._polish(candidates, quick=not complete)
 
     def search_graph(self) -> None:
@@ -209,11 +208,11 @@ class ExitSearch:
             self._failed("errors of the action plot", error)
             return dataclasses.replace(shots, complete=False).estimates
         self.findings += errors.findings
+        self._cut |= errors.stopped
         return estimates
 
-    @cached_property
-    def _polishings(self) -> list[Polishing]:
-        """One for each orbit that paths leave; none where that is impossible, for which a finding has the reason."""
+    def _begun(self) -> list[Polishing]:
+        """A polishing from each orbit; none where that is impossible, for which a finding has the reason."""
         found = list[Polishing]()
         shared = Shared()
         for orbit in (None,) if self.problem.attractor.repeats else self._orbits_inside():
@@ -223,11 +222,9 @@ class ExitSearch:
                 self._failed("polishing", error)
         return found
 
-    @property
-    def _polishing_begun(self) -> bool:
-        return "_polishings" in vars(self)
-
     def _polish(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
+        if self._polishings is None:
+            self._polishings = self._begun()
         for polishing in self._polishings:
             polishing.add(candidates, quick=quick)
             if self.stopped:
@@ -235,9 +232,7 @@ class ExitSearch:
 
     def _polished(self) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
         """Branches and findings of all orbits."""
-        if not self._polishing_begun:
-            return (), ()
-        found = [polishing.polished() for polishing in self._polishings]
+        found = [polishing.polished() for polishing in self._polishings or ()]
         branches = sorted((branch for each in found for branch in each.branches), key=lambda branch: branch.value)
         findings = tuple(finding for each in found for finding in each.findings)
         return tuple(branches), findings
@@ -249,10 +244,12 @@ class ExitSearch:
         if self.graph is not None:
             self.graph = self.graph.bounded(self.problem, evidence.cheapest.keys())
             evidence = self._evidence
-        energies, compared = evidence.combined(self._unpolished(evidence))
-        every = (*self.findings, *self._graph_findings, *polished)
+        compared = evidence.compared(self._unpolished(evidence))
+        energies = tuple(one.energy for one in compared)
+        graph = () if self.graph is None else self.graph.findings
+        every = (*self.findings, *graph, *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
-        findings += compared
+        findings += (one.finding for one in compared)
         if not energies and not self.stopped:
             findings.append(Finding.of(Code.NO_EXIT_FOUND, self.problem.source))
         return Analysis(

@@ -37,6 +37,7 @@ class GraphSolution:
     last: bool  # no other one on as many nodes follows
     finer: int  # how many times the nodes along a side may still be doubled
     last_for_all: bool  # whether finer ones follow only for exits that it is too coarse for
+    complete: bool = True  # False if `bounded` was stopped before its end
 
     def calibrated(self, polished: Sequence[ActivationEnergy]) -> tuple[ActivationEnergy, ...]:
         """Return the estimates, with errors from actions that are known.
@@ -75,7 +76,8 @@ class GraphSolution:
             energy if energy.target in polished else _bounded(energy, estimate, actions[estimate])
             for energy, estimate in pairs
         ]
-        return dataclasses.replace(self, energies=tuple(energies), findings=(*self.findings, *work.findings))
+        findings = (*self.findings, *work.findings)
+        return dataclasses.replace(self, energies=tuple(energies), findings=findings, complete=not work.stopped)
 
     @property
     def estimates(self) -> tuple[ActivationEnergy, ...]:

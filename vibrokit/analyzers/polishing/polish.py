@@ -38,7 +38,7 @@ class Polished:
     """What the candidates of one attractor led to."""
 
     branches: tuple[ActivationEnergy, ...]  # each path once for each attractor that it leads to, the cheapest first
-    findings: tuple[Finding, ...]  # `Code.STOPPED` is among them if the work was stopped before its end
+    findings: tuple[Finding, ...]
 
 
 @dataclasses.dataclass(eq=False)
@@ -90,6 +90,11 @@ class Polishing:
     much as leaving the attractor. Several of them may share what they lead to. Raises StructureError if no orbit is
     given, or if it is not hyperbolic, and StepperError if the stepper cannot integrate Hamilton's equations of this
     scene.
+
+    Attributes
+    ----------
+    complete : bool
+        Whether no part of it was stopped so far.
     """
 
     def __init__(self, problem: ExitProblem, orbit: Orbit | None = None, shared: Shared | None = None) -> None:
@@ -101,6 +106,7 @@ class Polishing:
         self._shared.orbits += 1
         self._branches: list[ActivationEnergy] = []
         self._certified = self._tried = 0
+        self.complete = True
         self._seen = set[tuple[int, bytes]]()
         self._waiting: list[Candidate] = []  # for a call that is not quick, which tries to reach all ends
 
@@ -139,6 +145,7 @@ class Polishing:
             self._findings += _remarks(self._problem, solved)
             self._branches += _energies(self._problem, solved)
         self._findings += (*polishing.findings, *certifying.findings)
+        self.complete = self.complete and not (polishing.stopped or certifying.stopped)
 
     def _reach_all(self, *, quick: bool = False) -> None:
         """Look for paths to the ends that no candidate led to; quickly for those that are not one of many in a set."""
