@@ -114,16 +114,29 @@ def test_reference_crosses_contacts():
     np.testing.assert_allclose(end, [-np.sin(np.pi / 3), -np.cos(np.pi / 3)], atol=1e-11)
 
 
-def test_command(linear, tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def command(linear, tmp_path, monkeypatch):
+    """Arguments of the command, with a small table of steppers in place of the long one, and short basins."""
     monkeypatch.setattr("vibrokit.trade.steppers.measure_steppers", lambda osc: linear)
     monkeypatch.setattr("vibrokit.trade.basins.measure_basins", lambda osc: "basins")
-    monkeypatch.setattr("vibrokit.trade.energies.measure_energies", lambda osc, source: "energies")
-    monkeypatch.setattr("vibrokit.trade.densities.measure_densities", lambda osc, source: "densities")
-    monkeypatch.setattr("vibrokit.trade.exit_times.measure_exit_times", lambda osc, source: "exit times")
-    monkeypatch.setattr("vibrokit.trade.assessments.measure_assessments", lambda osc, source: "assessments")
-    picture = tmp_path / "trade.png"
-    assert main(["trade", "hertz-0.570", "-o", str(picture)]) == 0
+    return ["-o", str(tmp_path / "trade.png")]
+
+
+def test_command(linear, command, tmp_path, monkeypatch, capsys):
+    asked, names = [], ("methods.measure_energies", "methods.measure_densities", "methods.measure_exit_times",
+                        "assessments.measure_assessments")  # fmt: skip
+    for name in names:
+        monkeypatch.setattr(f"vibrokit.trade.{name}", lambda osc, source, name=name: asked.append(source) or name)
+    assert main(["trade", "double-well", "--source", "left-rest", *command]) == 0
     printed = capsys.readouterr().out
     assert str(linear) in printed
-    assert all(f"\n{name}\n" in printed for name in ("basins", "energies", "densities", "exit times", "assessments"))
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert all(f"\n{name}\n" in printed for name in ("basins", *names))
+    assert asked == ["left-rest"] * len(names)
+    assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_command_says_why_there_is_no_table(command, tmp_path, capsys):
+    scene = tmp_path / "quiet.toml"
+    scene.write_text("natural_frequency = 1.0\ndamping_ratio = 0.05\n")
+    assert main(["trade", str(scene), *command]) == 0
+    assert "vibrokit: the scene has no noise" in capsys.readouterr().err

@@ -203,9 +203,7 @@ def _trade(options: argparse.Namespace) -> None:
     from vibrokit.scene_file import load_scene
     from vibrokit.trade.assessments import measure_assessments
     from vibrokit.trade.basins import measure_basins
-    from vibrokit.trade.densities import measure_densities
-    from vibrokit.trade.energies import measure_energies
-    from vibrokit.trade.exit_times import measure_exit_times
+    from vibrokit.trade.methods import measure_densities, measure_energies, measure_exit_times
     from vibrokit.trade.steppers import measure_steppers
 
     osc = load_scene(options.scene)
