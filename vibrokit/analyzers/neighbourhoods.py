@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from vibrokit.analyzers.paths.local_potential import local_potential
+from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
-from vibrokit.structure.linear_map import gaussian_map
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -48,11 +47,7 @@ def _covariances(osc: Oscillator, attractor: Attractor, stepper: Stepper) -> Arr
     if not attractor.is_fixed:
         return np.zeros((len(places_of(attractor)), 2, 2))
     orbit = refine_orbit(osc, attractor.points[0], attractor.period, stepper)
-    covariances = [local_potential(osc, orbit, stepper).covariance]
-    for point in attractor.points[:-1]:
-        step = gaussian_map(osc, point[None], stepper)
-        covariances.append(step.derivatives[0] @ covariances[-1] @ step.derivatives[0].T + step.covariances[0])
-    return np.array(covariances)[:, :2, :2]
+    return np.array([one.covariance[:2, :2] for one in potential_along(osc, orbit, stepper, 1)])
 
 
 def metrics_of(attractor: Attractor, covariances: Array, least: Array) -> Array:

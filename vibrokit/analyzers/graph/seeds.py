@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.paths.cycle_potential import cycle_potential
-from vibrokit.analyzers.paths.local_potential import local_potential
+from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
 
@@ -85,15 +85,12 @@ def _around_orbit(model: StepModel, attractor: Attractor, grids: Grids) -> Seeds
 def orbit_visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[Visit]:
     """Return the points of an orbit from phase to phase; raises StructureError if it is not hyperbolic."""
     orbit = refine_orbit(model.scene, attractor.points[0], attractor.period, model.stepper)
-    covariance, point = local_potential(model.scene, orbit, model.stepper).covariance, orbit.point
-    visits = []
-    for number in range(attractor.period * grids.phases // len(grids.sections)):
-        phase = number % grids.phases
-        step = model.linear(point[None], grids.time(phase), grids.step)
-        slopes = step.derivatives[0]
-        visits.append(Visit(phase, point, covariance, slopes))
-        point, covariance = step.images[0], slopes @ covariance @ slopes.T + step.covariances[0]
-    return visits
+    along = potential_along(model.scene, orbit, model.stepper, grids.steps)
+    count = attractor.period * grids.phases // len(grids.sections)
+    return [
+        Visit(number % grids.phases, here.point, here.covariance, after.monodromy)
+        for number, (here, after) in enumerate(zip(along[:count], [*along[1:], along[0]], strict=False))
+    ]
 
 
 def _linear_level(model: StepModel, grids: Grids, visits: list[Visit], level: float) -> float:

@@ -15,7 +15,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import gaussian_map, gaussian_pieces
 from vibrokit.structure.orbits import Orbit
 
-_PIECES = 16  # of a section interval, at which the quadratic form along an orbit is given
+_PIECES = 16  # of a section interval
 _SINGULAR = 1e-12  # least eigenvalue of a correlation matrix, as rounding errors may leave of 0
 _NEUTRAL = 1e-6  # distance of a multiplier from 1 below which nothing decays
 
@@ -69,17 +69,17 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
     return _stationary(orbit, found.derivatives[0], found.covariances[0])
 
 
-def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> tuple[Phase, ...]:
-    """Return the quadratic form at 16 times of each section interval of a stable orbit, the first the orbit's start.
+def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper, pieces: int = _PIECES) -> tuple[Phase, ...]:
+    """Return the quadratic form at equal times along a stable orbit, `pieces` to a section interval, from its start on.
 
     From phase to phase Σ' = M Σ Mᵀ + C; the monodromy of the first phase leads to it from the last. Raises
     StructureError if the orbit is not stable.
     """
-    nodes, pieces = gaussian_pieces(osc, orbit.point, stepper, _PIECES, _PIECES * orbit.period)
-    covariance = _stationary(orbit, *pieces.composed()).covariance
-    interval, phases = osc.section_interval / _PIECES, list[Phase]()
-    before = np.roll(pieces.derivatives, 1, axis=0)
-    for number, (step, added) in enumerate(zip(pieces.derivatives, pieces.covariances, strict=True)):
+    nodes, linear = gaussian_pieces(osc, orbit.point, stepper, pieces, pieces * orbit.period)
+    covariance = _stationary(orbit, *linear.composed()).covariance
+    interval, phases = osc.section_interval / pieces, list[Phase]()
+    before = np.roll(linear.derivatives, 1, axis=0)
+    for number, (step, added) in enumerate(zip(linear.derivatives, linear.covariances, strict=True)):
         phases.append(Phase(number * interval, nodes[number], covariance, before[number]))
         covariance = step @ covariance @ step.T + added
     return tuple(phases)
