@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -15,7 +16,6 @@ from vibrokit.results.finding import Finding
 
 VAGUE = 0.5
 """Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
-_SAME = 1e-6  # relative difference of the actions of a path and of its mirror image
 
 
 class ExitState(Enum):
@@ -84,11 +84,6 @@ def compared(
     )
 
 
-def cost_the_same(one: ActivationEnergy, other: ActivationEnergy) -> bool:
-    """Return whether two exits, one of which may be the mirror image of the other, cost the same."""
-    return abs(one.value - other.value) <= _SAME * one.value
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Known:
     """What was found of the exit to one target."""
@@ -132,7 +127,7 @@ def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> t
         without = Bound.EXACT if least.bound is Bound.EXACT else path.bound
         bound = without if path.certificate is None else Bound.CERTIFIED
         return ExitState.ATTAINED, dataclasses.replace(path, bound=bound)
-    if image is not None and cost_the_same(path, image):
+    if image is not None and same_action(path.value, image.value):
         lower = min(image.lower, path.value)
         return ExitState.MIRRORED, dataclasses.replace(path, lower=lower, bound=image.bound)
     if graph is None:

@@ -15,6 +15,7 @@ from vibrokit.analyzers.graph.targets import Arrival, ExitTarget, TraceStart
 from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
@@ -141,8 +142,7 @@ def distinct(paths: Iterable[TracedPath]) -> list[TracedPath]:
     """Return each path once, the cheapest first."""
     kept: list[TracedPath] = []
     for path in sorted(paths, key=lambda path: path.candidate.action):
-        action = path.candidate.action
-        if not any(abs(action - other.candidate.action) <= _SAME * action for other in kept):
+        if not any(same_action(path.candidate.action, other.candidate.action, _SAME) for other in kept):
             kept.append(path)
     return kept
 

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.agreement import cost_the_same
 from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.polishing.leg import samples_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
@@ -47,7 +47,7 @@ class Mirror:
         for one in (*polished, *own):
             target = self._image(one)
             alike = [each for each in own if each.target == target]
-            new = not any(cost_the_same(one, each) for each in alike)
+            new = not any(same_action(one.value, each.value) for each in alike)
             least = min((each.value for each in alike), default=math.inf)
             if target is not None and new and (one.value < least or not cheaper):
                 assert one.path is not None

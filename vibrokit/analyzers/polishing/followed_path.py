@@ -8,6 +8,7 @@ import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
@@ -21,7 +22,7 @@ from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy
 
-_SAME = 1e-6  # relative difference of two actions, and of two orbits over the extent of the path, that are one
+_SAME = 1e-6  # of a path's extent: distance of two orbits that are one
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ class FollowedPath:
         one, two = self.found, other.found
         orbits = [(one.source, two.source)]
         orbits += [(own, its) for (own, _), (its, _) in zip(one.ending.approached, two.ending.approached, strict=False)]
-        return abs(one.action - two.action) <= _SAME * one.action and all(
+        return same_action(one.action, two.action) and all(
             own.closest(its.along(0, 1))[0] <= _SAME * one.extent for own, its in orbits
         )
 

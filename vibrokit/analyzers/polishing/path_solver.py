@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.action_descent import FEW_ITERATIONS, MANY_ITERATIONS, descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.completion import (
     FEWEST_NODES,
@@ -36,7 +37,7 @@ _HOPEFUL = 0.02  # misfit up to which a path is solved for from the orbit; those
 _MOST_LOST = 4  # paths that could not be solved for from the orbit either, after which that is no longer tried
 _ROUGHLY_ACCEPTED = 1e-6  # misfit of a path that starts farther from its source than the final one
 _NEARLY = 1e-4  # misfit of a path that may converge if it begins nearer to its source
-_ONE_PATH, _ONE_FAMILY = 1e-9, 1e-6  # relative differences of the actions of one path, of one family before completion
+_ONE_PATH = 1e-9  # relative difference of the actions of one path, of equal nodes
 _FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
 _COMPARED = 512  # nodes of a path, at most, that are compared with another one
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
@@ -217,9 +218,9 @@ def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
     """Return whether two paths, each polished once, are one, or of one family."""
     if one.flat and other.flat:
         alike = _in_family(one, other.first, other.points, other.action)
-        return alike and abs(one.action - other.action) <= _ONE_FAMILY * one.action
+        return alike and same_action(one.action, other.action)
     alike = one.source.node(one.first) == other.source.node(other.first) and len(one.points) == len(other.points)
-    return alike and abs(one.action - other.action) <= _ONE_PATH * one.action
+    return alike and same_action(one.action, other.action, _ONE_PATH)
 
 
 def _in_family(known: ExtremalPath, first: int, points: Array, action: float) -> bool:
@@ -227,7 +228,7 @@ def _in_family(known: ExtremalPath, first: int, points: Array, action: float) ->
 
     On the section, the states of all members lie on one line.
     """
-    if not known.flat or abs(action - known.action) > _FITTED * known.action:
+    if not known.flat or not same_action(known.action, action, _FITTED):
         return False
     pieces = known.ending.propagator.grain
     line, own = (

@@ -8,6 +8,7 @@ from typing import Any
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.ends import usable_ends
@@ -70,7 +71,7 @@ class Shared:
     def is_new(self, one: SolvedPath) -> bool:
         """Whether no orbit has led to the same path, as far as its beginning does not matter."""
         alike = (other for other in self.solved if other.end is one.end)
-        return all(abs(one.action - other.action) > _EQUAL * other.action for other in alike)
+        return not any(same_action(other.action, one.action, _EQUAL) for other in alike)
 
 
 def polish(problem: ExitProblem, candidates: Sequence[Candidate], orbit: Orbit | None = None) -> Polished:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import PathEnd
+from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.polishing.leg import Departure, Leg, samples_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
@@ -22,7 +23,6 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import nodes_from, states_along, unstable_direction
 from vibrokit.symbolic.flow_kind import Flow
 
-_EQUAL = 1e-6  # relative difference of the actions of one path found twice
 _SAME = 0.05  # of a path's extent: distance between two paths that are one, one of them at its samples
 _BESIDE = 1e-3  # of a leg's extent: distance from a saddle at which motion towards an attractor begins
 _ARRIVED = 1e-2  # of a leg's extent: distance from that attractor at which it ends
@@ -73,7 +73,7 @@ class SolvedPath:
     def is_same(self, other: SolvedPath) -> bool:
         """Return whether two paths are one, shifted in time: of one action, and at one place where half is spent."""
         one, action = self.path, self.action
-        if self.end is not other.end or abs(action - other.action) > _EQUAL * action:
+        if self.end is not other.end or not same_action(action, other.action):
             return False
         middle = min(int(np.searchsorted(one.action, 0.5 * action)), len(one.t) - 1)
         place = np.concatenate([one.q[middle], one.p[middle]])
