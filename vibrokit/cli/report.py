@@ -28,10 +28,10 @@ def report_files(options: argparse.Namespace) -> int:
     from vibrokit.assessment.assessment import Assessment
     from vibrokit.report.assessment import assessment_text
     from vibrokit.report.material import gathered
-    from vibrokit.report.report import Report, checked_page, made_folder
+    from vibrokit.report.report import Report, checked_page
     from vibrokit.report.tables import input_table
     from vibrokit.report.text import record_text
-    from vibrokit.results.atomic import checked_target
+    from vibrokit.results.atomic import checked_target, made_folder
     from vibrokit.results.files import load_result
 
     if options.output is not None:

@@ -10,7 +10,7 @@ from vibrokit.assessment.durations import duration_text
 from vibrokit.comparison.tables import agreement_sentence
 from vibrokit.errors import StructureError, counted
 from vibrokit.report.assessment import noise_text
-from vibrokit.text_table import unit_text
+from vibrokit.text_units import unit_text
 
 _POWER = re.compile(r"(?<=[0-9])e([-+][0-9]+)|\b10\^(-?[0-9.]+)")
 

@@ -105,16 +105,6 @@ class Report:
         return tuple(files)
 
 
-def made_folder(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a folder, which is made if there is none; raises FileError if that is not possible."""
-    target = path_of(path)
-    try:
-        target.mkdir(exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{target} cannot be made a folder ({error.strerror}); give another one.") from error
-    return target
-
-
 def checked_page(path: str | os.PathLike[str]) -> Path:
     """Return the path of a page; raises VibrokitError if its ending is not that of a page."""
     target = path_of(path)
