@@ -68,6 +68,17 @@ def test_direct_and_splitting_agree(scene_and_structure):
 
 
 @pytest.mark.long
+def test_the_choice_between_them_leaves_rates_unbiased():
+    """Where chance decides between the methods, the mean of many rates is exact: luck in the choice is no evidence."""
+    osc = well(0.2)
+    structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
+    found = [rate_at(osc, structure, 7.5, target_error=0.2, seed=seed) for seed in range(60)]
+    assert {rate.method for rate in found} == {"direct", "splitting"}
+    ratios = np.exp([rate.log_value - double_well_rate(0.2, rate.intensity) for rate in found])
+    assert abs(ratios.mean() - 1) <= 3 * ratios.std(ddof=1) / math.sqrt(len(ratios))
+
+
+@pytest.mark.long
 def test_intervals_of_splitting_cover_the_truth():
     """Of intervals of 95 %, each from 16 replicas, as many contain the rate as their number's error allows."""
     count = 60

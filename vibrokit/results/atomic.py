@@ -38,7 +38,7 @@ def made_folder(path: str | os.PathLike[str]) -> Path:
     """Return a folder, made if it is missing; raises FileError unless files can be written there."""
     target = path_of(path)
     try:
-        target.mkdir(parents=True, exist_ok=True)
+        target.mkdir(exist_ok=True)
         tempfile.TemporaryFile(dir=target).close()  # permissions do not show a full disk, nor one that is read-only
     except (OSError, ValueError) as error:
         raise FileError(

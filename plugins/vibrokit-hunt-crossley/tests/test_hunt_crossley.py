@@ -95,7 +95,7 @@ def test_derived_properties():
     assert not contact.conservative
     assert not contact.jumps
     assert contact.clamped
-    assert contact.rooted
+    assert contact.root == 2
     assert float(contact.exponent) == 1.5
 
 

@@ -130,15 +130,12 @@ class DirectRun:
         """Whether as many have left as are wanted."""
         return self.left >= self.wanted
 
-    def run(self, most: float = math.inf, hopeless: float = math.inf) -> bool:
-        """Go on until it is done; return False if direct simulation would take too long.
-
-        That is so if, after `most` section intervals of all walkers, the expected number exceeds `hopeless`.
-        """
+    def run(self, most: float = math.inf) -> bool:
+        """Go on until it is done; return False if it is not after so many section intervals of all walkers."""
         with stage("direct simulation", unit="exits", total=self.wanted):
             while not self.done:
                 report(self.left, self.wanted)
-                if self.at_risk > most and self.at_risk * self.wanted > hopeless * max(self.left, 1):
+                if self.at_risk > most:
                     return False
                 self.state = self._later()
                 self.slot.write(vars(self.state))

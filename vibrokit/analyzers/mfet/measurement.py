@@ -37,7 +37,7 @@ from vibrokit.results.rated import METASTABLE
 # Direct simulation costs e^Λ relaxations for each exit, splitting about 2 Λ² (Λ is ln of the mean exit time in
 # relaxations), times what its importance function and its density cost: they break even near Λ = 7.
 _DIRECT = math.exp(7.0)
-_SEEN = 30.0  # exits at that limit after which the choice is made
+_PILOT = 10  # exits of walkers of their own, by which the choice is made
 _IDLE = 5.0  # relaxations in which no walker has time to leave
 _STEP_SHARE = 4  # a part of the exits is simulated with half the steps
 _LEAST_CHECKED = 25
@@ -134,12 +134,11 @@ class Measurement:
 
     def run(self) -> AtIntensity:
         """Simulate exits; split if that is wanted, or if it would take too long."""
-        wanted = math.ceil(self.settings.target_error**-2)
-        if self.settings.splitting is not True:
+        if self._exits_are_frequent():
+            wanted = math.ceil(self.settings.target_error**-2)
             self._direct = self._begun(self.walk, wanted, "direct", 10)
-            limits = () if self.settings.splitting is False or self.problem.has_bystanders else self._limits(wanted)
-            if self._direct.run(*limits):
-                return self._from_direct(self._direct, self._checked_steps(wanted))
+            self._direct.run()
+            return self._from_direct(self._direct, self._checked_steps(wanted))
         importance = self.importance(self.walk) or from_distances(self.walk)
         self._splitting = SplittingRun(
             self.walk, importance, self.settings.target_error, self.settings.replicas, self.slot.inner("splitting")
@@ -155,9 +154,15 @@ class Measurement:
             return self._from_direct(self._direct, None)
         return None
 
-    def _limits(self, wanted: int) -> tuple[float, float]:
-        limit = _DIRECT * self.walk.relaxation
-        return _SEEN * limit, wanted * limit
+    def _exits_are_frequent(self) -> bool:
+        """Whether to simulate exits directly.
+
+        Exits that decide this do not count in the rate: if early exits choose a method and count, rates are too large.
+        """
+        if self.settings.splitting is not None or self.problem.has_bystanders:
+            return self.settings.splitting is not True
+        self._direct = self._begun(self.walk, _PILOT, "pilot", 14)
+        return self._direct.run(_PILOT * _DIRECT * self.walk.relaxation)
 
     def _begun(self, walk: Walk, wanted: int, name: str, *key: int) -> DirectRun:
         count = DirectRun.walkers_for(wanted)
