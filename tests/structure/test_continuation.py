@@ -6,6 +6,7 @@ import multiprocessing
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
@@ -66,11 +67,10 @@ def test_branches_keep_their_identity(paper):
 def test_basin_fractions_are_shares_of_one_region(paper):
     shares, errors = paper.fractions()
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=0.02)  # but for cells on a boundary that did not settle
+    cells = 900.0 * 4.0 ** np.arange(8)  # 30 × 30, halved until each attractor has its own
     for share, error in zip(shares[errors > 0], errors[errors > 0], strict=True):
-        halvings = (
-            math.log2(share * (1 - share) / error**2 / 900) / 2
-        )  # of 30 × 30 cells, until each attractor has its own
-        assert halvings == pytest.approx(max(0, round(halvings)), abs=1e-9)
+        expected = stats.beta.std(cells * share + 0.5, cells * (1 - share) + 0.5)  # Jeffreys' interval
+        assert np.min(np.abs(expected / error - 1)) < 1e-9
     assert paper.region is not None
     for at in paper.states:
         for attractor in at.attractors:
