@@ -50,6 +50,7 @@ def test_scenes_are_those_of_the_data():
         (of_exit_times(ONE, 8.6e-5, 0.1e-5, 7.9e-5), Match.REGIME),
         (of_exit_times(ONE, 7.9e-5, 0.1e-5, 7.9e-5), Match.NOT_MET),
         (of_exit_times(ONE, 7.0e-5, 0.1e-5, 7.9e-5), Match.NOT_MET),
+        (of_density(ONE, 8.0e-5, 9.0e-5, 7.9e-5, 2e-5), Match.UNKNOWN),  # an interval that holds any number
         (unknown(ONE, "it is not metastable."), Match.UNKNOWN),
     ],
 )
@@ -126,5 +127,5 @@ def test_the_paper_in_short(tmp_path):
     assert len(list(tmp_path.glob("figure-*.png"))) == 2 * 8 + 1  # Figures 2 to 9 of both scenes, and 10
     verdicts = {row[:3]: row[6] for row in table.rows}
     assert verdicts["hertz-0.525", "I", "action-plot"] == verdicts["hertz-0.570", "I", "action-plot"] == "ring"
-    assert "unknown" not in verdicts.values()
+    assert list(verdicts.values()).count("unknown") <= 1  # few nodes do not resolve the density of 0.570, N
     assert all(step.file in {file.name for file in tmp_path.iterdir()} for step in steps(quick=True))

@@ -98,6 +98,8 @@ def of_action_plot(one: Published, lower: float, upper: float, ring: float) -> V
 
 def of_density(one: Published, value: float, error: float, certified: float, intensity: float) -> Verdict:
     """Compare a barrier of the density with our own at the same noise intensity."""
+    if not error < value:
+        return unknown(one, f"{value:.3g} has an error of {error:.2g}, which more nodes reduce.")
     depth = certified / intensity
     if _within(one, value - error, value + error):
         match = Match.MET
