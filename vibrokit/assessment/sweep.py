@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.analyzer import WEAK
 from vibrokit.analyzers.energy_continuation import search_places
 from vibrokit.analyzers.energy_run import EnergyRun
+from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.least_action import LeastAction
 from vibrokit.analyzers.mean_exit_times import MFET
 from vibrokit.construction import called
@@ -34,6 +35,7 @@ from vibrokit.structure.validation import check_means, seed_of
 from vibrokit.text_units import size_of
 
 _DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
+_NODES = (120, 120)  # of graphs, which propose paths here: their lower bounds are not asked for
 _ERROR = 0.2  # of a mean time: 25 exits
 _ALONG = (Code.BIFURCATION, Code.BRANCH_ENDS, Code.PATH_LOST, Code.LEAST_PATH_CHANGES, Code.NOTHING_AT)
 _VALUES = ("value", "error", "low", "high", "next")  # of the parameter, in findings of these codes
@@ -178,10 +180,10 @@ class _Run:
         """Search for exit paths in the structures that are known, and follow them."""
         try:
             source = None if self.source is None else states.names[label_of(self.source, states.names, "branch")]
+            analyzer = LeastAction(source=source, graph=GraphSearch(nodes=_NODES))
             run = EnergyRun(
-                self.osc, self.line, self.values, LeastAction(source=source), self.places, states.seed or 0,
-                self.search.structures,
-            )  # fmt: skip
+                self.osc, self.line, self.values, analyzer, self.places, states.seed or 0, self.search.structures
+            )
             with working() as work:
                 run.run()
                 self.paths = run.record(work)
