@@ -292,7 +292,7 @@ class Analyzer(ABC, metaclass=Constructed):
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
         self._check_returned(found, problem)
-        with put_off():  # what was found is kept
+        with put_off():  # an interrupt must not lose the results
             data, limits = metastability(problem, found.data)
         return dataclasses.replace(found, data=data, findings=(*found.findings, *limits))
 

@@ -27,8 +27,9 @@ from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import ParameterLine
 
 _SHORTEST = 1 / 64  # of the distance between two values: shortest step, after which a path counts as lost
-_TRAPEZOID = 0.1  # of a step's change: difference from what the derivatives predict, of a path that is still the same
-_ROUNDING = 1e-6  # of an action: the same, where the change is small
+# A step stays on its path if the action changes as its derivatives predict, within the sum of these two.
+_TRAPEZOID = 0.1  # of the change
+_ROUNDING = 1e-6  # of the action
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ class EnergyRun:
         self.work = Stoppable("searched values")
 
     def run(self) -> None:
-        """Search at each of the places, and follow what is new from there."""
+        """Search at each of the places, and follow new paths from there."""
         with self.work as work, stage("searched values", unit="values", total=len(self.places)):
             for place in self.places:
                 self._search(place)

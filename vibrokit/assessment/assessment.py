@@ -85,7 +85,7 @@ class Assessment(Record):
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What the results say of each exit."""
+        """Energies and mean times of each exit by all methods."""
         return Evidence(self.names, self.results)
 
     @cached_property

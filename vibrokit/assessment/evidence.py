@@ -1,4 +1,4 @@
-"""Evidence: what the results of all methods say of each exit of a scene."""
+"""Evidence: energies and mean times of each exit of a scene by all methods."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TRUST = (Bound.EXACT, Bound.CERTIFIED, Bound.UPPER, Bound.BRACKET, Bound.ESTIMA
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the results of all methods say of each exit; an end that is None stands for all exits of a state.
+    """Energies and mean times of each exit by all methods; an end that is None stands for all exits of a state.
 
     Attributes
     ----------

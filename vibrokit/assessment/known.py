@@ -45,7 +45,7 @@ class Known:
     def of(cls, given: Iterable[Any], accuracy: float) -> Known:
         """Sort records and paths of files; a result of its own counts as of the accuracy that is wanted.
 
-        Raises a VibrokitError for what is neither.
+        Raises a VibrokitError for an object that is neither.
         """
         structures, results = [], []
         for one in given:

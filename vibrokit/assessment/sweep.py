@@ -59,9 +59,10 @@ def sweep(
 ) -> Sweep:
     """Follow steady states, activation energies and mean exit times of a scene along values of one parameter.
 
-    The steady states are those of `continuation`, the energies those of `energy_continuation`. The mean time is
-    τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the values at which paths are searched for, at a noise that
-    makes ΔU/D = 5 there, and interpolated between them. States, paths and mean times have the names of the branches.
+    The steady states are those of `continuation`, the energies those of `energy_continuation` with graphs of 120 × 120
+    nodes: a sweep has no lower bounds. The mean time is τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the
+    values at which paths are searched for, at a noise that makes ΔU/D = 5 there, and interpolated between them. States,
+    paths and mean times have the names of the branches.
 
     A value at which the scene is refused is a gap. Along the noise intensity, states and energies are found once.
 

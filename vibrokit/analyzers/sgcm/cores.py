@@ -1,4 +1,4 @@
-"""Cores: sets around attractors in which a state has settled, and what the density around them needs.
+"""Cores: sets around attractors in which a state has settled, and the region that the density around them needs.
 
 A state has also settled where noise does not bring it back: in another basin, farther from its edge than noise moves
 states around the attractors. So a grid need not cover another attractor whose basin is wider than that.
@@ -51,8 +51,8 @@ class CoreSets:
     own : array (nx, nv)
         How much of each cell belongs to the core of the attractor that is left.
     others : mapping of int to array (nx, nv)
-        By label: the same for the cores of others with what is committed to them, or for their basins if those count;
-        empty if position decides.
+        By label: the same for the cores of other attractors and the cells committed to them, or for their basins if
+        basins count; empty if position decides.
     entry : array (nx, nv)
         ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
     outlet : int or None

@@ -23,7 +23,7 @@ def limit_of(
 
     The value is that of ln τ = ΔU/D + c through the two least intensities. How a prefactor depends on D is not known.
     So the error estimate is infinite with two intensities. With more it is the largest change by one of these, plus
-    what the errors of ln τ are:
+    the change by the errors of ln τ:
 
     - a prefactor proportional to D or 1/D. Kramers' rate has 1/D at weak damping, and √D if the force is periodic and
       not weak (Lehmann, Reimann & Hänggi, Phys. Rev. Lett. 84, 1639, 2000);
