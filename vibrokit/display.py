@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import sys
@@ -9,11 +10,46 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-from vibrokit.progress import Update
-
 _PATIENCE = 1.0  # seconds after which a stage is shown
 _PAUSE = 0.2  # seconds between two changes of the line
 _WIDTH = 80  # columns of a terminal that does not tell
+
+
+@dataclasses.dataclass(frozen=True)
+class Update:
+    """What a listener is told.
+
+    Attributes
+    ----------
+    stage : str
+        What is being done, such as ``"basins"`` or ``"graph"``.
+    subject : str
+        The attractor or other thing that the work is about; may be empty.
+    done : int
+        How many units are done.
+    total : int or None
+        How many there are; None where that is not known beforehand.
+    unit : str
+        What is counted, in the plural.
+    elapsed : float
+        Time since the stage began (s).
+    remaining : float or None
+        Estimated time until the stage ends (s), which never grows; None where the total is unknown.
+    compiling : bool
+        Whether a kernel is being compiled.
+    finished : bool
+        Whether the stage has ended.
+    """
+
+    stage: str
+    subject: str
+    done: int
+    total: int | None
+    unit: str
+    elapsed: float
+    remaining: float | None
+    compiling: bool = False
+    finished: bool = False
 
 
 class Display:

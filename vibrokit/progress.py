@@ -19,8 +19,9 @@ import numpy as np
 
 from vibrokit.arguments import real
 from vibrokit.blas import one_blas_thread
+from vibrokit.display import Display
+from vibrokit.display import Update as Update
 from vibrokit.errors import OutOfTime, StructureError, shown
-from vibrokit.registry import load_attribute
 
 TRAJECTORIES = "trajectories"
 """Unit of stages that integrate many starts: `run_ensemble` advances them."""
@@ -39,43 +40,6 @@ class Deadline(KeyboardInterrupt):
 
     No handler of errors inside the work may take it for one. If nothing was found, users see it as `OutOfTime`.
     """
-
-
-@dataclasses.dataclass(frozen=True)
-class Update:
-    """What a listener is told.
-
-    Attributes
-    ----------
-    stage : str
-        What is being done, such as ``"basins"`` or ``"graph"``.
-    subject : str
-        The attractor or other thing that the work is about; may be empty.
-    done : int
-        How many units are done.
-    total : int or None
-        How many there are; None where that is not known beforehand.
-    unit : str
-        What is counted, in the plural.
-    elapsed : float
-        Time since the stage began (s).
-    remaining : float or None
-        Estimated time until the stage ends (s), which never grows; None where the total is unknown.
-    compiling : bool
-        Whether a kernel is being compiled.
-    finished : bool
-        Whether the stage has ended.
-    """
-
-    stage: str
-    subject: str
-    done: int
-    total: int | None
-    unit: str
-    elapsed: float
-    remaining: float | None
-    compiling: bool = False
-    finished: bool = False
 
 
 Listener = Callable[[Update], None]
@@ -108,18 +72,15 @@ class Stats:
 
     def __add__(self, other: Stats) -> Stats:
         """The work of two results together."""
-        stages = {
-            name: self.seconds.get(name, 0.0) + other.seconds.get(name, 0.0)
-            for name in {**self.seconds, **other.seconds}
-        }
-        return Stats(**{name: getattr(self, name) + getattr(other, name) for name in _COUNTED}, seconds=stages)
+        counts = {name: getattr(self, name) + getattr(other, name) for name in _COUNTED}
+        one, another = self.seconds, other.seconds
+        seconds = {name: one.get(name, 0.0) + another.get(name, 0.0) for name in {**one, **another}}
+        return Stats(**counts, seconds=seconds)
 
     def part(self, number: int, count: int) -> Stats:
         """One of some equal parts, up to whole numbers: all parts together are the whole."""
-        counts = {
-            name: (number + 1) * getattr(self, name) // count - number * getattr(self, name) // count
-            for name in _COUNTED
-        }
+        wholes = {name: getattr(self, name) for name in _COUNTED}
+        counts = {name: (number + 1) * whole // count - number * whole // count for name, whole in wholes.items()}
         return Stats(**counts, seconds={name: seconds / count for name, seconds in self.seconds.items()})
 
 
@@ -355,8 +316,7 @@ def _listener(progress: Progress) -> Listener | None:
     if progress is None or progress is False:
         return None
     if progress is True:
-        display: Listener = load_attribute("vibrokit.display:Display")()  # it stands above this module
-        return display
+        return Display()
     if callable(progress):
         return progress
     raise StructureError(f"progress must be True, None or a function of one Update, got {shown(progress)}.")

@@ -117,11 +117,6 @@ def load_all(group: Group, kind: type[T]) -> dict[str, type[T]]:
     return working
 
 
-def load_attribute(place: str) -> Any:
-    """Import the object at ``module:attribute``, for a module of the toolkit in a layer above the caller."""
-    return EntryPoint(name="", value=place, group="").load()
-
-
 def name_of(group: Group, cls: type) -> str:
     """Return the registered name of a class, or ``module:Class`` if it is not registered."""
     place = f"{cls.__module__}:{cls.__qualname__}"

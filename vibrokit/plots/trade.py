@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -12,9 +12,6 @@ from matplotlib.lines import Line2D
 
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour
-
-if TYPE_CHECKING:
-    from vibrokit.trade.steppers import TradeRow
 
 _FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axis
 
@@ -38,7 +35,7 @@ class TradeArtists(Artists):
     defaults: tuple[Line2D, ...]
 
 
-def work_precision(rows: Sequence[TradeRow], *, ax: Axes | None = None) -> TradeArtists:
+def work_precision(rows: Sequence[Any], *, ax: Axes | None = None) -> TradeArtists:
     """Draw error against time, one line per stepper: solid in an ensemble, dotted one trajectory at a time.
 
     Parameters

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import xarray
 
-from vibrokit.errors import ResultFileError, UnknownNameError, shown
-from vibrokit.registry import Group, load
-from vibrokit.results.arrays import taken
-from vibrokit.results.plain import PlainRecord
-from vibrokit.results.provenance import json_data, json_text, provenance_from, provenance_text
+from vibrokit.errors import ResultFileError, shown
+from vibrokit.results.files import record_from
+from vibrokit.results.provenance import json_data, json_text
 from vibrokit.results.record import Record
 
 _CONTENTS = "records"  # attribute: names of the records, in the order of their prefixes
@@ -24,9 +21,9 @@ def nested(records: Mapping[str, Record]) -> xarray.Dataset:
         own = record.to_dataset()
         if own.attrs:
             raise ResultFileError(f"a {type(record).__name__} with attributes of its own cannot be part of a record")
-        prefixed = own.rename({name: f"{_prefix(number)}{name}" for name in {*own.variables, *own.dims}})
+        prefixed = own.rename({name: f"r{number}_{name}" for name in {*own.variables, *own.dims}})
         whole = whole.assign(prefixed.data_vars).assign_coords(prefixed.coords)
-        whole.attrs[f"{_prefix(number)}provenance"] = provenance_text(record)
+        whole.attrs[f"r{number}_provenance"] = json_text(record.provenance)
     return whole
 
 
@@ -37,21 +34,9 @@ def records_in(dataset: xarray.Dataset) -> dict[str, Record]:
         raise ResultFileError(f"its records are {shown(names)}, and a list of names is needed")
     found = {}
     for number, name in enumerate(names):
-        prefix = _prefix(number)
+        prefix = f"r{number}_"
         own = dataset[[one for one in dataset.variables if str(one).startswith(prefix)]]
         own = own.rename({one: str(one).removeprefix(prefix) for one in {*own.variables, *own.dims}})
         own.attrs = {}
-        header = json_data(dataset.attrs.get(f"{prefix}provenance"))
-        found[name] = _record(taken(header, "kind", str), own, provenance_from(header))
+        found[name] = record_from(own, json_data(dataset.attrs.get(f"{prefix}provenance")))
     return found
-
-
-def _record(kind: str, arrays: xarray.Dataset, provenance: Mapping[str, Any]) -> Record:
-    try:
-        return load(Group.RECORDS, kind, Record).from_dataset(arrays, **provenance)
-    except UnknownNameError:
-        return PlainRecord.from_dataset(arrays, unknown_kind=kind, **provenance)
-
-
-def _prefix(number: int) -> str:
-    return f"r{number}_"

@@ -25,14 +25,14 @@ class PlainRecord(Record):
     unknown_kind : str
         The kind that the file names.
     content : bytes
-        Of the file. Saved again, the record writes the same file.
+        Of the file; empty for a part of another record. Saved again, the record writes the same file.
     """
 
     kind: ClassVar[str] = "plain"
 
     dataset: xarray.Dataset
     unknown_kind: str
-    content: bytes
+    content: bytes = b""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,6 +61,14 @@ class PlainRecord(Record):
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays."""
         return self.dataset
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Provenance as plain data, with the kind that the file names."""
+        return super().provenance | {"kind": self.unknown_kind}
+
+    def _content(self) -> bytes:
+        return self.content or super()._content()
 
     @classmethod
     def from_dataset(

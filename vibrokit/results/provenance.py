@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from vibrokit.results.arrays import taken
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 
-if TYPE_CHECKING:
-    from vibrokit.results.record import Record
-
 FORMAT = 3
 """Format of the files that this version writes and reads: a change after which a file no longer opens raises it."""
 
@@ -27,22 +24,21 @@ _CODES = {code.value: code for code in Code}
 _LONGEST_SEED = 1000  # digits; Python refuses to read more than a few thousand
 
 
-def provenance_text(record: Record, **further: Any) -> str:
-    """Return the provenance of a record, and further entries, as JSON; raises ResultFileError."""
-    entries = {
+def provenance_data(kind: str, names: Sequence[str], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return kind and provenance as plain data; sentences of findings have `names` in them.
+
+    `provenance` has the attributes of a record that `provenance_from` returns.
+    """
+    return {
+        **provenance,
         "format": FORMAT,
-        "kind": record.kind,
-        "complete": bool(record.complete),
-        "seed": None if record.seed is None else str(record.seed),
-        "seconds": float(record.seconds),
-        "stats": dataclasses.asdict(record.stats),
-        "versions": dict(record.versions),
-        "scene": dict(record.scene),
-        "settings": dict(record.settings),
-        "findings": findings_data(record.findings, record.names),
-        **further,
+        "kind": kind,
+        "complete": bool(provenance["complete"]),
+        "seed": None if provenance["seed"] is None else str(provenance["seed"]),
+        "seconds": float(provenance["seconds"]),
+        "stats": dataclasses.asdict(provenance["stats"]),
+        "findings": findings_data(provenance["findings"], names),
     }
-    return json_text(entries)
 
 
 def json_text(value: Any) -> str:

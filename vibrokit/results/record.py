@@ -12,10 +12,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed, called
+from vibrokit.errors import ResultFileError
 from vibrokit.progress import Stats
-from vibrokit.registry import load_attribute
+from vibrokit.results.atomic import write_atomically
 from vibrokit.results.codes import Code, Severity
 from vibrokit.results.finding import Finding, check_findings
+from vibrokit.results.netcdf import content_of
+from vibrokit.results.provenance import provenance_data
 from vibrokit.results.summary import Summary
 
 if TYPE_CHECKING:
@@ -143,20 +146,48 @@ class Record(ABC, metaclass=Constructed):
     @property
     def oscillator(self) -> Oscillator:
         """The scene as an oscillator."""
-        # The reader of scenes is in a layer above; it is found by name, as plug-ins are.
-        oscillator: Oscillator = load_attribute("vibrokit.scene_file:scene_from_data")(self.scene)
-        return oscillator
+        from vibrokit.scene_file import scene_from_data
+
+        return scene_from_data(self.scene)
 
     @called
     def report(self, *others: Record, title: str = "Vibro-impact oscillator") -> Report:
         """Return a page on this record, and on others of the same scene; see `vibrokit.Report`."""
-        # Reports stand above this layer; they are found by name, as plug-ins are.
-        report: Report = load_attribute("vibrokit.report.report:Report").of(self, *others, title=title)
-        return report
+        from vibrokit.report.report import Report
+
+        return Report.of(self, *others, title=title)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Kind and provenance as plain data."""
+        own = {field.name: getattr(self, field.name) for field in dataclasses.fields(Record)}
+        return provenance_data(self.kind, self.names, own)
 
     @called
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it."""
-        from vibrokit.results.files import save_record
+        """Write to a netCDF file, whole or not at all; `vibrokit.load_result` opens it.
 
-        save_record(self, path)
+        Raises
+        ------
+        ResultFileError
+            It has something that netCDF 3 cannot hold.
+        """
+        try:
+            content = self._content()
+        except ResultFileError as error:
+            raise ResultFileError(f"{type(self).__name__} cannot be saved: {str(error).rstrip('.')}.") from error
+        write_atomically(path, content)
+
+    def _content(self) -> bytes:
+        """The content of its file, with attributes for people who look into that."""
+        document = (type(self).__doc__ or "").strip().partition("\n")[0]
+        software = f"vibrokit {self.versions.get('vibrokit', '')}".strip()
+        seed = "" if self.seed is None else f", seed {self.seed}"
+        about = {
+            "title": f"{self.kind}: {document}",
+            "Conventions": "CF-1.11",
+            "source": software,
+            "history": f"computed by {software} in {self.seconds:.1f} s{seed}",
+            "status": self.status,
+        }
+        return content_of(self.to_dataset(), about, self.provenance)

@@ -11,7 +11,6 @@ import xarray
 
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted
-from vibrokit.registry import load_attribute
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.data import check_names, data_in, joined
 from vibrokit.results.energy import ActivationEnergy, ExitPath, bounds_text, energy_variables, read_energies
@@ -149,9 +148,9 @@ class Result(Record):
     @property
     def analyzer(self) -> Analyzer:
         """The analyzer that made this result, built again from the settings."""
-        # Analyzers stand above this layer; they are found by name, as plug-ins are.
-        analyzer: Analyzer = load_attribute("vibrokit.analyzers.settings:analyzer_from")(self.settings)
-        return analyzer
+        from vibrokit.analyzers.settings import analyzer_from
+
+        return analyzer_from(self.settings)
 
     @called
     def plot(self, ax: Any = None) -> Any:
