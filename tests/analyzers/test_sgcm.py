@@ -64,20 +64,6 @@ def test_any_executor_gives_the_same_bits(pool, structure):
         np.testing.assert_array_equal(shared.data[name], alone.data[name])
 
 
-def test_a_sampled_matrix_agrees_where_it_sees_enough(structure):
-    """At the barrier over 4 D, within what cells of finite size and samples add."""
-    given = {"source": 0, "intensities": (1.25e-2,), "nodes": (64, 64)}
-    (sampled,) = vk.SGCM(samples=200, **given).run(WELL, structure).rates
-    (rate,) = vk.SGCM(**given).run(WELL, structure).rates
-    assert sampled.value == pytest.approx(rate.value, rel=0.25)
-    assert sampled.value != rate.value
-
-
-def test_a_sampled_matrix_does_not_see_a_rare_exit(structure):
-    found = vk.SGCM(source=0, intensities=(1.5e-3,), nodes=(100, 100), samples=4).run(WELL, structure)
-    assert not found.rates or found.rates[0].log_error > 1
-
-
 @pytest.mark.slow
 def test_the_deeper_well_has_the_higher_barrier():
 
@@ -157,7 +143,6 @@ def test_time_limit_keeps_what_was_solved(structure):
         ({"intensities": "weak"}, "w"),
         ({"steps": 7}, "7"),
         ({"steps": 0}, "0"),
-        ({"samples": 0}, "0"),
         ({"intensities": (1e-3, 0.0)}, "0"),
         ({"intensities": ()}, "()"),
         ({"intensities": (float("nan"),)}, "nan"),

@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.neighbourhoods import core_of, covariances_of, relaxation_of
+from vibrokit.analyzers.neighbourhoods import core_of, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.attractor import Attractor
@@ -99,10 +99,9 @@ def core_shares(problem: ExitProblem, attractor: Attractor, intensity: float) ->
     if not _by_commitment(problem):
         return unknown
     try:
-        covariances = covariances_of(problem, attractor)
+        centres, roots = core_of(problem, attractor, intensity)
     except StructureError:
         return unknown
-    centres, roots = core_of(attractor, covariances, intensity, basins.region)
     some = np.unique(np.linspace(0, len(centres) - 1, min(len(centres), _CENTRES)).astype(int))
     axes = np.linalg.inv(roots[some])
     cells = np.array([np.ptp(basins.region.x), np.ptp(basins.region.v)]) / basins.labels.shape

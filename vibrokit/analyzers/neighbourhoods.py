@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +15,11 @@ from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.region import Region
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
-CORE_SIZE = 1.0
-"""Semi-axes of an attractor's core in standard deviations of the density around it: it holds 39 % of that."""
-
 _FEW = 64  # centres, each with its own ellipse
-_LEAST = 1 / 60  # semi-axes of the core of motion that never repeats, in widths of the region
-_RELAXATION = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
+_FORGOTTEN = 10.0  # section intervals in which the density on an attractor without multipliers forgets its start
 
 Array = NDArray[np.float64]
 
@@ -45,9 +41,32 @@ def covariances_of(problem: ExitProblem, attractor: Attractor) -> Array:
 def _covariances(osc: Oscillator, attractor: Attractor, stepper: Stepper) -> Array:
     """The same, kept: each attractor is a target of all others, at several intensities."""
     if not attractor.is_fixed:
-        return np.zeros((len(places_of(attractor)), 2, 2))
+        return np.zeros((len(_places(attractor)), 2, 2))
     orbit = refine_orbit(osc, attractor.points[0], attractor.period, stepper)
     return np.array([one.covariance[:2, :2] for one in potential_along(osc, orbit, stepper, 1)])
+
+
+def core_of(
+    problem: ExitProblem,
+    attractor: Attractor,
+    intensity: float,
+    size: float = 1.0,
+    resolved: Callable[[Array], Array] | None = None,
+) -> tuple[Array, Array]:
+    """Return the core of an attractor as ellipses: centres c (count, 2) and matrices R, |R (q − c)| ≤ 1 inside.
+
+    Semi-axes are the standard deviations of the density around the attractor, which hold 39 % of it, times `size`; for
+    motion that never repeats, 1/60 of the widths of the region. `resolved`, if given, returns the least semi-axes in x
+    and v that a grid resolves at some points, shape (count, 2).
+    """
+    centres, region = problem.on_turn(_places(attractor)), problem.structure.basins.region
+    least = 1 / 60 * np.ptp(region.bounds, axis=1)
+    if attractor.is_fixed:
+        least = 1e-9 * least  # as far as its own width does not decide
+    if resolved is not None:
+        least = np.maximum(least, resolved(centres))
+    covariances = size**2 * intensity * covariances_of(problem, attractor)
+    return centres, metrics_of(attractor, covariances, np.broadcast_to(least, centres.shape))
 
 
 def metrics_of(attractor: Attractor, covariances: Array, least: Array) -> Array:
@@ -63,15 +82,8 @@ def metrics_of(attractor: Attractor, covariances: Array, least: Array) -> Array:
     return np.linalg.cholesky(np.linalg.inv(widened)).transpose(0, 2, 1)
 
 
-def core_of(attractor: Attractor, covariances: Array, intensity: float, region: Region) -> tuple[Array, Array]:
-    """Return the core of an attractor as ellipses: centres c (count, 2) and matrices R, |R (q − c)| ≤ 1 inside."""
-    widths = _LEAST * np.array([np.ptp(region.x), np.ptp(region.v)])
-    least = np.tile(1e-9 * widths if attractor.is_fixed else widths, (len(covariances), 1))
-    return places_of(attractor), metrics_of(attractor, CORE_SIZE**2 * intensity * covariances, least)
-
-
-def places_of(attractor: Attractor) -> Array:
-    """Return x and v of the places where motion on an attractor may be on a section, shape (count, 2)."""
+def _places(attractor: Attractor) -> Array:
+    """x and v of the places where motion on an attractor may be on a section, shape (count, 2)."""
     cycle = attractor.kind == "limit cycle"  # noise makes its phase any
     return attractor.orbit[:-1] if cycle else attractor.points[:, :2]
 
@@ -89,22 +101,14 @@ def relaxation_of(attractor: Attractor, interval: float, least: float = 1.0) -> 
     """
     if attractor.kind == "limit cycle" and len(attractor.exponents) > 1:
         slowest = float(np.sort(attractor.exponents.real)[-2])  # the last one is that of the phase
-        return max(least, -1.0 / (slowest * interval)) if slowest < 0 else _RELAXATION
+        return max(least, -1.0 / (slowest * interval)) if slowest < 0 else _FORGOTTEN
     largest = float(np.abs(attractor.multipliers).max()) if len(attractor.multipliers) else 0.0
     if not 0.0 < largest < 1.0 or not attractor.is_fixed:
-        return _RELAXATION
+        return _FORGOTTEN
     return max(least, -max(attractor.period, 1) / math.log(largest))
 
 
-def repeated(centres: Array, roots: Array, turn: float) -> tuple[Array, Array]:
-    """Return ellipses with their copies a turn away along x on both sides; the same ones if there is no turn."""
-    if not turn:
-        return centres, roots
-    away = np.array([[-turn, 0.0], [0.0, 0.0], [turn, 0.0]])
-    return (centres + away[:, None]).reshape(-1, 2), np.tile(roots, (3, 1, 1))
-
-
-def nearest(states: Array, centres: Array, roots: Array) -> Array:
+def nearest(states: Array, centres: Array, roots: Array, turn: float = 0.0) -> Array:
     """Return the least |R (q − c)|² over centres c with their matrices R, at each state q, shape (…).
 
     Parameters
@@ -113,7 +117,12 @@ def nearest(states: Array, centres: Array, roots: Array) -> Array:
     centres : array (count, 2)
     roots : array (count, 2, 2)
         If there are more than a few centres, the first R is used for all.
+    turn : float
+        Distance along x after which centres repeat, as on a circle; 0 if they do not.
     """
+    if turn:
+        away = np.array([[-turn, 0.0], [0.0, 0.0], [turn, 0.0]])
+        centres, roots = (centres + away[:, None]).reshape(-1, 2), np.tile(roots, (3, 1, 1))
     if len(centres) > _FEW:
         distances: Array = cKDTree(centres @ roots[0].T).query(states @ roots[0].T)[0]
         return distances**2

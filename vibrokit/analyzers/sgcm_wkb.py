@@ -14,12 +14,11 @@ from vibrokit.analyzers.analyzer import Analysis, Analyzer
 from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
-from vibrokit.analyzers.sgcm.density_flow import check_steps, steps_for
+from vibrokit.analyzers.sgcm.density_flow import check_steps
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.energies import limit_of
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import ACCURACY, DensitySolver
-from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
@@ -32,7 +31,6 @@ from vibrokit.structure.validation import gibibytes, intensities, share
 
 METHOD = "SGCM-WKB"
 _INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
-_MOST_SAMPLES = 1_000_000
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
 
@@ -65,10 +63,6 @@ class SGCM(Analyzer):
     accuracy : float
         Relative error of rates that is wanted, as two error estimates. The number of node spacings follows from it: 5
         at 0.1, and in proportion to its inverse root. Each rate has the error that was reached.
-    samples : int, optional
-        If given, the transition over one section interval is a matrix of sampled transitions, as published, with so
-        many trajectories from each cell. It is there for comparison: it does not see what is less likely than one in
-        `samples`.
 
     Raises
     ------
@@ -102,7 +96,6 @@ class SGCM(Analyzer):
     nodes: tuple[int, int] | None = None
     steps: int | None = None
     max_memory_gib: float = 2.0
-    samples: int | None = None
     accuracy: float = ACCURACY
 
     def __post_init__(self) -> None:
@@ -110,8 +103,6 @@ class SGCM(Analyzer):
             object.__setattr__(self, "nodes", checked_nodes("SGCM", self.nodes))
         if self.steps is not None:
             check_steps("SGCM", self.steps)
-        if self.samples is not None:
-            whole("SGCM: samples", self.samples, 1, _MOST_SAMPLES)
         share("SGCM: accuracy", self.accuracy)
         gibibytes("SGCM: max_memory_gib", self.max_memory_gib)
         if self.intensities is not None:
@@ -136,13 +127,11 @@ class SGCM(Analyzer):
         noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
-        orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
-        steps = self.steps or steps_for(problem.osc, np.concatenate(orbits))
         wanted = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
         wanted, limits = with_states(problem, wanted)
         if not wanted:
             return Analysis(findings=limits)
-        solver = DensitySolver(problem, self.nodes, steps, self.max_memory_gib, self.samples, self.accuracy)
+        solver = DensitySolver(problem, self.nodes, self.steps, self.max_memory_gib, self.accuracy)
         solved: list[AtIntensity] = []
         unresolved: list[Unresolved] = []
         with Stoppable("density", problem.source) as work:
@@ -220,7 +209,7 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
                 {"long_name": "logarithm of the probability to reach an exit before the own core", "units": "1"},
             ),
             "mass_drift": (
-                ("intensity_index",), np.array([one.found.drift for one in solved]),
+                ("intensity_index",), np.array([one.density.drift for one in solved]),
                 {"long_name": "relative change of probability in a section interval by truncation", "units": "1"},
             ),
             "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln p", "units": "m2 s-3"}),
@@ -272,11 +261,11 @@ def _findings(problem: ExitProblem, solved: list[AtIntensity], unresolved: list[
                     Code.DENSITY_NOT_CONVERGED,
                     problem.source,
                     intensity=one.intensity,
-                    intervals=one.found.intervals,
-                    change=max([one.found.change, *(c.change for c in one.committors.values())]),
+                    intervals=one.density.intervals,
+                    change=max([one.density.change, *(c.change for c in one.committors.values())]),
                 )
             )
-        if one.at_edge > max(one.found.log_rates.values(), default=0.0) + math.log(_EDGE):
+        if one.at_edge > max(one.density.log_rates.values(), default=0.0) + math.log(_EDGE):
             found.append(
                 Finding.of(Code.DENSITY_AT_EDGE, problem.source, intensity=one.intensity, share=math.exp(one.at_edge))
             )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.mfet.walk import Walk
-from vibrokit.analyzers.neighbourhoods import metrics_of, nearest, repeated
+from vibrokit.analyzers.neighbourhoods import metrics_of, nearest
 from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.kernels.climbing import climb
 from vibrokit.results.attractor import Attractor
@@ -100,8 +100,7 @@ def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:
     """Squared distances of nodes from an attractor at the times of a section interval, shape (times, nx, nv)."""
     if not attractor.is_fixed:
         stop = walk.around([attractor])
-        centres, roots = repeated(stop.points, stop.metrics, stop.turn)
-        return np.repeat(nearest(nodes, centres, roots)[None], _TIMES, axis=0)
+        return np.repeat(nearest(nodes, stop.points, stop.metrics, stop.turn)[None], _TIMES, axis=0)
     stepper = walk.problem.single_stepper(Flow.LINEARISED)
     orbit = refine_orbit(walk.problem.osc, attractor.points[0], attractor.period, stepper)
     phases = potential_along(walk.problem.osc, orbit, stepper)
@@ -111,6 +110,5 @@ def _distances(walk: Walk, attractor: Attractor, nodes: Array) -> Array:
         covariances = walk.intensity * np.array([phase.covariance[:2, :2] for phase in here])
         least = 1e-9 * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
         points = walk.problem.on_turn(np.array([phase.point[:2] for phase in here]))
-        ellipses = repeated(points, metrics_of(attractor, covariances, least), walk.problem.turn)
-        found.append(nearest(nodes, *ellipses))
+        found.append(nearest(nodes, points, metrics_of(attractor, covariances, least), walk.problem.turn))
     return np.array(found)

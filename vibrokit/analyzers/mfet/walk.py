@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of, repeated
+from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
@@ -165,8 +165,8 @@ class Walk:
     def at_home(self, states: Array) -> NDArray[np.bool_]:
         """Return which states (…, n) on the section are in the attractor's core."""
         own = self.own
-        centres, roots = repeated(own.points, own.metrics, own.turn)
-        inside: NDArray[np.bool_] = nearest(self.problem.on_turn(states[..., :2]), centres, roots) <= 1
+        distances = nearest(self.problem.on_turn(states[..., :2]), own.points, own.metrics, own.turn)
+        inside: NDArray[np.bool_] = distances <= 1
         return inside
 
     def from_orbit(self, attractor: Attractor, count: int, *key: int) -> Walkers:
@@ -297,10 +297,9 @@ class Walk:
         """Return the test for being in the core of one of some attractors, on the section."""
         points, metrics = [np.empty((0, 2))], [np.empty((0, 2, 2))]
         labels = [np.empty(0, dtype=np.int64)]
-        region = self.problem.structure.basins.region
         for attractor in attractors:
-            centres, roots = core_of(attractor, self.covariances[attractor.label], self.intensity, region)
-            points.append(self.problem.on_turn(centres))
+            centres, roots = core_of(self.problem, attractor, self.intensity)
+            points.append(centres)
             metrics.append(roots)
             labels.append(np.full(len(centres), attractor.label, dtype=np.int64))
         return Stop(

@@ -10,22 +10,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.cores import CoreSets
-from vibrokit.analyzers.sgcm.density_flow import ABSORBED
-from vibrokit.analyzers.sgcm.quasi_stationary import (
-    Backward,
-    QuasiStationary,
-    most_intervals,
-    remaining,
-    spread_of,
-)
+from vibrokit.analyzers.sgcm.density_flow import ABSORBED, Leg
+from vibrokit.analyzers.sgcm.quasi_stationary import Convergence, QuasiStationary
 from vibrokit.progress import advance, stage
 
 _BELOW = 20.0  # in ln c: the floor lies that far below the rate
+_RELEVANT = 14.0  # in ln p below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
 
 Array = NDArray[np.float64]
 
@@ -52,50 +47,44 @@ class Committor:
     converged: bool
 
 
-def committor(
-    earlier: Backward,
-    density: QuasiStationary,
-    cores: CoreSets,
-    target: int,
-    relaxation: float,
-    converged: float,
-    start: Array | None = None,
+def committors(
+    density: QuasiStationary, convergence: Convergence, starts: Mapping[int, Array] | None = None
+) -> dict[int, Committor]:
+    """Return the committor of each target whose rate is known; `starts` are ln c, for example of stronger noise."""
+    if not density.log_rates:
+        return {}
+    legs, begun = relevant_legs(density), starts or {}
+    return {target: _committor(density, legs, target, convergence, begun.get(target)) for target in density.log_rates}
+
+
+def relevant_legs(density: QuasiStationary) -> list[Leg]:
+    """Return the backward legs where the density, at its time, is large enough to matter, and in the cores."""
+    cores = density.cores
+    return density.propagator.backward_legs(density.phi, density.level - _RELEVANT, (cores.own, *cores.others.values()))
+
+
+def _committor(
+    density: QuasiStationary, legs: Sequence[Leg], target: int, convergence: Convergence, start: Array | None
 ) -> Committor:
     """Iterate the backward equation until the rate stays the same.
 
     The rate is the probability of the own core in the quasi-stationary density times the committor one section interval
     later: each exit begins with a last visit to the core (transition-path theory; E & Vanden-Eijnden, Annu. Rev. Phys.
     Chem. 61, 391, 2010).
-
-    Parameters
-    ----------
-    earlier : Backward
-    density : QuasiStationary
-    cores : CoreSets
-        Those of others absorb on the section, and at the outlet motion ends at any time.
-    target : int
-    relaxation : float
-        Section intervals in which deviations of the density fall by a factor e.
-    converged : float
-        Change of ln rate that may be left.
-    start : array (nx, nv), optional
-        ln c, for example of stronger noise.
     """
-    floor, at_exit = density.log_rates[target] - _BELOW, 0.0 if target == cores.outlet else -math.inf
-    own = cores.own
-    reached = cores.others.get(target, np.zeros_like(own))
-    elsewhere = sum((covered for label, covered in cores.others.items() if label != target), own)
+    cores, floor = density.cores, density.log_rates[target] - _BELOW
+    at_exit = 0.0 if target == cores.outlet else -math.inf
+    reached = cores.others.get(target, np.zeros_like(cores.own))
+    elsewhere = sum((covered for label, covered in cores.others.items() if label != target), cores.own)
     with np.errstate(divide="ignore"):
         reached_log, stays = np.log(reached), np.log(1 - ABSORBED * np.minimum(elsewhere + reached, 1.0))
-    found = np.maximum(reached_log if start is None else start, floor)
-    rates, change = list[float](), np.inf
-    most = most_intervals(relaxation)
+    found, rates = np.maximum(reached_log if start is None else start, floor), list[float]()
     with stage("committor", unit="section intervals"):
-        while len(rates) < most and change > converged:
-            later = np.minimum(earlier(found, floor, at_exit), 0.0)
-            rate = float(np.logaddexp.reduce((density.in_core + later)[own > 0]))
+        while convergence.goes_on(rates):
+            *_, earlier = density.propagator.earlier(legs, found, floor, at_exit)
+            later = np.minimum(earlier, 0.0)
+            rate = float(np.logaddexp.reduce((density.in_core + later)[cores.own > 0]))
             rates.append(rate if rate > floor + 0.5 * _BELOW else -math.inf)
             found = np.clip(np.logaddexp(reached_log, later + stays), floor, 0.0)
-            change = remaining(rates, relaxation)
             advance()
-    return Committor(found, rates[-1], spread_of(rates, change), change <= converged)
+    return Committor(found, rates[-1], convergence.error(rates), convergence.reached(rates))

@@ -9,35 +9,23 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import (
-    CORE_SIZE,
-    covariances_of,
-    metrics_of,
-    nearest,
-    places_of,
-    relaxation_of,
-    repeated,
-)
+from vibrokit.analyzers.neighbourhoods import core_of, covariances_of, nearest, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.region import Region
 
-_LEAST = 2.5  # semi-axes of a core in node spacings, so that its area is known to a few per cent
-_DEVIATIONS = 5.0  # of the density around the orbit that the region covers
-_WIDER = 0.1  # of the width of the attractors' orbits, on each side of them
 # Deviations from the edge of a basin, beyond which a state in it counts as settled. On hertz-0.570, ln of the rate from
 # the clear orbit changes by 0.003 at D = 5e-6; with 5 by 0.042 at D = 2e-5, since transients pass the edge again.
 _COMMITTED = 10.0
-_BEYOND_FACE = 0.1  # of the region's width: what passes a face of the exit in a leg is still on the grid
+_WIDER = 0.1  # of the width of the orbits and of the region: what passes a face in a leg is still on the grid
 
 Array = NDArray[np.float64]
 
@@ -79,11 +67,6 @@ class Cores:
 
     problem: ExitProblem
 
-    @cached_property
-    def covariances(self) -> dict[int, Array]:
-        """By label: the stationary covariances per unit D around the points of each attractor, shape (count, 2, 2)."""
-        return {a.label: covariances_of(self.problem, a) for a in self.problem.structure.attractors}
-
     def on(
         self, grid: DensityGrid, intensity: float, every: int = 1, larger: float = 1.0, nearer: float = 1.0
     ) -> CoreSets:
@@ -91,8 +74,7 @@ class Cores:
 
         States are settled `nearer` to the edge of a basin by a factor: with 0 only in the core.
         """
-        size = larger * CORE_SIZE
-        own = self._core(self.problem.attractor, grid, intensity, size)
+        own = self._core(self.problem.attractor, grid, intensity, larger)
         with np.errstate(divide="ignore"):
             entry: Array = self.start(grid, intensity) + np.log(own)
         outlet, targets = self.problem.outlet, self.problem.targets
@@ -104,7 +86,7 @@ class Cores:
             committed = np.minimum(sum(others.values(), committed), 1.0)
         elif not self.problem.exit.by_position:
             settled = targets_at(self.problem, intensity) or targets  # exploration may take more noise than is wanted
-            others = {a.label: self._core(a, grid, intensity, size) for a in settled}
+            others = {a.label: self._core(a, grid, intensity, larger) for a in settled}
             for label in others if nearer else ():
                 inner = self._inner(label, grid, own, _COMMITTED * math.sqrt(intensity) / nearer)
                 committed, others[label] = np.maximum(committed, inner), np.maximum(others[label], inner)
@@ -112,9 +94,8 @@ class Cores:
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
         """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
-        attractor = self.problem.attractor
-        covariances = intensity * self.covariances[attractor.label]
-        return -0.5 * nearest(grid.nodes, *self._ellipses(attractor, covariances, 1.0, grid))
+        ellipses = core_of(self.problem, self.problem.attractor, intensity, resolved=grid.local_spacing)
+        return -0.5 * nearest(grid.nodes, *ellipses, self.problem.turn)
 
     def resolved(self, grid: DensityGrid, nodes: float) -> float:
         """Return the least intensity at which the density around the attractor is wider than some node spacings.
@@ -125,7 +106,7 @@ class Cores:
         attractor = self.problem.attractor
         if not attractor.is_fixed:
             return 0.0
-        inverse = np.linalg.inv(self.covariances[attractor.label])
+        inverse = np.linalg.inv(covariances_of(self.problem, attractor))
         deviations = 1 / np.sqrt(np.diagonal(inverse, axis1=1, axis2=2)).max(axis=0)
         spacings = grid.local_spacing(attractor.points).max(axis=0)
         return float(((nodes * spacings / deviations) ** 2).max())
@@ -134,9 +115,8 @@ class Cores:
         """Return a rectangle around the structure's region, the attractors' orbits with the density, and the faces."""
         structure = self.problem.structure
         orbits = np.concatenate([attractor.orbit[:, :2] for attractor in structure.attractors])
-        spread = np.diagonal(self.covariances[self.problem.source], axis1=1, axis2=2).max(axis=0)
-        beyond = _DEVIATIONS * np.sqrt(intensity * spread)
-        beyond = np.maximum(beyond, _WIDER * np.ptp(orbits, axis=0))
+        spread = self._spread(self.problem.attractor)
+        beyond = np.maximum(5.0 * np.sqrt(intensity * spread), _WIDER * np.ptp(orbits, axis=0))
         low, high = orbits.min(axis=0) - beyond, orbits.max(axis=0) + beyond
         own = self._with_faces(structure.basins.region.bounds)
         found = np.stack([np.minimum(own[:, 0], low), np.maximum(own[:, 1], high)], axis=1)
@@ -145,7 +125,7 @@ class Cores:
     def _with_faces(self, bounds: Array) -> Array:
         """Bounds that hold the exit's faces; if x must be wider for that then v is too, as a motion there needs it."""
         faces, outward = self.problem.faces, np.array([-1.0, 1.0])
-        margins = _BEYOND_FACE * np.diff(bounds)
+        margins = _WIDER * np.diff(bounds)
         beyond = np.where(np.isfinite(faces), np.maximum(outward * (faces - bounds) + margins, 0.0), 0.0)
         grown = np.max(beyond / np.diff(bounds))
         wider: Array = np.maximum(beyond, grown * np.diff(bounds) * np.isinf(faces))
@@ -171,8 +151,7 @@ class Cores:
         pair = problem.attractor, problem.structure.attractors[label]
         if not all(attractor.is_fixed for attractor in pair):
             return np.zeros(grid.shape)
-        both = np.concatenate([self.covariances[attractor.label] for attractor in pair])
-        widths = deviations * np.sqrt(np.diagonal(both, axis1=1, axis2=2).max(axis=0))
+        widths = deviations * np.sqrt(np.maximum(*map(self._spread, pair)))
         cells = np.ptp(basins.region.bounds, axis=1) / basins.labels.shape
         reach = np.ceil(np.minimum(widths / cells, basins.labels.shape)).astype(int)
         beyond = ("wrap" if problem.turn else "constant", "constant")
@@ -181,15 +160,15 @@ class Cores:
         covered = grid.covered(lambda states: held.at(problem.on_turn(states)) == label)
         return np.minimum(covered, 1.0 - own)
 
-    def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:
-        covariances = size**2 * intensity * self.covariances[attractor.label]
-        ellipses = self._ellipses(attractor, covariances, _LEAST, grid)
-        return grid.covered(lambda states: nearest(states, *ellipses) <= 1)
+    def _spread(self, attractor: Attractor) -> Array:
+        """The largest variances of x and of v per unit D around an attractor, shape (2,)."""
+        variances: Array = np.diagonal(covariances_of(self.problem, attractor), axis1=1, axis2=2)
+        return variances.max(axis=0)
 
-    def _ellipses(
-        self, attractor: Attractor, covariances: Array, least: float, grid: DensityGrid
-    ) -> tuple[Array, Array]:
-        """Centres and metrics; no semi-axis is below `least` node spacings."""
-        points = self.problem.on_turn(places_of(attractor))
-        roots = metrics_of(attractor, covariances, least * grid.local_spacing(points))
-        return repeated(points, roots, self.problem.turn)
+    def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:
+        """How much of each cell belongs to a core, with semi-axes of 2.5 node spacings at least.
+
+        So its area is known to a few per cent.
+        """
+        ellipses = core_of(self.problem, attractor, intensity, size, lambda points: 2.5 * grid.local_spacing(points))
+        return grid.covered(lambda states: nearest(states, *ellipses, self.problem.turn) <= 1)

@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.sgcm.cores import CoreSets
 from vibrokit.analyzers.sgcm.density_flow import ABSORBED, DensityFlow, Leg
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.quasi_stationary import Backward, QuasiStationary
 from vibrokit.errors import SceneError, counted
 from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
 from vibrokit.kernels.tasks import carry
@@ -26,7 +24,6 @@ from vibrokit.progress import current
 
 _BLOCKS = 4  # of rows, which threads or processes share
 _NODES_AT_ONCE = 2**14  # between looks at the time limit: a node takes 1 to 10 µs
-_RELEVANT = 14.0  # in ln p below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.uint8]
@@ -99,39 +96,25 @@ class Propagator:
             factor, before = factor + change, carried.copy()
         return before, factor
 
-    def backward(self, density: QuasiStationary, cores: CoreSets) -> Backward:
-        """Return what gives ln of an expected value one section interval earlier.
+    def backward_legs(self, phi: Array, least: float, kept: Sequence[Array]) -> list[Leg]:
+        """Return the legs that carry an expected value back, the last one first, at the nodes that matter.
 
-        Where the density, at its time, is too small to matter there is no value, so that nothing is computed, unless
-        the node belongs to a core.
+        That is where ln p, which is `phi` on the section, exceeds `least` at its time, and in the cells of some cores.
+        Elsewhere nothing is computed.
         """
-        legs = self._backward_legs(density, cores)
-
-        def earlier(values: Array, floor: float, at_exit: float) -> Array:
-            *_, (_, found, _) = self._carried(legs, values, _NO_WEIGHT, floor, at_exit)
-            return found
-
-        return earlier
-
-    def stages(self, density: QuasiStationary, cores: CoreSets, values: Array, floor: float) -> Array:
-        """Return ln of an expected value at the beginning of each leg of the section interval before, the first first.
-
-        Shape (legs, nx, nv); values are computed where `backward` computes them.
-        """
-        legs = self._backward_legs(density, cores)
-        carried = self._carried(legs, values, _NO_WEIGHT, floor, at_exit=0.0)
-        return np.array([found.copy() for _, found, _ in carried])[::-1]
-
-    def _backward_legs(self, density: QuasiStationary, cores: CoreSets) -> list[Leg]:
-        least = density.level - _RELEVANT
-        reached = [density.phi, *(phi for _, phi, _ in self._carried(self.flow.legs, density.phi, self._weight, least))]
-        there = [phi > least for phi in reached[:-1]]
-        for covered in (cores.own, *cores.others.values()):
+        reached = [phi, *(later for _, later, _ in self._carried(self.flow.legs, phi, self._weight, least))]
+        there = [one > least for one in reached[:-1]]
+        for covered in kept:
             there[0] |= covered > 0
         return [
             dataclasses.replace(leg, feet=np.where(mask[..., None], leg.feet, np.nan))
             for leg, mask in zip(self.flow.backward_legs, reversed(there), strict=True)
         ]
+
+    def earlier(self, legs: Sequence[Leg], values: Array, floor: float, at_exit: float) -> Iterator[Array]:
+        """Yield ln of an expected value before each of some backward legs; `at_exit` is that of motion at the exit."""
+        for _, found, _ in self._carried(legs, values, _NO_WEIGHT, floor, at_exit):
+            yield found
 
     def _carried(
         self, legs: Sequence[Leg], phi: Array, weight: Array, floor: float, at_exit: float = -math.inf

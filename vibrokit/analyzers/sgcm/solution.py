@@ -4,50 +4,44 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.at_intensity import COARSER, FEWER, LARGER, NEARER, AtIntensity, Unresolved
-from vibrokit.analyzers.sgcm.committor import Committor, committor
+from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
+from vibrokit.analyzers.sgcm.committor import Committor, committors
 from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
-from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
-from vibrokit.analyzers.sgcm.quasi_stationary import QuasiStationary, Transition, quasi_stationary
-from vibrokit.analyzers.sgcm.sampled_matrix import SampledMatrix
+from vibrokit.analyzers.sgcm.quasi_stationary import Convergence, QuasiStationary, quasi_stationary
 from vibrokit.errors import StructureError
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.region import Region
 from vibrokit.symbolic.flow_kind import Flow
 
-_CONVERGED = 1e-2  # change of ln rate that may be left by iteration
-_EXPLORED_TO = 0.1  # the same in exploration
-# Relaxations that must pass from a density that is solved with fewer steps or nodes. On hertz-0.570 at D = 2e-5, ln of
-# the rate after 2 differs by 0.004 from that after 4, and its error is 0.03.
-_ARRIVED = 2.0
-_EVERY = 2  # cells of the basins that are one for the estimate of what their size changes, which is of first order
-_BELOW = 12.0  # in ln p: the closer grid keeps what is that far below the density that leaves
-_SLACK = 3.0  # more than that, in units of the stronger noise with which it is found
-_EXPLORED = 3.0  # node spacings in the narrowest deviation, when the whole region is explored
-_NARROWEST = 2.0  # the same on the finest grid, at least
-_ENOUGH = 1.05 * _NARROWEST  # and a little to spare
-_WANTED = 5.0  # the same on the finest grid, by default
-# Relative error of rates, as two stated errors, that so many spacings reach; it is of second order. hertz-0.570, from
-# clear at ΔU/D = 4: 0.43, 0.21, 0.11 and 0.04 with 2.2, 3.2, 5 and 7 spacings, in 9, 15, 27 and 45 CPU seconds. A
-# double well (ζ = 0.2, ΔU/D = 4 to 12): 0.1 with 2.2 and 0.02 with 5.
+COARSER = math.sqrt(2.0)
+"""Factor by which nodes are farther apart in a second solution.
+
+What that changes is once an error of second order, and three times one of fourth order.
+"""
+FEWER = 1.5
+"""Factor by which steps are longer in a third solution, at least: they are even."""
+_FLOWS = 2.0 * (1.0 + (1.0 + 1.0 / FEWER) / COARSER**2)  # all flows, both ways, in units of one on the finest grid
 ACCURACY = 0.1
-_FEWEST, _MOST = 120, 400  # nodes along each side, by default
-_LARGEST = 640  # the same if more than the most are needed for the least width
-_EXPLORING = 140  # nodes along each side for exploration, at most
-_ZOOMS, _SHRINKING = 4, 0.7  # steps of exploration, each to a region smaller by at least that factor
-_MARGIN = 3  # nodes around it
-_EDGE = 0.01  # of the density that leaves: with less on its edge the region is wide enough
-_GROWN = 0.25  # of the width, by which a region grows on a side where it is too narrow
-_ALL_FLOWS = 3.7  # memory of all flows together, in units of the one with all steps on the finest grid
+"""Relative error of rates, as two stated errors, that 5 node spacings in the narrowest deviation reach.
+
+It is of second order. hertz-0.570, from clear at ΔU/D = 4: 0.43, 0.21, 0.11 and 0.04 with 2.2, 3.2, 5 and 7 spacings,
+in 9, 15, 27 and 45 CPU seconds. A double well (ζ = 0.2, ΔU/D = 4 to 12): 0.1 with 2.2 and 0.02 with 5.
+"""
+_WANTED, _EXPLORED, _NARROWEST = 5.0, 3.0, 2.0  # such spacings: by default, in exploration, and at least
+_ENOUGH = 1.05 * _NARROWEST  # and a little to spare
+_FEWEST, _MOST, _LARGEST = 120, 400, 640  # nodes along each side, by default; the last one for the least spacings
+_SMALLER = 0.7  # factor of the area by which a region must shrink at least, or exploration ends
+_EDGE = 0.01  # of the density that leaves: with less on its edge a region is wide enough
 
 Array = NDArray[np.float64]
 
@@ -59,24 +53,27 @@ class DensitySolver:
     Attributes
     ----------
     problem : ExitProblem
-    shape : (int, int) or None
+    shape : (int, int), optional
         Nodes in x and in v; by default as many as the narrowest density needs.
-    steps : int
-        How often noise acts in a section interval; even.
+    given_steps : int, optional
+        How often noise acts in a section interval; even. By default as often as the motion needs.
     max_memory_gib : float
         Memory that the legs of all flows may take (GiB).
-    samples : int or None
-        If given, transitions are those of so many simulated trajectories from each cell.
     accuracy : float
         Relative error of rates that is wanted.
     """
 
     problem: ExitProblem
-    shape: tuple[int, int] | None
-    steps: int
-    max_memory_gib: float
-    samples: int | None = None
+    shape: tuple[int, int] | None = None
+    given_steps: int | None = None
+    max_memory_gib: float = 2.0
     accuracy: float = ACCURACY
+
+    @cached_property
+    def steps(self) -> int:
+        """How often noise acts in a section interval."""
+        orbits = [attractor.orbit[:, :2] for attractor in self.problem.structure.attractors]
+        return self.given_steps or steps_for(self.problem.osc, np.concatenate(orbits))
 
     def solve(self, intensities: Sequence[float]) -> Generator[AtIntensity | Unresolved, None, None]:
         """Yield what is found at some intensities, which must descend; first those that cannot be resolved.
@@ -85,12 +82,12 @@ class DensitySolver:
         on a coarser grid and from there on the finest one. What fewer steps and other sets change of the committors is
         found on the coarser grid.
         """
-        explored, closer = self.explored(intensities[0])
+        before, closer = self.explored(intensities[0])
         grid, left = None, list(intensities)
         while left and grid is None:
             grid = self._grid(closer.region, self._shape(closer, left[-1]))
             try:
-                self._check(grid, left[-1], _ALL_FLOWS)
+                self._check(grid, left[-1], _FLOWS)
             except StructureError as error:
                 yield Unresolved(left.pop(), str(error))
                 grid = None
@@ -100,50 +97,21 @@ class DensitySolver:
         flow = self._flow(grid, self.steps)
         coarse = self._flow(self._grid(closer.region, (nx, nv)), self.steps)
         rough = dataclasses.replace(coarse, steps=self._fewer)
-        before = explored
+        # On hertz-0.570 at D = 2e-5, ln of the rate after 2 relaxations from the coarser solution differs by 0.004 from
+        # that after 4, and its error is 0.03.
+        settled = dataclasses.replace(self._convergence, crossed=2.0)
         for intensity in left:
-            coarser = self._solved(coarse, before, intensity)
+            coarser = self._solved(coarse, before, intensity, settled)
+            propagator = Propagator(rough, intensity, self.problem.executor)
+            edges, cores = self._other_edges(coarser), self._larger_cores(coarser)
             before = dataclasses.replace(
-                self._solved(flow, coarser, intensity),
+                self._solved(flow, coarser, intensity, settled),
                 coarser=coarser,
-                fewer_steps=self._with(coarser, self._transition(rough, intensity), coarser.cores),
-                other_sets=self._with(coarser, coarser.transition, self._other_sets(coarser))
-                if coarser.cores.others
-                else {},
-                nearer=self._with(coarser, coarser.transition, self._nearer(coarser))
-                if coarser.cores.committed.any() and not self.problem.exit.at_boundary
-                else None,
+                fewer_steps=self._again(coarser, dataclasses.replace(coarser.density, propagator=propagator)),
+                other_edges=None if edges is None else self._again(coarser, coarser.density.among(edges)),
+                larger_cores=None if cores is None else self._again(coarser, coarser.density.among(cores)),
             )
             yield before
-
-    def _with(self, known: AtIntensity, transition: Transition, cores: CoreSets) -> dict[int, Committor]:
-        """The committors of a density as it is, with another transition or other cores."""
-        density = known.found
-        if cores.own is not known.cores.own:
-            with np.errstate(divide="ignore"):
-                density = dataclasses.replace(density, in_core=density.phi + np.log(cores.own * known.grid.areas))
-        starts = {target: each.log_values for target, each in known.committors.items()}
-        return self._committors(transition, density, cores, starts, _CONVERGED)
-
-    def _other_sets(self, known: AtIntensity) -> CoreSets:
-        """Larger cores, or coarser basins."""
-        if not self.problem.exit.at_boundary:
-            return self._cores.on(known.grid, known.intensity, larger=LARGER)
-        coarser = self._cores.on(known.grid, known.intensity, _EVERY)
-        return dataclasses.replace(coarser, own=known.cores.own)
-
-    def _nearer(self, known: AtIntensity) -> CoreSets:
-        """Sets that absorb nearer to the edges of the basins."""
-        return self._cores.on(known.grid, known.intensity, nearer=NEARER)
-
-    def _solved(self, flow: DensityFlow, before: AtIntensity, intensity: float) -> AtIntensity:
-        """The density and the committors on the grid of a flow, begun from those of another one."""
-        transition, cores = self._transition(flow, intensity), self._cores.on(flow.grid, intensity)
-        begun, committors = before.begun(flow.grid, intensity)
-        found = quasi_stationary(transition, begun, cores, self._cores.relaxation, _CONVERGED, _ARRIVED)
-        known = self._committors(transition, found, cores, committors, _CONVERGED)
-        resolved = not self.problem.exit.at_boundary
-        return AtIntensity(intensity, flow.grid, found, transition, cores, known, sets_resolved=resolved)
 
     def guide(self, intensity: float) -> AtIntensity:
         """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
@@ -157,61 +125,93 @@ class DensitySolver:
             self._check(grid, intensity, 1.0)
         except StructureError:
             return explored
-        start, committors = explored.begun(grid, intensity)
-        transition = Propagator(self._flow(grid, self.steps), intensity, self.problem.executor)
-        cores = self._cores.on(grid, intensity)
-        found = quasi_stationary(transition, start, cores, self._cores.relaxation, _EXPLORED_TO)
-        known = self._committors(transition, found, cores, committors, _EXPLORED_TO)
-        return AtIntensity(intensity, grid, found, transition, cores, known) if known else explored
+        found = self._solved(self._flow(grid, self.steps), explored, intensity, self._exploring)
+        return found if found.committors else explored
 
     def explored(self, intensity: float) -> tuple[AtIntensity, DensityGrid]:
         """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
         Where the nodes of the whole region are too far apart for the density, a stronger noise is used.
         """
-        wanted_shape = self.shape or (_EXPLORING, _EXPLORING)
-        shape = min(_EXPLORING, wanted_shape[0]), min(_EXPLORING, wanted_shape[1])
+        nx, nv = self.shape or (_LARGEST, _LARGEST)
+        shape = min(nx, 140), min(nv, 140)
         grid = self._grid(self._cores.region(intensity), shape)
-        for _ in range(_ZOOMS):
+        for _ in range(4):
             stronger = max(intensity, self._cores.resolved(grid, _EXPLORED))
             propagator = Propagator(self._flow(grid, self._fewer), stronger, self.problem.executor)
-            nearer = math.sqrt(stronger / intensity)  # as near as at the noise that is wanted
-            cores = self._cores.on(grid, stronger, nearer=nearer)
-            start = self._cores.start(grid, stronger)
-            found = quasi_stationary(propagator, start, cores, self._cores.relaxation, _EXPLORED_TO)
-            below = (_BELOW * intensity + (_SLACK * stronger if stronger > intensity else 0.0)) / stronger
-            wanted = found.highest > min(found.level, found.highest.max()) - below
-            if not self.problem.exit.at_boundary:  # cores are needed whole, basins where the density is
-                for covered in self._cores.on(grid, intensity, nearer=0.0).others.values():
-                    wanted |= (covered > 0) & (cores.committed == 0)
-            if self.problem.outlet is not None:
-                wanted |= propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted
-            closer = self._grid(grid.around(wanted, _MARGIN), shape)
-            smaller = closer.areas.sum() * closer.shape[1] < _SHRINKING * grid.areas.sum() * grid.shape[1]
-            wider = self._widened(grid, found, intensity / stronger)
+            # States are committed as near to the edges of basins as at the noise that is wanted.
+            cores = self._cores.on(grid, stronger, nearer=math.sqrt(stronger / intensity))
+            found = quasi_stationary(propagator, self._cores.start(grid, stronger), cores, self._exploring)
+            wanted = self._wanted(found, intensity)
+            closer = self._grid(grid.around(wanted, 3), shape)
+            smaller = closer.areas.sum() * closer.shape[1] < _SMALLER * grid.areas.sum() * grid.shape[1]
+            wider = self._widened(found, intensity / stronger)
             if stronger > intensity and smaller:
                 grid = closer
             elif wider is not None:
                 grid = self._grid(wider, shape)
             else:
                 break
-        committors = self._committors(propagator, found, cores, {}, _EXPLORED_TO)
-        return AtIntensity(stronger, propagator.grid, found, propagator, cores, committors), closer
+        return AtIntensity(found, committors(found, self._exploring)), closer
 
-    def _widened(self, grid: DensityGrid, found: QuasiStationary, weaker: float) -> Region | None:
+    def _wanted(self, found: QuasiStationary, intensity: float) -> NDArray[np.bool_]:
+        """The nodes that matter at an intensity, by a density at this or more noise.
+
+        They hold the density down to 12 below what leaves in ln p, and 3 more in units of a stronger noise, and the
+        cores of other attractors; basins count only where the density is.
+        """
+        stronger = found.propagator.intensity
+        below = (12.0 * intensity + (3.0 * stronger if stronger > intensity else 0.0)) / stronger
+        wanted: NDArray[np.bool_] = found.highest > found.top - below
+        if not self.problem.exit.at_boundary:
+            for covered in self._cores.on(found.grid, intensity, nearer=0.0).others.values():
+                wanted |= (covered > 0) & (found.cores.committed == 0)
+        if self.problem.outlet is not None:
+            wanted |= found.propagator.flow.beyond_exit(wanted)  # what leaves the grid there is not counted
+        return wanted
+
+    def _widened(self, found: QuasiStationary, weaker: float) -> Region | None:
         """A region wider on the sides where motion between attractors leaves the grid; None if there is no such side.
 
         What leaves there is lost, although it would come back. Where motion escapes or position decides it is not.
         `weaker` is the noise that is wanted over that of the density: depths grow as it falls.
         """
-        matters = found.highest > min(found.level, found.highest.max()) + weaker * math.log(_EDGE)
+        matters, grid = found.highest > found.top + weaker * math.log(_EDGE), found.grid
         sides = np.array([[matters[0].any(), matters[-1].any()], [matters[:, 0].any(), matters[:, -1].any()]])
         if grid.turn:
             sides[0] = False
         if self.problem.outlet is not None or not sides.any():
             return None
         bounds = np.array([grid.region.x, grid.region.v])
-        return Region.of(bounds + _GROWN * np.diff(bounds) * sides * [-1.0, 1.0])
+        return Region.of(bounds + 0.25 * np.diff(bounds) * sides * [-1.0, 1.0])
+
+    def _solved(
+        self, flow: DensityFlow, before: AtIntensity, intensity: float, convergence: Convergence
+    ) -> AtIntensity:
+        """The density and the committors on the grid of a flow, begun from those of another one."""
+        start, known = before.begun(flow.grid, intensity)
+        propagator, cores = Propagator(flow, intensity, self.problem.executor), self._cores.on(flow.grid, intensity)
+        found = quasi_stationary(propagator, start, cores, convergence)
+        return AtIntensity(found, committors(found, dataclasses.replace(convergence, crossed=4.0), known))
+
+    def _again(self, known: AtIntensity, density: QuasiStationary) -> dict[int, Committor]:
+        """The committors of a density with another propagator or other cores, begun from the known ones."""
+        starts = {target: each.log_values for target, each in known.committors.items()}
+        return committors(density, self._convergence, starts)
+
+    def _other_edges(self, known: AtIntensity) -> CoreSets | None:
+        """Sets that absorb √2 times nearer to the edges of basins, or the basins of cells twice as large."""
+        if not known.density.cores.committed.any():
+            return None
+        every, nearer = (2, 1.0) if self.problem.exit.at_boundary else (1, COARSER)
+        sets = self._cores.on(known.grid, known.intensity, every, nearer=nearer)
+        return dataclasses.replace(sets, own=known.density.cores.own)
+
+    def _larger_cores(self, known: AtIntensity) -> CoreSets | None:
+        """Cores 1.5 times as large, to see whether limits of weak noise depend on their size."""
+        if self.problem.exit.at_boundary or not known.density.cores.others:
+            return None
+        return self._cores.on(known.grid, known.intensity, larger=1.5)
 
     def _grid(self, region: Region, shape: tuple[int, int]) -> DensityGrid:
         return DensityGrid.of(self.problem.scene, region, shape, self.problem.faces, self.problem.turn)
@@ -252,6 +252,14 @@ class DensitySolver:
     def _cores(self) -> Cores:
         return Cores(self.problem)
 
+    @cached_property
+    def _convergence(self) -> Convergence:
+        return Convergence(self._cores.relaxation, 1e-2)
+
+    @cached_property
+    def _exploring(self) -> Convergence:
+        return Convergence(self._cores.relaxation, 0.1)
+
     @property
     def _fewer(self) -> int:
         """Two thirds of the steps, or a little less, to an even number."""
@@ -262,26 +270,3 @@ class DensitySolver:
         beyond = None if self.problem.outlet is None else self.problem.beyond
         escaping = self.problem.outlet == ESCAPED  # may take motion far beyond the grid in a leg
         return DensityFlow(self.problem.scene, stepper, grid, steps, beyond, watches_edge=escaping)
-
-    def _transition(self, flow: DensityFlow, intensity: float) -> Transition:
-        if self.samples is None:
-            return Propagator(flow, intensity, self.problem.executor)
-        scene = flow.scene.replace({"noise.intensity": intensity})
-        return SampledMatrix(scene, flow.grid, self.samples, flow.steps, flow.beyond, self.problem.executor)
-
-    def _committors(
-        self,
-        transition: Transition,
-        found: QuasiStationary,
-        cores: CoreSets,
-        starts: Mapping[int, Array],
-        converged: float,
-    ) -> dict[int, Committor]:
-        """The committor of each target whose rate is known."""
-        if not found.log_rates:
-            return {}
-        earlier, relaxation = transition.backward(found, cores), self._cores.relaxation
-        return {
-            target: committor(earlier, found, cores, target, relaxation, converged, starts.get(target))
-            for target in found.log_rates
-        }

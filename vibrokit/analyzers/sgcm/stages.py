@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_flow import DensityFlow, steps_for
+from vibrokit.analyzers.sgcm.committor import relevant_legs
+from vibrokit.analyzers.sgcm.density_flow import DensityFlow
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.analyzers.sgcm.solution import DensitySolver
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAME = 1e-9  # of a section interval
-_MEMORY = 2.0  # GiB
 _BELOW = 20.0  # in ln: values so far below the least of the core are not computed
 
 Array = NDArray[np.float64]
@@ -77,18 +76,16 @@ def committor_stages(problem: ExitProblem, intensity: float) -> CommittorStages:
 
     Raises StructureError if there is none.
     """
-    orbits = [attractor.orbit[:, :2] for attractor in problem.structure.attractors]
-    solver = DensitySolver(problem, None, steps_for(problem.osc, np.concatenate(orbits)), _MEMORY)
-    one = solver.guide(intensity)
-    logs = [known.log_values for known in one.committors.values()]
-    if not logs or not isinstance(one.transition, Propagator):
+    one = DensitySolver(problem).guide(intensity)
+    if not one.committors:
         raise StructureError(f"no committor was found at D = {one.intensity:g}.")
-    together = np.minimum(functools.reduce(np.logaddexp, logs), 0.0)
-    floor = float(together.min()) - _BELOW
-    found = one.transition.stages(one.found, one.cores, together, floor)
+    together = np.minimum(functools.reduce(np.logaddexp, [each.log_values for each in one.committors.values()]), 0.0)
+    floor, propagator = float(together.min()) - _BELOW, one.density.propagator
+    earlier = propagator.earlier(relevant_legs(one.density), together, floor, at_exit=0.0)
+    found = np.array([values.copy() for values in earlier])[::-1]
     stages = np.concatenate([np.where(found > floor + 0.5 * _BELOW, found, np.nan), together[None]])
     for stage in stages:
         nearest = distance_transform_edt(np.isnan(stage), return_distances=False, return_indices=True)
         stage[:] = stage[tuple(nearest)]
-    flow = one.transition.flow
+    flow = propagator.flow
     return CommittorStages(flow, one.intensity, np.append(flow.leg_times, flow.scene.section_interval), stages)
