@@ -21,15 +21,13 @@ from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
 
-STEPPERS = {"RK4": vk.RK4(), "RK8": vk.RK8(), "RKN12": vk.RKN12(), "Order8": vk.Order8(), "FreeFlight": vk.FreeFlight()}
+STEPPERS = {"RK4": vk.RK4(), "Order8": vk.Order8(), "FreeFlight": vk.FreeFlight()}
 FLOWS = (Flow.STATE, Flow.STATE_VARIATIONAL, Flow.HAMILTONIAN, Flow.HAMILTONIAN_VARIATIONAL)
 
 
 def scene(stepper: str, power: int) -> vk.Oscillator:
-    """A scene of its own for each power, with a stop where the stepper takes one."""
-    stops = (
-        () if stepper in ("RK8", "RKN12") else (vk.Barrier(vk.CustomLaw(f"k*depth**{power}", k=20.0), 1.6, "right"),)
-    )
+    """A scene of its own for each power, with a stop."""
+    stops = (vk.Barrier(vk.CustomLaw(f"k*depth**{power}", k=20.0), 1.6, "right"),)
     spring = vk.LinearSpring(1.0) if stepper == "FreeFlight" else vk.CustomSpring(f"x + b*x**{power + 1}", b=0.3)
     return vk.Oscillator(
         natural_frequency=1.0, damping_ratio=0.05, spring=spring, barriers=stops,

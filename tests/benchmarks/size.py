@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 OTHERS = ("tests", "docs", "plugins", "tutorials")
 LAYOUT = ("plots", "report", "display.py", "text_table.py", "progress.py")  # of pictures, pages and printed text
-TABLES = ("kernels/tableau", "kernels/nystrom_tableau", "kernels/waves", "kernels/templates", "kernels/stopping")
+TABLES = ("kernels/tableau", "kernels/waves", "kernels/templates", "kernels/stopping")
 ALLOWED = ast.Constant | ast.UnaryOp | ast.BinOp | ast.operator | ast.unaryop | ast.Tuple | ast.List | ast.expr_context
 WIDE, LONG, FEWEST = 7, 60, 8  # parameters; lines; numbers that make a table of coefficients
 

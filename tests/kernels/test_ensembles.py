@@ -177,9 +177,7 @@ class TestVisits:
         assert ended.states.tobytes() == self.sections(stepper, 11).tobytes()
 
 
-@pytest.mark.parametrize(
-    "stepper", [vk.RK4(steps=256), vk.RK8(steps=64), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name
-)
+@pytest.mark.parametrize("stepper", [vk.RK4(steps=256), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name)
 def test_starts_at_several_phases(stepper):
     """Trajectories that begin at parts of the period end where those of a whole period do."""
     osc, parts = impacting(), 16
@@ -309,9 +307,7 @@ def swing(stepper, amplitude, phase, side, budget, between=True):
 
 
 @pytest.mark.parametrize("side", [1, -1], ids=["right", "left"])
-@pytest.mark.parametrize(
-    "stepper", [vk.RK4(steps=64 * TESTS), vk.RK8(steps=16 * TESTS), vk.FreeFlight()], ids=lambda stepper: stepper.name
-)
+@pytest.mark.parametrize("stepper", [vk.RK4(steps=64 * TESTS), vk.FreeFlight()], ids=lambda stepper: stepper.name)
 class TestBetween:
     """RK4 takes 64 steps in H, so its error is about (H/64)^4 = 6e-12; A is never nearer to 1 than 1e-10."""
 

@@ -69,7 +69,7 @@ def test_unforced_has_no_time(flow, excitations):
     assert not words(text) & {"forcing", "tabulate", "table", "cos", "sin", "u_omega", "u_phi", "f", "t", "elapsed"}
     parts = functions(text)
     assert "f" not in arguments(parts["derivative"])
-    assert arguments(parts["step_lanes"]) == ["z", "forces", "normals", "theta", "room", "h", "steps"]
+    assert arguments(parts["step_lanes"]) == ["z", "forces", "normals", "theta", "h", "steps"]
     assert "forces[" not in text
 
 

@@ -11,7 +11,6 @@ from types import FrameType
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.contact_time import contact_times
-from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
@@ -74,7 +73,7 @@ def single_stepper(scene: Scene, flow: Flow) -> Stepper:
 
 def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     """Warn, at the line that called into this package, if fixed steps are too few in a contact to follow it."""
-    if not isinstance(stepper, FixedSteps):
+    if not isinstance(stepper, RK4):
         return
     shortest = min((contact.duration for contact in contact_times(scene, flow)), default=math.inf)
     taken, needed = stepper.steps * shortest / scene.time_unit, _steps_of_changes(scene, flow)
@@ -89,7 +88,7 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     if flow is not Flow.NOISY:
         advice += f", or {type(single_stepper(scene, flow)).__name__}, which finds contacts and pulses"
     warnings.warn(
-        f"{type(stepper).__name__}(steps={stepper.steps}) {problem}; {advice}.",
+        f"RK4(steps={stepper.steps}) {problem}; {advice}.",
         CoarseStepsWarning,
         stacklevel=_frames_inside(sys._getframe()),
     )

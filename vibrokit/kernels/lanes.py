@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
-
-from vibrokit.kernels.tableau import NODES, RESULT, STAGES, WEIGHTS
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -18,30 +12,25 @@ if TYPE_CHECKING:
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
+_NODES = (0.0, 0.5, 1.0)
 _REGISTERS = "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers\n"
+# `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
+# because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
+# only where a scene and a flow need them.
 _STEP = (
-    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, room, h, steps):",
+    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, h, steps):",
     "    promise_no_overlap(), use_widest_registers()",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
-CLASSICAL_NODES = (0.0, 0.5, 1.0)
 
 
-def classical_step(text: SceneText) -> list[str]:
+def pieces_of_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    pieces = [tabulation(text, CLASSICAL_NODES), text.derivative, text.crossed, text.amplitude, text.slope]
-    return [*pieces, steps_of(text, _unrolled(text), len(CLASSICAL_NODES))]
-
-
-def staged_step(text: SceneText) -> list[str]:
-    """Pieces of a kernel of Dormand–Prince steps of order 8, without noise."""
-    nodes = tuple(float(node) for node in NODES)
-    return [tabulation(text, nodes), text.derivative, text.crossed, steps_of(text, _staged(text), STAGES)]
-
-
-def staged_room(text: SceneText) -> int:
-    """Numbers that a Dormand–Prince step works in: its slopes, and a point."""
-    return (STAGES + 1) * len(text.variables) * lanes_of(text)
+    pieces = [_tabulation(text), text.derivative, text.crossed, text.amplitude, text.slope]
+    lines = [_REGISTERS, "", *_STEP]
+    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
+    lines += ["    for step in range(steps):", *[f"        _node = {len(_NODES)}*step"] * text.forced]
+    return [*pieces, "\n".join([*lines, *(f"    {line}" for line in _step(text)), ""])]
 
 
 def lanes_of(text: SceneText) -> int:
@@ -49,59 +38,7 @@ def lanes_of(text: SceneText) -> int:
     return 32 if len(text.variables) <= _FEW_EQUATIONS else 16
 
 
-def steps_of(text: SceneText, step: Sequence[str], nodes: int) -> str:
-    """Function `step_lanes(z, forces, normals, theta, room, h, steps)`, which takes steps of every lane.
-
-    `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
-    because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
-    only where a scene and a flow need them.
-    """
-    lines = [_REGISTERS, "", *_STEP]
-    lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    for step in range(steps):", *[f"        _node = {nodes}*step"] * text.forced]
-    return "\n".join([*lines, *(f"    {line}" for line in step), ""])
-
-
-def _staged(text: SceneText) -> list[str]:
-    """Lines of a step of order 8, which works in its slopes and a point.
-
-    With few equations, a stage is one loop over the lanes. With many, that loop would need more registers and a longer
-    compilation than it gains: the point of a stage is computed in a loop over all numbers of all lanes first, which
-    halves both times.
-    """
-    names, lanes = text.variables, lanes_of(text)
-    few, size = len(names) <= _FEW_EQUATIONS, len(names) * lanes
-    lines = []
-
-    def at(block: str, place: int, row: int) -> str:
-        return f"{block}[{place * size + row * lanes} + lane]"
-
-    start = [at("z", 0, row) for row in range(text.states)]
-    for stage, weights in enumerate(WEIGHTS):
-        if few:
-            before = [_combined(weights, functools.partial(at, "room", row=row)) for row in range(len(names))]
-            point = [at("z", 0, row) + moved for row, moved in enumerate(before)]
-        else:
-            lines += [f"    for number in range({size}):"]
-            moved = _combined(weights, lambda s: f"room[{s * size} + number]")
-            lines += [f"        room[{STAGES * size} + number] = z[number]{moved}"]
-            point = [at("room", STAGES, row) for row in range(len(names))]
-        lines += [f"    force = forces[_node + {stage}]"] * text.forced
-        lines += ["    for lane in range(LANES):"]
-        lines += [f"        {', '.join(at('room', stage, row) for row in range(len(names)))} = \\"]
-        lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
-        lines += ended(text, start, point, at("room", stage, 0)) if stage else []
-    if text.gauges:
-        last = [
-            at("z", 0, row) + _combined(RESULT, functools.partial(at, "room", row=row)) for row in range(text.states)
-        ]
-        lines += ["    for lane in range(LANES):", *ended(text, start, last, at("room", 0, 0))]
-    lines += [f"    for number in range({size}):"]
-    end = _combined(RESULT, lambda s: f"room[{s * size} + number]")
-    return [*lines, f"        z[number] += {end.removeprefix(' + ')}"]
-
-
-def ended(text: SceneText, start: Sequence[str], point: Sequence[str], target: str) -> list[str]:
+def _ended(text: SceneText, start: Sequence[str], point: Sequence[str], target: str) -> list[str]:
     """A line that makes a number NaN if a pole lies between the start of a step and a point; none without poles."""
     if not text.gauges:
         return []
@@ -109,13 +46,7 @@ def ended(text: SceneText, start: Sequence[str], point: Sequence[str], target: s
     return [f"        {target} += crossed({', '.join([*states, *text.parameters])})"]
 
 
-def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
-    """Text that adds the weighted slopes of a step, if there are any; `slope` gives the text of that of a stage."""
-    terms = [f"{float(weight)!r}*{slope(stage)}" for stage, weight in enumerate(weights) if weight]
-    return f" + h*({' + '.join(terms)})" if terms else ""
-
-
-def _unrolled(text: SceneText) -> list[str]:
+def _step(text: SceneText) -> list[str]:
     """Lines of a classical Runge–Kutta step, between two kicks where there is noise.
 
     With U₁, U₂ standard normal, ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
@@ -134,12 +65,12 @@ def _unrolled(text: SceneText) -> list[str]:
         force = [_FORCES[stage // 2]] if text.forced else []
         targets = ", ".join(f"k{stage}_{name}" for name in names)
         lines.append(f"        {targets} = derivative({', '.join([*point, *force, *text.parameters])})")
-        lines += ended(text, start, point, f"k{stage}_{names[0]}") if before or noisy else []
+        lines += _ended(text, start, point, f"k{stage}_{names[0]}") if before or noisy else []
     for row, name in enumerate(names):
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
         after = " + _later" if noisy and name == driven else ""
         lines.append(f"        z[{row * lanes} + lane] = {name} + h/6.0*({slopes}){after}")
-    return [*lines, *ended(text, names, start, start[0])]
+    return [*lines, *_ended(text, names, start, start[0])]
 
 
 def _kicks(driven: str, text: SceneText) -> list[str]:
@@ -153,13 +84,13 @@ def _kicks(driven: str, text: SceneText) -> list[str]:
     ]
 
 
-def tabulation(text: SceneText, nodes: Sequence[float]) -> str:
+def _tabulation(text: SceneText) -> str:
     """Function `tabulate(start, h, steps, theta, table)`: the forcing at the nodes of steps; empty without."""
     if not text.forced:
         return ""
     lines = ["@njit(**LINKED_LANES)", "def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
     lines += [
-        f"        table[{len(nodes)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
-        for place, node in enumerate(nodes)
+        f"        table[{len(_NODES)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
+        for place, node in enumerate(_NODES)
     ]
     return "\n".join([*lines, ""])

@@ -24,8 +24,7 @@ _SIGNATURES = {
     "flight_rate": _F8(_NUMBERS),
     "taylor": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "tabulate": types.none(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
-    "prepare": types.none(_F8, _NUMBERS, _NUMBERS),
-    "step_lanes": types.none(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8, _I8),
+    "step_lanes": types.none(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8, _I8),
 }
 LINKS = len(_SIGNATURES)
 
@@ -100,12 +99,6 @@ def tabulate(_context: Any, start: Any, h: Any, steps: Any, theta: Any, table: A
 
 
 @intrinsic
-def prepare(_context: Any, h: Any, theta: Any, room: Any) -> Any:
-    """Write what all steps of a length have in common."""
-    return _call("prepare", 1)
-
-
-@intrinsic
-def step_lanes(_context: Any, z: Any, forces: Any, normals: Any, theta: Any, room: Any, h: Any, steps: Any) -> Any:
+def step_lanes(_context: Any, z: Any, forces: Any, normals: Any, theta: Any, h: Any, steps: Any) -> Any:
     """Take steps in each lane."""
     return _call("step_lanes", 3)

@@ -19,8 +19,6 @@ from vibrokit.symbolic.flight import ORDER, FlightWriter
 from vibrokit.symbolic.flow import derive_flow, model_for
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.printer import assignments, unpack
-from vibrokit.symbolic.second_order import second_order_form
-from vibrokit.symbolic.second_order_source import SecondOrderWriter
 from vibrokit.symbolic.symbols import code_name, plain
 
 _PREAMBLE = '''"""{title}
@@ -215,12 +213,6 @@ class SceneText:
     def flight(self) -> str:
         """Functions `flight_rate(theta)` and `taylor(t, z, theta, c)`."""
         return FlightWriter(self._model, self._equations).text(self._index)
-
-    @cached_property
-    def second_order(self) -> SecondOrderWriter | None:
-        """What writes the second-order form of the flow; None if it has none."""
-        form = second_order_form(self._equations, self.flow)
-        return None if form is None else SecondOrderWriter(form, self._equations, self._index)
 
     @cached_property
     def _borders(self) -> tuple[Border, ...]:

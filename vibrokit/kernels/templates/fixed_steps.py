@@ -10,40 +10,47 @@ Milstein & Tretyakov, *Stochastic Numerics for Mathematical Physics*); where the
 it drives, Milstein's term makes it strong order 1. `given` normals, if any, replace those that a single trajectory
 draws.
 
-One driver serves all scenes, flows and steps of this kind; it reads from the facts of a scene what these need. Some
-steps after it began, it returns to Python, and goes on when it is called with the same memory again: a trajectory has
-the same bits wherever it was cut.
+One driver serves all scenes and flows; it reads from the facts of a scene what these need. Some steps after it began,
+it returns to Python, and goes on when it is called with the same memory again: a trajectory has the same bits wherever
+it was cut.
 """
 
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.links import prepare, step_lanes, tabulate
-from vibrokit.kernels.options import CONTRACTED
+from vibrokit.kernels.links import step_lanes, tabulate
+from vibrokit.kernels.options import CONTRACTED, INNER_LANES
 from vibrokit.kernels.pointers import offset_by, pointer_to
+from vibrokit.kernels.registers import use_widest_registers
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, left_in_step, stop_status
-from vibrokit.kernels.templates.drawing import draw_lanes
+from vibrokit.kernels.streams import normal_pair
 
 # --- scene above, stepper below ---
 
-# Facts, before the parameters of a scene: lanes of a block, values of the forcing in a step, numbers that a step works
-# in, whether the forcing depends on time, and whether steps share factors.
-LANES, NODES, WORK, FORCED, PREPARED = 1, 2, 3, 4, 5
-
-
+# Facts, before the parameters of a scene: lanes of a block, and whether the forcing depends on time.
+LANES, FORCED = 1, 2
+NODES = 3  # of a step, at which the forcing is tabulated
 MOST_STEPS = 4096  # taken in one go
+
+
+@njit(**INNER_LANES)
+def draw_lanes(streams, normals, lanes):
+    """Draw two standard normals for each lane, into two rows."""
+    use_widest_registers()
+    for lane in range(lanes):
+        normals[lane], normals[lanes + lane] = normal_pair(streams, lane)
 
 
 def memory_of(states, parameters, settings, streams):
     """What `advance` keeps from call to call; the last array has what waits and what is active."""
-    equations, lanes, nodes = states.shape[1], int(parameters[LANES]), int(parameters[NODES])
+    equations, lanes = states.shape[1], int(parameters[LANES])
     intervals = max(int(settings[1]), 1) if parameters[FORCED] > 0.0 else 0
-    z, before, work = np.zeros((equations, lanes)), np.zeros((equations, lanes)), np.zeros(int(parameters[WORK]))
-    tabulated = np.zeros(max(intervals * int(settings[0]) * nodes, 1))
+    z, before = np.zeros((equations, lanes)), np.zeros((equations, lanes))
+    tabulated = np.zeros(max(intervals * int(settings[0]) * NODES, 1))
     stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
     holder, done = np.full(lanes, -1), np.zeros(lanes, dtype=np.int64)
     outside = np.zeros(lanes, dtype=np.bool_)
-    return z, before, work, tabulated, stream, drawn, holder, done, outside, np.array([0, 0, -1, 0])
+    return z, before, tabulated, stream, drawn, holder, done, outside, np.array([0, 0, -1, 0])
 
 
 @njit(**CONTRACTED)
@@ -75,7 +82,6 @@ def advance(
     visits,
     z,
     before,
-    work,
     tabulated,
     stream,
     drawn,
@@ -85,22 +91,20 @@ def advance(
     place,
     most,  # steps before it returns
 ):
-    count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
+    count, equations, lanes = states.shape[0], states.shape[1], int(parameters[LANES])
     forced, noisy, steps = parameters[FORCED] > 0.0, streams.shape[1] > 0, int(settings[0])
     # Intervals after which the forcing repeats; 0 if it never does.
     cycle = int(settings[1]) if forced else 1
     h = interval / steps
     begun = np.zeros((2, lanes))
-    block, room, table, normals = pointer_to(z), pointer_to(work), pointer_to(tabulated), pointer_to(drawn)
+    block, table, normals = pointer_to(z), pointer_to(tabulated), pointer_to(drawn)
     theta = offset_by(pointer_to(parameters), int(parameters[0]))
     waiting, active, elapsed, step, used = place[0], place[1], place[2], place[3], 0
     if elapsed < 0:  # the first call
         elapsed = 0
-        if parameters[PREPARED] > 0.0:
-            prepare(h, theta, room)
         if forced:
             for phase in range(cycle):
-                tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * nodes))
+                tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * NODES))
     while used < most and (waiting < count or active > 0):
         # If the forcing never repeats, lanes that do not share the phase of a newcomer go on first.
         if step == 0 and (active == 0 or cycle > 0):
@@ -136,7 +140,7 @@ def advance(
                 outside[lane] = False
                 for e in range(equations):
                     before[e, lane] = z[e, lane]
-        forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
+        forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * NODES)
         end = min(step + MOST_STEPS, steps)
         used += end - step
         at_once = 1 if noisy or between else end - step
@@ -149,12 +153,12 @@ def advance(
             if between:
                 for lane in range(lanes):
                     begun[0, lane], begun[1, lane] = z[0, lane], z[1, lane]
-            step_lanes(block, forces, normals, theta, room, h, at_once)
+            step_lanes(block, forces, normals, theta, h, at_once)
             if between:
                 for lane in range(lanes):
                     x, v = z[0, lane], z[1, lane]
                     outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, region)
-            forces = offset_by(forces, nodes)
+            forces = offset_by(forces, NODES)
         step = end if end < steps else 0
         if step > 0:
             continue
