@@ -32,7 +32,6 @@ from vibrokit.results.energy import Bound
 from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
 
-solve, solve_at_once = PathSolver.solve, PathSolver.solve_at_once
 DAMPING = 0.3
 PIECE = 2 * np.pi / 8  # of a candidate; ω_n = 1
 BARRIER = 0.25
@@ -125,17 +124,9 @@ def shot(path, momentum, action):
     return dataclasses.replace(guess(states, action), momenta=np.full_like(states, momentum))
 
 
-def test_all_shots_are_tried_quickly_before_one_is_polished_with_all_means(problem, monkeypatch):
-    """The first shot leads nowhere; the second one is a path."""
-    path = only(polish(problem, (guess(straight()),))).path
-    good = Candidate(0, 1, path.t, path.q, 0.31, "guess", path.p)
-    tried = []
-    monkeypatch.setattr(PathSolver, "solve_at_once", lambda *given: tried.append("quickly") or solve_at_once(*given))
-    monkeypatch.setattr(PathSolver, "solve", lambda *given: tried.append("by descent") or solve(*given))
-    found = polish(problem, (shot(straight(), 5.0, 0.305), good))
-    assert only(found).value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
-    assert tried[:2] == ["quickly", "quickly"]
-    assert tried.count("by descent") == 2  # from each: from the path that was new, too
+def test_a_shot_that_newton_s_method_does_not_lead_to_a_path_descends(problem):
+    (branch,) = polish(problem, (shot(straight(), 5.0, 0.305),)).branches
+    assert branch.value == pytest.approx(4 * DAMPING * BARRIER, rel=1e-6)
 
 
 NO_PATH = [[-1.0, 0.0], [np.nan, 0.0], [0.5, 0.0]]
@@ -144,10 +135,10 @@ NO_PATH = [[-1.0, 0.0], [np.nan, 0.0], [0.5, 0.0]]
 @pytest.mark.parametrize(("path", "paths"), [(straight(), 1), (NO_PATH, 0)], ids=["path", "no path"])
 def test_a_candidate_is_polished_from_two_of_several_orbits_that_lead_to_the_same(problem, path, paths):
     (well,), shared = equilibria(problem.scene, -1.5, -0.5), Shared()
-    several, iterations = [Polishing(problem, well, shared) for _ in range(4)], []
+    several, iterations, candidate = [Polishing(problem, well, shared) for _ in range(4)], [], guess(path)
     for one in several:
         with working() as work:
-            one.add((guess(path),))
+            one.add((candidate,))
         iterations.append(work.stats.newton_iterations)
     assert iterations[2:] == [0, 0]
     assert [len(one.polished().branches) for one in several] == [paths, 0, 0, 0]
@@ -158,9 +149,10 @@ def test_where_a_path_costs_next_to_nothing_no_other_orbit_is_tried(problem):
     (well,), shared = equilibria(problem.scene, -1.5, -0.5), Shared()
     several, iterations = [Polishing(problem, well, shared) for _ in range(3)], []
     (path,) = polish(problem, (guess(straight()),)).branches
+    candidate = guess(straight(), 1000 * path.value)
     for one in several:
         with working() as work:
-            one.add((guess(straight(), 1000 * path.value),))
+            one.add((candidate,))
         iterations.append(work.stats.newton_iterations)
     assert iterations[0] > 0
     assert iterations[1:] == [0, 0]
@@ -230,7 +222,7 @@ def test_a_path_whose_certificate_fails_is_an_upper_bound(problem, monkeypatch):
         raise StructureError("no solution nearby.")
 
     exact = polish(problem, (guess(straight()),)).branches[0]
-    monkeypatch.setattr("vibrokit.analyzers.polishing.polish.certify", failing)
+    monkeypatch.setattr("vibrokit.analyzers.polishing.certified.certify", failing)
     found = polish(problem, (guess(straight()),))
     (branch,) = found.branches
     assert branch.value == exact.value
@@ -361,23 +353,6 @@ def parts(problem):
 def from_orbit(parts):
     propagator, source, cuts = parts
     return propagator, PathSolver(propagator, source.with_start_on_orbit()).solve(cuts)
-
-
-@pytest.mark.parametrize(("misfit", "starts"), [(0.5, 1), (1e-3, 4)], ids=["hopeless", "hopeful"])
-def test_what_failed_is_not_tried_again(parts, monkeypatch, misfit, starts):
-    """From the orbit itself, in three lengths, only where a linearized start has nearly converged."""
-    propagator, source, cuts = parts
-    solver, tried = PathSolver(propagator, source), []
-
-    def fails(*given, **settings):
-        tried.append(given)
-        raise NotConverged(misfit, 1e-9)
-
-    monkeypatch.setattr("vibrokit.analyzers.polishing.path_solver.extremal_path", fails)
-    for way in (solver.solve_near, solver.solve):
-        with pytest.raises(NotConverged):
-            way(cuts)
-    assert len(tried) == starts
 
 
 def test_a_failure_keeps_its_misfit_between_processes():

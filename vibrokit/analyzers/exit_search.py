@@ -114,7 +114,7 @@ class ExitSearch:
         self._least = detailed_balance.with_paths(self.problem, self._least, found)
         if found:
             exact = bool(self._least) and all(each.bound is Bound.EXACT for each in self._least)
-            self._polish([dataclasses.replace(each, exact=bool(self._least)) for each in found], quick=exact)
+            self._polish(found, quick=exact)
         if slow:
             self._polish(slow, quick=self._shots_follow)
         self._reversed = True

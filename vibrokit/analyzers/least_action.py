@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.graph.search import GraphSearch
-from vibrokit.analyzers.polishing.polish import METHOD
+from vibrokit.analyzers.polishing.certified import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
 from vibrokit.arguments import whole

@@ -12,8 +12,7 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
 
-MANY_ITERATIONS, FEW_ITERATIONS = 100, 30
-"""Generic paths need 5 to 30 iterations; those of a nearly degenerate family descend slowly."""
+_ITERATIONS = 100  # generic paths need 5 to 30; those of a nearly degenerate family descend slowly
 _INNER = 20  # Newton's method on the momenta of the segments; it converges in 2 to 4, beside contacts in up to 20
 _MATCHED = 1e-5  # of the path's extent: accuracy with which a segment reaches its end; the rest is counted to 1st order
 _CONVERGED = 1e-9  # of the action
@@ -57,7 +56,7 @@ def descend_action(
     last: float | None = None,  # duration of the last piece (s), if it differs from the others
     free: NDArray[np.bool_] | None = None,  # (n,): coordinates of the last state that may change; by default none
     closing: Closing | None = None,  # action after the last node, all of whose coordinates may change
-    iterations: int = MANY_ITERATIONS,  # at most
+    iterations: int = _ITERATIONS,  # at most
     converged: float = _CONVERGED,  # gain that the next step promises, relative to the action
 ) -> tuple[Array, float]:
     """Bring a path to a local minimum of the action, with extremal segments and its first state held.

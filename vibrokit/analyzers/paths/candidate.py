@@ -19,4 +19,3 @@ class Candidate:
     action: float  # action according to the method that found it (m² s⁻³)
     finder: str  # that method, in words
     momenta: NDArray[np.float64] | None = None  # (count, n): at the states, where the method knows them
-    exact: bool = False  # whether it is an extremal path but for its ends

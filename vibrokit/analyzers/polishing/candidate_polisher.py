@@ -1,4 +1,4 @@
-"""CandidatePolisher: candidates of one attractor, the cheapest first, polished to the ends that they come near."""
+"""CandidatePolisher: candidates of one attractor, polished to the ends that they come near, with rising effort."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes, Way
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes
 from vibrokit.analyzers.polishing.passing import PassingSearch
-from vibrokit.analyzers.polishing.path_solver import PathSolver
+from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
@@ -25,9 +25,7 @@ WORTH = 1.25
 """Times the least action known: costlier candidates are skipped. Searches price a path to a few percent."""
 _NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
 _INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
-_QUICKLY = 0.0  # for the least action known: no finer pieces where the coarser ones do not converge
-_MOST_FAILURES = 6  # candidates that lead to no path to an end, after which no other one is tried
-_CHEAPER = 0.95  # times the least action that failed
+_MOST_FAILURES = 6  # candidates that lead to no path to an end, after which only cheaper ones are tried
 _TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 
 
@@ -46,17 +44,18 @@ class CandidatePolisher:
         self._solver = LegSolver(self.nodes, _left(problem, orbit))
         self._passing = PassingSearch(self.nodes)
         self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
-        self._unsolved: list[Candidate] = []  # that led nowhere quickly
-        self._beside: list[tuple[PathEnd, Candidate]] = []  # shots that led to a path; descent may find a cheaper one
-        self._overpricing: dict[int, float] = {}  # by target: action of the first shot that led to a path, over its
+        self._unsolved: dict[Candidate, Effort] = {}  # the effort with which each led nowhere
 
-    def polish(self, candidate: Candidate, *, quick: bool = False) -> None:
+    def polish(self, candidate: Candidate, effort: Effort = Effort.FROM_ORBIT) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
 
-        A candidate of a grid may pass an orbit on its way to an end. No path does that in finite time, so that it is
-        polished in legs first. If it is polished quickly and no path is found, it is left for `polish_the_rest`.
+        Without momenta it is at least brought to descend. A candidate of a grid may pass an orbit on its way to an end.
+        No path does that in finite time, so that it is polished in legs first. If no path is found, it is left for
+        `polish_the_rest`.
         """
-        if candidate.action > WORTH * self._known(candidate) * self._overpriced(candidate):
+        effort = effort if candidate.momenta is not None else max(effort, Effort.DESCEND)
+        self._unsolved.pop(candidate, None)
+        if candidate.action > WORTH * self._known(candidate):
             self.skipped += 1
             return
         failures, solved = list[str](), False
@@ -65,15 +64,17 @@ class CandidatePolisher:
                 in_legs = self._solve_in_legs(end, candidate)
                 if (in_legs and self._failures[end]) or not self._is_wanted(end, candidate):
                     solved = True  # no failure of this candidate
-                else:
-                    solved |= self._solve_directly(end, candidate, failures, quick=quick) or in_legs
+                    continue
+                failure = self._solve(end, candidate, effort)
+                failures += [failure] if failure else []
+                solved |= in_legs or not failure
             for end in self._farther(candidate):
                 if self._solve_in_legs(end, candidate):
                     break
         except StructureError as error:
             failures.append(str(error))
-        if not solved and quick:
-            self._unsolved.append(candidate)
+        if not solved and effort < Effort.FROM_ORBIT:
+            self._unsolved[candidate] = effort
         elif not solved:
             self.findings.append(
                 Finding.of(
@@ -82,63 +83,41 @@ class CandidatePolisher:
                 )
             )  # fmt: skip
 
-    def polish_the_rest(self) -> None:
-        """Polish what was left, then descend from shots that led to a path.
+    def polish_the_rest(self, effort: Effort) -> None:
+        """Polish what led nowhere with less effort.
 
         A shot costs more than the path near it, a candidate of a grid may cost less: of these, only those that cost
         less than a known path.
         """
-        unsolved, self._unsolved = self._unsolved, []
-        for candidate in sorted(unsolved, key=lambda each: each.action):
-            if candidate.momenta is not None or candidate.action < self._known(candidate):
-                self.polish(candidate)
-        beside, self._beside = self._beside, []
-        for end, candidate in beside:
-            with contextlib.suppress(StructureError):
-                self._add(self._solve(end, candidate, PathSolver.solve, self._least((end,))))
+        unsolved = sorted(self._unsolved, key=lambda each: each.action)
+        for candidate in unsolved:
+            shot = candidate.momenta is not None
+            if self._unsolved[candidate] < effort and (shot or candidate.action < self._known(candidate)):
+                self.polish(candidate, effort)
 
-    def _solve_directly(self, end: PathEnd, candidate: Candidate, failures: list[str], *, quick: bool) -> bool:
-        """Whether a path to an end is found; by multiple shooting first where momenta are known."""
-        at_once = PathSolver.solve_exact if candidate.exact else PathSolver.solve_at_once
-        if candidate.momenta is None:
-            ways: tuple[Way, ...] = (PathSolver.solve_near if quick else PathSolver.solve,)
-        else:
-            ways = (at_once,) if quick else (at_once, PathSolver.solve)
-        for way in ways:
-            try:
-                one = self._solve(end, candidate, way, _QUICKLY if quick else self._least((end,)))
-            except StructureError as error:
-                failures.append(str(error))
-                self._failures[end] += [] if quick else [candidate.action]
-                continue
-            if candidate.momenta is not None:
-                self._overpricing.setdefault(candidate.target, max(1.0, candidate.action / one.action))
-            if self._add(one) and way is at_once:
-                self._beside.append((end, candidate))
-            return True
-        return False
-
-    def reach(self, end: PathEnd, ranked: Sequence[Candidate], *, quick: bool = False) -> None:
+    def reach(self, end: PathEnd, ranked: Sequence[Candidate], effort: Effort) -> None:
         """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
-        way, least = (PathSolver.solve_near, _QUICKLY) if quick else (PathSolver.solve, self._least((end,)))
         near = list(itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES))
         for candidate in (*near, *(each for each in ranked[:1] if each not in near)):
-            if not self._is_wanted(end, candidate):
+            if not self._is_wanted(end, candidate) or not self._solve(end, candidate, effort):
                 return
-            try:
-                self._add(self._solve(end, candidate, way, least))
-                return
-            except StructureError:
-                self._failures[end] += [] if quick else [candidate.action]
 
-    def _add(self, one: SolvedPath) -> bool:
-        """Whether a path is new; it is added then."""
-        new = not any(one.is_same(other) for other in self.solved)
-        if new:
+    def _solve(self, end: PathEnd, candidate: Candidate, effort: Effort) -> str:
+        """Polish a candidate to an end; return why it leads to no path, or an empty text."""
+        others = [other for other in self.ends if other is not end]
+        try:
+            leg = self._solver.solve(end, candidate, others=others, least=self._least((end,)), effort=effort)
+            self._add(SolvedPath.of(self.problem, (leg,)))
+        except StructureError as error:
+            self._failures[end] += [candidate.action] if effort is Effort.FROM_ORBIT else []
+            return str(error)
+        return ""
+
+    def _add(self, one: SolvedPath) -> None:
+        if not any(one.is_same(other) for other in self.solved):
             self.solved.append(one)
-        return new
 
     def _known(self, candidate: Candidate) -> float:
         """The least action of a known path to the candidate's target, or, if less, to any end that it comes near.
@@ -153,13 +132,6 @@ class CandidatePolisher:
         if np.isinf(to_target) and self._passes(candidate, near):
             return np.inf
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
-
-    def _overpriced(self, candidate: Candidate) -> float:
-        """By how much shots to its target cost more than the paths that they lead to, as the first one did.
-
-        Between stiff stops, a path may cost a third less than the shot, and the next shot lead to another path.
-        """
-        return 1.0 if candidate.momenta is None else self._overpricing.get(candidate.target, 1.0)
 
     def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
         """Whether only ends that are not near a candidate lead to its target."""
@@ -177,7 +149,7 @@ class CandidatePolisher:
         """
         failed = self._failures[end]
         known = any(one.end is end for one in self.solved)
-        if len(failed) >= _MOST_FAILURES and not known and candidate.action > _CHEAPER * min(failed):
+        if len(failed) >= _MOST_FAILURES and not known and candidate.action >= min(failed):
             return False
         others = (other for other in self.ends if set(other.targets) & set(end.targets))
         return not end.one_of_many or candidate.action < self._least(others)
@@ -208,19 +180,13 @@ class CandidatePolisher:
         return sorted(ends, key=lambda end: self.nodes.distance(end, candidate))
 
     def _comes_near(self, end: PathEnd, candidate: Candidate) -> bool:
-        try:
+        with contextlib.suppress(StructureError):
             return end in self._near(candidate)
-        except StructureError:
-            return False
-
-    def _solve(self, end: PathEnd, candidate: Candidate, way: Way, least: float) -> SolvedPath:
-        others = [other for other in self.ends if other is not end]
-        leg = self._solver.solve(end, candidate, others=others, least=least, way=way)
-        return SolvedPath.of(self.problem, (leg,))
+        return False
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:
         """Whether a path to an end through an orbit that a candidate passes is known, or found and added."""
-        if candidate.momenta is not None:  # a shot, which is one extremal path
+        if candidate.momenta is not None:  # it is one extremal path
             return False
         found = self._passing.solve(end, candidate, self.solved)
         if found is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate, resampled
+from vibrokit.analyzers.polishing.ending import Ending, ResampledCandidate, resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.path_solver import PathSolver
+from vibrokit.analyzers.polishing.path_solver import Effort, PathSolver
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record, record_each
@@ -34,7 +34,6 @@ _ROUNDS = 4  # how often a path is cut where it has already left
 _CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
 
 Array = NDArray[np.float64]
-Way = Callable[[PathSolver, Sequence[Cut], float], ExtremalPath]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,28 +128,28 @@ class LegSolver:
         *,
         others: Iterable[PathEnd] = (),
         least: float = np.inf,
-        way: Way = PathSolver.solve,
+        effort: Effort = Effort.FROM_ORBIT,
     ) -> Leg:
-        """Polish a candidate to an end, with finer pieces if necessary and if it is cheaper than `least`.
+        """Polish a candidate to an end; with all effort also in finer pieces, if it is cheaper than `least`.
 
         Raises StructureError if no path to the end is found, or if it leaves by one of the others before.
         """
         for pieces in self.nodes.pieces:
             try:
-                return self._solve_with(pieces, end, candidate, others, (1 - _CHEAPER) * least, way)
+                return self._solve_with(pieces, end, candidate, others, (1 - _CHEAPER) * least, effort)
             except StructureError as error:
                 failure = error
-                if candidate.action >= least:
+                if effort < Effort.FROM_ORBIT or candidate.action >= least:
                     break
         raise failure
 
     def _solve_with(
-        self, pieces: int, end: PathEnd, candidate: Candidate, others: Iterable[PathEnd], worth: float, way: Way
+        self, pieces: int, end: PathEnd, candidate: Candidate, others: Iterable[PathEnd], worth: float, effort: Effort
     ) -> Leg:
         solver: PathSolver = self._solver(end, pieces)
         ending = self.nodes.ending(end, pieces)
         for _ in range(_ROUNDS):
-            found = way(solver, ending.cuts(self.nodes.resampled(candidate, pieces)), worth)
+            found = solver.solve(ending.cuts(self.nodes.resampled(candidate, pieces)), effort, worth)
             if not found.action > 0:
                 raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
             path = _dense_path(solver.propagator, found)

@@ -16,7 +16,7 @@ from vibrokit.analyzers.path_ends import AtSaddle, PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.ends import obstacle
 from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes
-from vibrokit.analyzers.polishing.path_solver import PathSolver
+from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.errors import StructureError
 
@@ -65,7 +65,7 @@ class PassingSearch:
             if self._tries[solver, end] > _MOST_TRIES:
                 continue
             with contextlib.suppress(StructureError):
-                leg = solver.solve(end, rest, way=PathSolver.solve_near)
+                leg = solver.solve(end, rest, effort=Effort.DESCEND)
                 if first.action + leg.found.action <= _TOO_MUCH * candidate.action:
                     return SolvedPath.of(self._problem, (*first.legs, leg))
         return None
