@@ -83,18 +83,38 @@ def test_values_at_which_the_scene_is_refused_are_gaps():
     assert not found.found(Code.PATH_LOST)
 
 
-def test_structures_that_are_known_are_not_searched_for_again(monkeypatch):
-    """Their attractors have the names that are given, also as the source; paths are followed from there."""
+def test_states_have_the_names_and_the_places_that_are_given(monkeypatch):
+    """Paths leave those states alone that are listed, and are searched for only where these exist."""
     osc = WELLS.replace(damping_ratio=0.1)
     structure = vk.find_structure(osc, starts=(8, 8), manifolds=False)
     monkeypatch.setattr(energy_run, "find_structure", None)
-    line, analyzer = parameter_line("test", WELLS, "damping_ratio"), dataclasses.replace(QUICK, source="other")
-    known = {0.1: (structure, ("one", "other"))}
-    run = energy_run.EnergyRun(WELLS, line, np.array([0.1, 0.2]), analyzer, [0], 0, known)
+    line = parameter_line("test", WELLS, "damping_ratio")
+    run = energy_run.EnergyRun(
+        WELLS, line, np.array([0.05, 0.1, 0.2]), QUICK, None, 0,
+        structure_at=lambda value: (structure, ("one", "other")), existing={"other": [1]},
+    )  # fmt: skip
     run.run()
     (curve,) = run.curves
+    assert run.places == [1]
     assert (curve.source, curve.target) == ("other", "one")
-    assert [curve.action(place) for place in (0, 1)] == pytest.approx([0.1, 0.2], rel=1e-7)
+    assert [curve.action(place) for place in range(3)] == pytest.approx([0.05, 0.1, 0.2], rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("existing", "known", "searched", "wanted"),
+    [
+        (range(9), {0, 1, 8}, [0, 8], [5]),  # the middle of 2 to 7
+        (range(9), {0, 1, 8}, [0, 5, 8], [3]),  # 5 was in vain; then the middle of 2 to 4
+        (range(9), {0, 1}, [0, 2, 8], []),  # searches at both ends were in vain
+        (range(3, 6), set(), [0, 8], [4]),  # a state that exists between the searched values only
+        (range(9), set(range(9)), [0, 8], []),
+    ],
+)
+def test_where_an_energy_is_missing_is_searched_next(existing, known, searched, wanted):
+    line = parameter_line("test", WELLS, "damping_ratio")
+    run = energy_run.EnergyRun(WELLS, line, np.arange(1.0, 10.0), QUICK, None, 0, existing={"a": existing})
+    run.places, run.curves = searched, [energy_run._Curve("a", "b", dict.fromkeys(known))]
+    assert run._further() == wanted
 
 
 def test_it_can_be_saved_and_reopened(wells, tmp_path):

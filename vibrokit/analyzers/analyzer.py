@@ -343,10 +343,14 @@ def _known(analyses: Mapping[int, Analysis], label: int) -> tuple[ActivationEner
 
 
 def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:
-    """Findings where the noise is not weak against an energy."""
-    energies = [energy for one in analyses.values() for energy in one.estimates]
-    return [
-        Finding.of(Code.NOISE_NOT_WEAK, e.source, e.target, ratio=e.value / intensity, intensity=intensity, least=WEAK)
-        for e in energies
-        if 0 < e.value < WEAK * intensity and math.isfinite(e.upper)  # otherwise the value is not known
-    ]
+    """Findings where the noise is not weak against an energy that is known."""
+    energies = [energy for one in analyses.values() for energy in one.estimates if math.isfinite(energy.upper)]
+    return [finding for one in energies for finding in not_weak(one.source, one.target, one.value, intensity)]
+
+
+def not_weak(source: int, target: int, energy: float, intensity: float) -> list[Finding]:
+    """Return a finding if the noise is not weak against an energy."""
+    if not 0 < energy < WEAK * intensity:
+        return []
+    values = {"ratio": energy / intensity, "intensity": intensity, "least": WEAK}
+    return [Finding.of(Code.NOISE_NOT_WEAK, source, target, **values)]

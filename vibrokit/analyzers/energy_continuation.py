@@ -38,10 +38,11 @@ def energy_continuation(
 ) -> EnergyContinuation:
     """Follow the exit paths of a scene, and so its activation energies, along values of one parameter.
 
-    At a few values the structure and all exit paths are searched for. Each path is then followed to the other values:
-    Newton's method solves for it from the path at the value before. A step is halved until the change of the action
-    agrees with its derivative at both ends, so that a path is not exchanged for another one. Where paths cost the same,
-    the least action passes from one to the other; a path that does not exist at any searched value is not found.
+    At a few values the structure and all exit paths are searched for. The cheapest path of each exit is then followed
+    to the other values: Newton's method solves for it from the path at the value before. A step is halved until the
+    change of the action agrees with its derivative at both ends, so that a path is not exchanged for another one. Where
+    paths cost the same, the least action passes from one to the other. A path that is the cheapest at no searched value
+    is not found, so that the energies at the other values are upper bounds.
 
     On Ctrl-C, or when the time limit is reached, what was found so far is returned, marked incomplete.
 
@@ -57,7 +58,7 @@ def energy_continuation(
         Finds the paths, with its source and its exit; by default ``LeastAction()``.
     search : sequence of float, optional
         Those of the values at which paths are searched for; by default the one nearest to the parameter's own value,
-        the first and the last.
+        the first and the last, and then the middle of each stretch in which a state has no energy.
     rng : int or numpy.random.Generator
         Seed of the structures.
     progress : bool or callable, optional
@@ -91,23 +92,15 @@ def energy_continuation(
     if not isinstance(chosen, LeastAction):
         raise StructureError(f"{_CALLER}: analyzer must be a LeastAction, got {shown(analyzer)}.")
     chosen.check(osc)
-    run = EnergyRun(osc, line, numbers, chosen, search_places(osc, line, numbers, search), seed_of(rng))
+    wanted = None if search is None else search_places(line, numbers, search)
+    run = EnergyRun(osc, line, numbers, chosen, wanted, seed_of(rng))
     with working(progress, time_limit) as work:
         run.run()
         return run.record(work)
 
 
-def search_places(osc: Oscillator, line: ParameterLine, values: Array, search: Any) -> list[int]:
-    """Return the indices of the values to search at, that nearest to the scene's own first; errors as of the caller.
-
-    By default these are that one, the first and the last value at which there is a scene. One is enough where the
-    equations of exit paths do not depend on the parameter.
-    """
-    if search is None:
-        held = [place for place, value in enumerate(values) if not line.refusal(osc, value)]
-        nearest = sorted(held, key=lambda place: abs(values[place] - line.own))[:1]
-        ends = [*held[:1], *held[-1:]] if line.enters(osc, osc.model.hamiltonian) else []
-        return list(dict.fromkeys([*nearest, *ends]))
+def search_places(line: ParameterLine, values: Array, search: Any) -> list[int]:
+    """Return the indices of the values to search at, that nearest to the scene's own first; errors as of the caller."""
     found = []
     for value in ordered_values(f"{_CALLER}: search", search):
         place = int(np.argmin(np.abs(values - value)))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import itertools
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,30 +53,45 @@ class _Curve:
 
 @dataclasses.dataclass(eq=False)
 class EnergyRun:
-    """Searches at some places, follows to the other values, and keeps what each has found.
+    """Searches for exit paths at some values, follows the cheapest of each exit to the others, and keeps both.
 
-    `known` has structures that were found before, by their values, with the names of their attractors.
+    Attributes
+    ----------
+    wanted : sequence of int, optional
+        Indices of the values to search at. By default these are the one nearest to the scene's own, the first and the
+        last at which a state exists, and then the middle of each stretch where a state has no energy. One is enough
+        where the equations of exit paths do not depend on the parameter.
+    structure_at : callable
+        Returns the structure at a value, and the names of its attractors; by default it is searched for, and the names
+        are its own.
+    existing : mapping of str to collection of int, optional
+        The places where each state exists, by its name; by default a state may exist everywhere. Others are not left.
     """
 
     osc: Oscillator
     line: ParameterLine
     values: Array
     analyzer: LeastAction
-    places: list[int]
+    wanted: Sequence[int] | None
     seed: int
-    known: Mapping[float, tuple[Structure, tuple[str, ...]]] = dataclasses.field(default_factory=dict)
+    structure_at: Callable[[float], tuple[Structure, tuple[str, ...]]] | None = None
+    existing: Mapping[str, Collection[int]] | None = None
 
     def __post_init__(self) -> None:
         self.still = not self.line.enters(self.osc, self.osc.model.hamiltonian)  # a path is the same at all values
+        self.places: list[int] = []  # that were searched
+        self.structures: dict[int, tuple[Structure, tuple[str, ...]]] = {}  # by place
         self.curves: list[_Curve] = []
         self.findings: list[Finding] = []
         self.work = Stoppable("searched values")
 
     def run(self) -> None:
         """Search at each of the places, and follow new paths from there."""
-        with self.work as work, stage("searched values", unit="values", total=len(self.places)):
-            for place in self.places:
-                self._search(place)
+        waiting = list(self._first() if self.wanted is None else self.wanted)
+        with self.work as work, stage("searched values", unit="values"):
+            while waiting or (self.wanted is None and (waiting := self._further())):
+                self.places.append(waiting.pop(0))
+                self._search(self.places[-1])
                 advance()
         self.findings += work.findings
         if not (self.curves or work.stopped):
@@ -83,43 +99,76 @@ class EnergyRun:
             reasons = [*map(str, self.findings), *refused, "all paths lead from sets that are no orbits."]
             raise StructureError(f"no exit path was found at any searched value. {reasons[0]}")
 
+    def _held(self) -> list[int]:
+        """The places at which there is a scene."""
+        return [place for place, value in enumerate(self.values) if not self.line.refusal(self.osc, float(value))]
+
+    def _first(self) -> list[int]:
+        """The places that are searched in any case, that nearest to the scene's own value first."""
+        held = self._held() if self.existing is None else sorted({*itertools.chain(*self.existing.values())})
+        nearest = sorted(held, key=lambda place: abs(self.values[place] - self.line.own))[:1]
+        return list(dict.fromkeys(nearest if self.still else [*nearest, *held[:1], *held[-1:]]))
+
+    def _further(self) -> list[int]:
+        """The middle of a stretch where a state has no energy; none where searches at both of its ends found none."""
+        existing, count = self.existing, len(self.values)
+        if existing is None:
+            existing = dict.fromkeys((curve.source for curve in self.curves), self._held())
+        for source, places in existing.items():
+            known = {place for curve in self.curves if curve.source == source for place in curve.paths}
+            without = {-1, count, *self.places} - known
+            missing = [place for place in range(count) if place in places and place not in known | without]
+            for _, group in itertools.groupby(enumerate(missing), lambda pair: pair[1] - pair[0]):
+                stretch = [place for _, place in group]
+                if not {stretch[0] - 1, stretch[-1] + 1} <= without:
+                    return [stretch[len(stretch) // 2]]
+        return []
+
     def _search(self, place: int) -> None:
-        """Find the paths at a value, and follow those that are not known yet."""
+        """Find the paths at a value, and follow the cheapest of each exit unless it is known."""
         value = float(self.values[place])
         try:
             osc = self.line.at(self.osc, value)
-            structure, names = self._structure(osc, value)
+            structure, names = self.structures[place] = self._structure(osc, value)
             source = None if self.analyzer.source is None else label_of(self.analyzer.source, names)
             result = dataclasses.replace(self.analyzer, source=source).run(osc, structure)
         except VibrokitError as error:
             self.findings.append(Finding.of(Code.NOTHING_AT, value=value, reason=str(error)))
             return
-        branches = result.branches
-        with stage("exit paths", unit="paths", total=len(branches)):
-            for number, branch in enumerate(branches):
-                if not any(branch.path is other.path for other in branches[:number]):
+        least = dict[tuple[str, str], ActivationEnergy]()
+        for branch in sorted(result.branches, key=lambda branch: (branch.source, branch.value)):
+            exit_ = names[branch.source], goal_name(names, branch.target)
+            if self.existing is None or exit_[0] in self.existing:
+                least.setdefault(exit_, branch)
+        with stage("exit paths", unit="paths", total=len(least)):
+            for number, (exit_, branch) in enumerate(least.items()):
+                if not any(branch.path is other.path for other in list(least.values())[:number]):
                     attractor = structure.attractors[branch.source]
                     problem = ExitProblem(osc, structure, attractor, self.analyzer.exit, self.analyzer.stepper)
-                    exit_ = names[branch.source], goal_name(names, branch.target)
                     self._add(place, exit_, problem, branch, follow=result.complete)
                 advance()
         current().stop_again()
 
     def _structure(self, osc: Oscillator, value: float) -> tuple[Structure, tuple[str, ...]]:
         """The structure at a value, and the names of its attractors."""
-        if value in self.known:
-            return self.known[value]
-        structure = find_structure(osc, manifolds=False, rng=self.seed)
+        if self.structure_at is not None:
+            found = self.structure_at(value)
+        else:
+            structure = find_structure(osc, manifolds=False, rng=self.seed)
+            found = structure, structure.names
         current().stop_again()
-        return structure, structure.names
+        return found
 
     def _add(
         self, place: int, exit_: tuple[str, str], problem: ExitProblem, branch: ActivationEnergy, *, follow: bool
     ) -> None:
-        """Add the curve of a path, unless it is known, and follow it unless there is no time left."""
+        """Add the curve of a path, unless it is known, and follow it unless there is no time left or it is known."""
         try:
             path = FollowedPath.of(problem, branch)
-        except StructureError:
+        except StructureError as error:
+            self.findings.append(
+                Finding.of(Code.NOTHING_AT, value=float(self.values[place]), reason=str(error))
+            )  # fmt: skip
             return
         if any(place in curve.paths and path.is_same(curve.paths[place]) for curve in self.curves):
             return
@@ -167,9 +216,11 @@ class EnergyRun:
             path, slope, at, curve.step = tried, tried_slope, ahead, 2 * length
         try:
             path = path.completed()
-            self._check_distinct(curve, here, there, path)
+            joined = self._joins(curve, here, there, path)
         except StructureError as error:
             self._lost(curve, float(self.values[here]), end, str(error))
+            return False
+        if joined:
             return False
         self._keep(curve, there, path)
         return True
@@ -178,11 +229,14 @@ class EnergyRun:
     def _copy(curve: _Curve, here: int, there: int) -> None:
         curve.paths[there], curve.errors[there], curve.slopes[there] = curve.paths[here], curve.errors[here], 0.0
 
-    def _check_distinct(self, curve: _Curve, here: int, there: int, path: FollowedPath) -> None:
-        """Raise StructureError if a curve has become one that it differed from: nearby paths may be exchanged."""
+    def _joins(self, curve: _Curve, here: int, there: int, path: FollowedPath) -> bool:
+        """Whether a curve goes on as one that began there; StructureError if the two differ before that."""
         for other in self.curves:
-            if other is not curve and {here, there} <= set(other.paths) and path.is_same(other.paths[there]):
-                raise StructureError("it coincides with another path from there on.")
+            if other is not curve and there in other.paths and path.is_same(other.paths[there]):
+                if here in other.paths:  # nearby paths may be exchanged
+                    raise StructureError("it coincides with another path from there on.")
+                return True
+        return False
 
     def _lost(self, curve: _Curve, value: float, following: float, reason: str) -> None:
         """Note that a curve ends between two values."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.analyzer import WEAK
+from vibrokit.analyzers.analyzer import not_weak
 from vibrokit.analyzers.energy_continuation import search_places
 from vibrokit.analyzers.energy_run import EnergyRun
 from vibrokit.analyzers.graph.search import GraphSearch
@@ -19,6 +19,7 @@ from vibrokit.construction import called
 from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, stage, working
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
@@ -27,15 +28,18 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.labels import goal_of, label_of
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.stoppable import Stoppable
+from vibrokit.results.structure import Structure
 from vibrokit.results.sweep import Prefactor, Sweep
 from vibrokit.scene_file import scene_data
-from vibrokit.structure.continuation import ContinuationRun, request_of
+from vibrokit.structure.continuation import continuation
+from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.validation import check_means, seed_of
 from vibrokit.text_units import size_of
 
 _DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
 _NODES = (120, 120)  # of graphs, which propose paths here: their lower bounds are not asked for
+_SAME = 1e-5  # of the widths of the region: distance of two points that are one
 _ERROR = 0.2  # of a mean time: 25 exits
 _ALONG = (Code.BIFURCATION, Code.BRANCH_ENDS, Code.PATH_LOST, Code.LEAST_PATH_CHANGES, Code.NOTHING_AT)
 _VALUES = ("value", "error", "low", "high", "next")  # of the parameter, in findings of these codes
@@ -60,9 +64,10 @@ def sweep(
     """Follow steady states, activation energies and mean exit times of a scene along values of one parameter.
 
     The steady states are those of `continuation`, the energies those of `energy_continuation` with graphs of 120 × 120
-    nodes: a sweep has no lower bounds. The mean time is τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the
-    values at which paths are searched for, at a noise that makes ΔU/D = 5 there, and interpolated between them. States,
-    paths and mean times have the names of the branches.
+    nodes: a sweep has no lower bounds. Where a state exists and has no energy, paths are searched for anew. The mean
+    time is τ₀ exp(ΔU/D). Its prefactor τ₀ is found by simulation at the values at which paths are searched for, at a
+    noise that makes ΔU/D = 5 there, and interpolated between them. States, paths and mean times have the names of the
+    branches.
 
     A value at which the scene is refused is a gap. Along the noise intensity, states and energies are found once.
 
@@ -109,15 +114,17 @@ def sweep(
     size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit)
     numbers = size * ordered_values("sweep", values)
     wanted = energies and osc.noise is not None
-    searched = None if search is None else (size * ordered_values("sweep: search", search)).tolist()
-    places = search_places(osc, line, numbers, searched) if wanted else []
-    states = ContinuationRun(
-        osc, line, numbers.tolist(), request_of(region, starts, seed), thorough=numbers[places].tolist()
-    )
+    listed = None if search is None else (size * ordered_values("sweep: search", search)).tolist()
+    places = None if listed is None else search_places(line, numbers, listed)
     settings = {"parameter": line.argument, "values": numbers.tolist(), "unit": unit, "source": source, "rng": seed}
     with working(progress, time_limit) as work:
-        run = _Run(osc, line, numbers, places, source, states)
-        run.run()
+        states = continuation(
+            osc, line.argument, numbers.tolist(), region=region, starts=starts, cells=None, rng=seed
+        )  # fmt: skip
+        run = _Run(osc, line, numbers, states)
+        if wanted and states.complete:
+            run.find_paths(source, places)
+            run.find_prefactors()
         return run.record(work, settings)
 
 
@@ -128,29 +135,17 @@ class _Run:
     osc: Oscillator
     line: ParameterLine
     values: NDArray[np.float64]
-    places: list[int]  # of the values at which exits are searched for
-    source: int | str | None
-    search: ContinuationRun
-    states: Continuation | None = None
+    states: Continuation
+    search: EnergyRun | None = None
     paths: EnergyContinuation | None = None
-    complete: bool = False
     prefactors: list[Prefactor] = dataclasses.field(default_factory=list)
     findings: list[Finding] = dataclasses.field(default_factory=list)
 
-    def run(self) -> None:
-        """Find the steady states, the exit paths, and the prefactors of the mean times."""
-        with working() as work:
-            self.search.run()
-            self.states = self.search.record(work)
+    def __post_init__(self) -> None:
         self.complete = self.states.complete
-        if self.complete and self.places:
-            self._find_paths(self.states)
-        if self.complete and self.paths is not None:
-            self._find_prefactors(self.paths)
 
     def record(self, work: Work, settings: Mapping[str, Any]) -> Sweep:
         """Return the record of all that was found."""
-        assert self.states is not None
         declared = self.line.entry.declared
         found = Sweep(
             parameter=self.line.path, symbol=declared.symbol, unit=declared.unit, states=self.states,
@@ -163,7 +158,6 @@ class _Run:
 
     def _of_parts(self, size: float) -> Iterator[Finding]:
         """Yield what the parts found, in a unit; a path that was lost is named by the branch that it leaves."""
-        assert self.states is not None
         yield from (_in_unit(one, size) for one in self.states.findings)
         paths, names = self.paths, self.states.names
         if paths is None:
@@ -177,14 +171,22 @@ class _Run:
             elif finding.source is not None:
                 yield Finding.of(Code.REMARK, text=_in_unit(finding, size).sentence(paths.names))
 
-    def _find_paths(self, states: Continuation) -> None:
-        """Search for exit paths in the structures that are known, and follow them."""
+    def find_paths(self, source: int | str | None, places: list[int] | None) -> None:
+        """Search for exit paths where the states exist that are left, and follow them."""
+        names = self.states.names
+        labels = range(len(names)) if source is None else [label_of(source, names, "branch")]
+        existing = {
+            names[label]: [number for number, at in enumerate(self.states.states) if label in at.branches]
+            for label in labels
+        }
+        analyzer = LeastAction(
+            source=None if source is None else names[labels[0]], graph=GraphSearch(nodes=_NODES)
+        )  # fmt: skip
+        run = self.search = EnergyRun(
+            self.osc, self.line, self.values, analyzer, places, self.states.seed or 0,
+            structure_at=self._structure, existing=existing,
+        )  # fmt: skip
         try:
-            source = None if self.source is None else states.names[label_of(self.source, states.names, "branch")]
-            analyzer = LeastAction(source=source, graph=GraphSearch(nodes=_NODES))
-            run = EnergyRun(
-                self.osc, self.line, self.values, analyzer, self.places, states.seed or 0, self.search.structures
-            )
             with working() as work:
                 run.run()
                 self.paths = run.record(work)
@@ -192,11 +194,29 @@ class _Run:
         except StructureError as error:
             self.findings.append(Finding.of(Code.REMARK, text=str(error)))
 
-    def _find_prefactors(self, paths: EnergyContinuation) -> None:
+    def _structure(self, value: float) -> tuple[Structure, tuple[str, ...]]:
+        """The structure at a value, and the names of the branches of its attractors."""
+        states = self.states
+        structure = find_structure(
+            self.line.at(self.osc, value), region=states.settings["region"], starts=states.settings["starts"],
+            manifolds=False, rng=states.seed or 0,
+        )  # fmt: skip
+        (known,) = (at for at in states.states if at.value == value)
+        branches = dict(zip(known.attractors, known.branches, strict=True))
+        return structure, tuple(
+            f"{attractor.name} in no branch" if same is None else states.names[branches[same]]
+            for attractor in structure.attractors
+            for same in [_same(attractor, known.attractors, structure.basins.region.widths)]
+        )
+
+    def find_prefactors(self) -> None:
         """Simulate exits at the values at which paths were searched for."""
-        with Stoppable("mean times") as times, stage("mean times", unit="values", total=len(self.places)):
-            for place in self.places:
-                for name, result in self._simulated(paths, place):
+        if self.search is None or self.paths is None or not self.complete:
+            return
+        places = self.search.places
+        with Stoppable("mean times") as times, stage("mean times", unit="values", total=len(places)):
+            for place in places:
+                for name, result in self._simulated(self.paths, place):
                     if result.rates:
                         # The noise was chosen so that the energy is this many times D.
                         left = ExitRate.total(result.rates)
@@ -211,10 +231,8 @@ class _Run:
 
     def _simulated(self, paths: EnergyContinuation, place: int) -> Iterator[tuple[str, RatedResult]]:
         """Yield the exits from each branch whose energy is known at a value, at a noise that is strong enough."""
-        value = float(self.values[place])
-        if value not in self.search.structures:
-            return
-        structure, names = self.search.structures[value]
+        assert self.search is not None
+        structure, names = self.search.structures[place]
         left = {branch.source for branch in paths.branches}
         for label, name in enumerate(names):
             energy = float(paths.energy(name)[place]) if name in left else 0.0
@@ -222,12 +240,21 @@ class _Run:
                 continue
             analyzer = MFET(source=label, intensities=(energy / _DEPTH,), target_error=_ERROR)
             try:
-                result = analyzer.run(self.line.at(self.osc, value), structure)
+                result = analyzer.run(self.line.at(self.osc, float(self.values[place])), structure)
             except VibrokitError as error:
                 self.findings.append(Finding.of(Code.REMARK, text=str(error)))
                 continue
             if isinstance(result, RatedResult):
                 yield name, result
+
+
+def _same(attractor: Attractor, known: Sequence[Attractor], widths: NDArray[np.float64]) -> Attractor | None:
+    """Which of some attractors it is, in a region of these widths."""
+    for one in known:
+        away = np.abs(one.points[:, :2] - attractor.points[0, :2])
+        if (one.kind, one.period) == (attractor.kind, attractor.period) and (away < _SAME * widths).all(axis=1).any():
+            return one
+    return None
 
 
 def _in_unit(finding: Finding, size: float) -> Finding:
@@ -260,7 +287,5 @@ def _strong(found: Sweep) -> Iterator[Finding]:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = np.where(branch.action > 0, branch.action / found.intensity, np.inf)
         place = int(np.argmin(ratios))
-        if ratios[place] < WEAK and branch.source in found.names:
-            source, target = found.names.index(branch.source), goal_of(branch.target, found.names)
-            values = {"ratio": float(ratios[place]), "intensity": float(found.intensity[place]), "least": WEAK}
-            yield Finding.of(Code.NOISE_NOT_WEAK, source, target, **values)
+        source, target = found.names.index(branch.source), goal_of(branch.target, found.names)
+        yield from not_weak(source, target, float(branch.action[place]), float(found.intensity[place]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
-from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,7 +24,6 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.stoppable import Stoppable
-from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.grid import SETTLING, basin_fractions
@@ -133,17 +132,13 @@ def request_of(region: Any, starts: Any, seed: int, *, cells: Any = None, steppe
 
 @dataclasses.dataclass(eq=False)
 class ContinuationRun:
-    """Goes through the stages and keeps what each has found; arguments as of `continuation`.
-
-    At the values `thorough`, basins and saddles are found too, and the structures kept.
-    """
+    """Goes through the stages and keeps what each has found; arguments as of `continuation`."""
 
     osc: Oscillator
     line: ParameterLine
     values: list[float]
     request: Request
     executor: concurrent.futures.Executor | None = None
-    thorough: Collection[float] = ()
 
     def __post_init__(self) -> None:
         self.region = self.request.region
@@ -194,8 +189,7 @@ class ContinuationRun:
 
     def _search(self) -> None:
         """Search for the steady states at each value."""
-        thorough = self.values if self.still and self.thorough else self.thorough
-        tasks = [(self.osc, self.line, value, self.request, value in thorough) for value in self.values]
+        tasks = [(self.osc, self.line, value, self.request) for value in self.values]
         with (
             stage("values", unit="values", total=len(tasks)),
             contextlib.closing(self._each(searched_value, tasks)) as all_,
@@ -211,18 +205,6 @@ class ContinuationRun:
     def numbered(self) -> list[list[int]]:
         """The branch of each attractor, once the stages are over."""
         return self.tracing.numbered()
-
-    @property
-    def structures(self) -> dict[float, tuple[Structure, tuple[str, ...]]]:
-        """Where saddles were searched for, the structure and the names of the branches of its attractors."""
-        names = branch_names(self.tracing, self.numbered)
-        branches = dict(zip(self.tracing.values, self.numbered, strict=True))
-        found = {
-            at.value: (at.structure, tuple(names[branch] for branch in branches[at.value][: len(at.attractors)]))
-            for at in self.found
-            if at.structure is not None
-        }
-        return dict.fromkeys(self.values, next(iter(found.values()))) if self.still and found else found
 
     @cached_property
     def tracing(self) -> Tracing:

@@ -10,7 +10,6 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
-from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.grid import CELL_CODES
 from vibrokit.structure.find import structure_of
 from vibrokit.structure.parameter_values import ParameterLine
@@ -27,25 +26,18 @@ class SearchedValue:
     budget: int = 0
     findings: tuple[Finding, ...] = ()
     refused: bool = False  # whether there is no such scene, or none that can have attractors
-    structure: Structure | None = None  # where saddles were searched for
 
 
-def searched_value(
-    osc: Oscillator, line: ParameterLine, value: float, request: Request, thorough: bool
-) -> SearchedValue:
-    """Search for the steady states at a value; thoroughly, for their basins and saddles too."""
+def searched_value(osc: Oscillator, line: ParameterLine, value: float, request: Request) -> SearchedValue:
+    """Search for the steady states at a value."""
     if reason := line.refusal(osc, value):
         return SearchedValue(value, findings=(Finding.of(Code.NOTHING_AT, value=value, reason=reason),), refused=True)
     there = line.at(osc, value)
-    wanted = dataclasses.replace(request, cells=None, saddles=thorough)
     try:
-        structure = structure_of(there, wanted, basins=thorough)
+        structure = structure_of(there, dataclasses.replace(request, cells=None), basins=False)
     except VibrokitError as error:
         nothing = Finding.of(Code.NOTHING_AT, value=value, reason=str(error))
         return SearchedValue(value, findings=(nothing,), refused=there.model.undamped)
     # Basins are found once all attractors are known.
     findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
-    kept = structure if thorough else None
-    return SearchedValue(
-        value, structure.attractors, structure.basins.region, structure.budget, findings, structure=kept
-    )
+    return SearchedValue(value, structure.attractors, structure.basins.region, structure.budget, findings)
