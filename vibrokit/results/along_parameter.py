@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Mapping
 from typing import Any
 
 from vibrokit.results.arrays import Arrays
@@ -18,7 +19,7 @@ class AlongParameter(Record, ABC):
     Attributes
     ----------
     parameter : str
-        Path of the parameter, as in ``osc.parameters``.
+        Path of the parameter, as in ``osc.parameters``; that of the first if several are tied.
     symbol : str
         Its letter, as SymPy writes it.
     unit : str or None
@@ -30,9 +31,24 @@ class AlongParameter(Record, ABC):
     unit: str | None
 
     @property
+    def factors(self) -> dict[str, float]:
+        """Each parameter divided by the values, by its path: 1 for a single one, others where several are tied."""
+        given = self.settings.get("parameter")
+        return dict(given) if isinstance(given, Mapping) else {self.parameter: 1.0}
+
+    @property
+    def parameters_text(self) -> str:
+        """The parameter, or all that are tied: ``barriers.0.position = −barriers.1.position``."""
+        texts = []
+        for path, factor in self.factors.items():
+            sign, size = "−" * (factor < 0), abs(factor)
+            texts.append(f"{sign}{path}" if size == 1 else f"{sign}{path}/{size:g}")
+        return " = ".join(texts)
+
+    @property
     def axis_label(self) -> str:
         """Label of the parameter's axis, with symbol and unit."""
-        return parameter_text(self.parameter, self.symbol, self.unit)
+        return self.axis()[0]
 
     def axis(self, unit: str | None = None) -> tuple[str, float]:
         """Return the label of the parameter's axis in a unit, and the size of that unit in SI.
@@ -42,9 +58,9 @@ class AlongParameter(Record, ABC):
         ParameterError
             The parameter cannot be shown in this unit.
         """
-        if unit is None:
-            return self.axis_label, 1.0
-        return parameter_text(self.parameter, self.symbol, unit), size_of(unit, self.unit)
+        symbol = self.symbol if self.factors == {self.parameter: 1.0} else ""
+        label = parameter_text(self.parameters_text, symbol, unit or self.unit)
+        return label, 1.0 if unit is None else size_of(unit, self.unit)
 
     def parameter_variables(self) -> dict[str, Any]:
         """Return the arrays that hold the parameter."""

@@ -121,9 +121,8 @@ class Sweep(AlongParameter):
 
     def _along(self, path: str, own: float) -> Array:
         """A parameter of the scene at each value, given what it is in the scene."""
-        given = self.settings.get("parameter", self.parameter)
-        factors = {given: 1.0} if isinstance(given, str) else given
-        return factors[path] * self.values if path in factors else np.full(len(self.values), float(own))
+        factor = self.factors.get(path)
+        return np.full(len(self.values), float(own)) if factor is None else factor * self.values
 
     @property
     def searched(self) -> Array:
@@ -242,7 +241,7 @@ class Sweep(AlongParameter):
             (one.name, f"{one.first / scale:.8g} ({one.begins}) to {one.last / scale:.8g} ({one.ends})")
             for one in self.coexistence
         )
-        return Summary(f"Sweep of {self.parameter}{f' in {self.shown_in}' if self.shown_in else ''}", rows)
+        return Summary(f"Sweep of {self.parameters_text}{f' in {self.shown_in}' if self.shown_in else ''}", rows)
 
     @called
     def plot(self, ax: Any = None, unit: str | None = None) -> SweepArtists:
