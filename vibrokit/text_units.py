@@ -22,7 +22,6 @@ _SIZES: Mapping[str, Mapping[str, float]] = {
     },
     "rad": {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180},
 }  # fmt: skip
-_LENGTHS: Mapping[str, float] = {"m": 1e-2, "mm": 1e-5, "µm": 1e-8}  # least length (m) that is written in each
 _EXPONENT = re.compile(r"\^\(?([-+]?[0-9]+(?:/[0-9]+)?)\)?")
 _RAISED = str.maketrans("-0123456789/", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ᐟ")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -48,8 +47,8 @@ def parameter_text(path: str, symbol: str, unit: str | None) -> str:
 
 
 def length_unit(largest: float) -> str:
-    """Return the unit in which lengths (m) up to a largest one are read most easily."""
-    return next((unit for unit, least in _LENGTHS.items() if largest >= least), "nm" if largest > 0 else "m")
+    """Return the unit in which lengths (m) up to a largest one are read most easily: that is 0.01 at least."""
+    return _largest_unit(100 * largest, "m") or ("nm" if largest > 0 else "m")
 
 
 def size_of(unit: str, base: str | None) -> float:
@@ -69,9 +68,15 @@ def size_of(unit: str, base: str | None) -> float:
 
 def familiar(value: float, base: str | None) -> str:
     """Return a number in SI base units in the largest other unit in which it is 1 at least, such as ``"40 Hz"``."""
-    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if abs(value) >= size}
-    name = max(fitting, key=fitting.__getitem__, default="")
-    return "" if fitting.get(name, 1.0) == 1.0 else f"{value / fitting[name]:.6g} {name}"
+    name = _largest_unit(abs(value), base)
+    size = _SIZES[base or ""][name] if name else 1.0
+    return "" if size == 1.0 else f"{value / size:.6g} {name}"
+
+
+def _largest_unit(value: float, base: str | None) -> str:
+    """The largest unit that is not above a number in SI base units; empty if there is none."""
+    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if value >= size}
+    return max(fitting, key=fitting.__getitem__, default="")
 
 
 def number_in(text: str, base: str | None) -> tuple[float, str | None]:

@@ -27,20 +27,15 @@ def reproduce_paper(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     from vibrokit.cli.interrupts import Interrupts
     from vibrokit.progress import working
-    from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, publish
-    from vibrokit.reproduction.steps import steps
-    from vibrokit.reproduction.work import do
-    from vibrokit.results.atomic import made_folder
+    from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
 
-    folder, wanted = made_folder(options.output), steps(quick=options.quick)
     with Interrupts() as interrupts:
         with working(True, options.time_limit) as work:
             interrupts.stops(work)
-            records = do(wanted, folder)
+            report = reproduce(options.output, quick=options.quick)
         interrupts.finishing()
-        report = publish(records, wanted, folder)
         print("\n\n".join(table.text for table in report.tables if table.name == PUBLISHED))
-        print(folder / PAGE)
+        print(options.output / PAGE)
         if interrupts.requested:
             return interrupts.status
     return 0 if report.complete else 1

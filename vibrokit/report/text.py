@@ -108,7 +108,7 @@ def findings_text(findings: Sequence[Finding], names: Sequence[str] = ()) -> str
         for finding in (one for one in shown if one.severity is severity):
             advice = "" if severity is Severity.INFO else f" {finding.advice}"
             lines.append(f"{severity}: {finding.sentence(names)}{advice}".rstrip())
-    return "\n".join(dict.fromkeys(lines))
+    return "\n".join(lines)
 
 
 def stats_text(record: Record) -> str:

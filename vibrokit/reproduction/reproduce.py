@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 
 from vibrokit.construction import called
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.inline_svg import inline_svg
-from vibrokit.progress import Progress, working
+from vibrokit.progress import Progress, put_off, working
 from vibrokit.report.blocks import Chapter, Picture, Sentences, Table
 from vibrokit.report.chapters import work_chapter
 from vibrokit.report.report import Report
 from vibrokit.reproduction.comparison import verdicts
 from vibrokit.reproduction.figures import Figure, figures
 from vibrokit.reproduction.published import STATES
-from vibrokit.reproduction.steps import Step, steps
+from vibrokit.reproduction.steps import steps
 from vibrokit.reproduction.verdicts import Match, Verdict
 from vibrokit.reproduction.work import Records, do
 from vibrokit.results.atomic import made_folder
@@ -61,14 +60,10 @@ def reproduce(
     target, wanted = made_folder(folder), steps(quick=quick)
     with working(progress, time_limit):
         records = do(wanted, target)
-    return publish(records, wanted, target)
-
-
-def publish(records: Records, wanted: Sequence[Step], folder: Path) -> Report:
-    """Write figures, tables and the page of the records that are there; return the report."""
-    report = _report(records, complete=sum(map(len, records.values())) == len(wanted), folder=folder)
-    report.save(folder / PAGE)
-    report.save_tables(folder)
+        with put_off():
+            report = _report(records, complete=sum(map(len, records.values())) == len(wanted), folder=target)
+            report.save(target / PAGE)
+            report.save_tables(target)
     return report
 
 

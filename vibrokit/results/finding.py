@@ -93,13 +93,16 @@ def _named(label: int | None, names: Sequence[str]) -> str:
 
 
 def together(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings to show: those that differ in numbers only, at several noise intensities, as one with ranges."""
+    """Return findings to show, each sentence once.
+
+    Those that differ in numbers only, at several noise intensities, become one with ranges.
+    """
     groups: dict[str, list[Finding]] = {}
     for one in findings:
         ranged = "intensity" in one.values
         fixed = {name: value for name, value in one.values.items() if not (ranged and _is_number(value))}
         groups.setdefault(repr((one.code, one.source, one.target, fixed)), []).append(one)
-    return [_with_ranges(group) for group in groups.values()]
+    return list({one.sentence(): one for one in map(_with_ranges, groups.values())}.values())
 
 
 def _with_ranges(group: Sequence[Finding]) -> Finding:
