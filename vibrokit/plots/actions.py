@@ -16,11 +16,12 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new, colour
+from vibrokit.plots.axes import axes_or_new, colour, scientific
 
 _PARTS = 360
 _SHOWN = 10.0  # times the least action, up to which colours tell actions apart
 _COLOURS = "viridis"
+_ANGLE, _ACTION = r"angle of the start $\theta$ (°)", r"action at the exit $S$ (m$^2$ s$^{-3}$)"
 _BELOW = 1.4  # the axis begins at the least action divided by this: room for the numbers under the lines
 _TOP = 300.0  # times the largest energy, up to which actions are shown
 
@@ -29,19 +30,7 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ActionPlotArtists(Artists):
-    """Actions against the angle of the start.
-
-    Attributes
-    ----------
-    ax : Axes
-    starts : tuple of Line2D
-        The points of each attractor.
-    least : tuple of Line2D
-        The least action of all radii, for each attractor whose starts have several radii.
-    energies : tuple of Line2D
-    numbers : tuple of Annotation
-        The value of each energy.
-    """
+    """Starts of each attractor, the `least` action where they have several radii, energies and their `numbers`."""
 
     starts: tuple[Line2D, ...]
     least: tuple[Line2D, ...]
@@ -51,19 +40,7 @@ class ActionPlotArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ActionMapArtists(Artists):
-    """Actions over the fundamental domain.
-
-    Attributes
-    ----------
-    ax : Axes
-    others : Line2D
-        Starts whose paths found no exit.
-    starts : PathCollection
-        Starts whose paths found one.
-    best : Line2D or None
-        The one of least action.
-    colorbar : Colorbar
-    """
+    """`starts` of paths that found an exit, `others` that found none, and the `best`, whose action is the least."""
 
     others: Line2D
     starts: PathCollection
@@ -118,18 +95,16 @@ def action_plot(
     lines = [axes.axhline(value, color=colour(label), linewidth=0.8) for label, value in energies]
     numbers = [
         axes.annotate(
-            rf"$\Delta U = {_scientific(value)}$", (360, value), ha="right", va="top", fontsize=8,
+            rf"$\Delta U = {scientific(value)}$", (360, value), ha="right", va="top", fontsize=8,
             xytext=(-3, -2), textcoords="offset points", color=colour(label),
         )
         for label, value in energies
     ]  # fmt: skip
     axes.set_yscale("log")
-    axes.set_xlim(0, 360)
     low, high = axes.get_ylim()
     axes.set_ylim(low / _BELOW, min(high, max((_TOP * value for _, value in energies), default=high)))
-    axes.set_xlabel(r"angle of the start $\theta$ (°)")
-    axes.set_ylabel(r"action at the exit $S$ (m$^2$ s$^{-3}$)")
-    axes.xaxis.set_major_locator(MultipleLocator(60))
+    axes.set_ylabel(_ACTION)
+    _angle_axis(axes)
     if starts:
         for sample in axes.legend(handles=starts, loc="upper right", fontsize=8).legend_handles:
             if isinstance(sample, Line2D):
@@ -174,20 +149,18 @@ def action_map(
             np.degrees(theta[order[-1]]), r[order[-1]], "o", markersize=9, markerfacecolor="none",
             markeredgecolor="black", zorder=3,
         )  # fmt: skip
-    bar = axes.figure.colorbar(points, ax=axes, extend="max", pad=0.02)
-    bar.set_label(r"action at the exit $S$ (m$^2$ s$^{-3}$)")
-    axes.set_xlim(0, 360)
+    bar = axes.figure.colorbar(points, ax=axes, extend="max", pad=0.02, label=_ACTION)
+    _angle_axis(axes)
     axes.set_ylim(*((0, 1) if r.any() else (-0.5, 0.5)))
-    axes.xaxis.set_major_locator(MultipleLocator(60))
-    axes.set_xlabel(r"angle of the start $\theta$ (°)")
     axes.set_ylabel("radius of the start (log scale, 0 to 1)")
     axes.set_title(f"leaving {name}" if name else "", fontsize=10)
     return ActionMapArtists(axes, others, points, best, bar)
 
 
-def _scientific(value: float) -> str:
-    mantissa, exponent = f"{value:.3e}".split("e")
-    return rf"{mantissa} \times 10^{{{int(exponent)}}}"
+def _angle_axis(axes: Axes) -> None:
+    axes.set_xlim(0, 360)
+    axes.set_xlabel(_ANGLE)
+    axes.xaxis.set_major_locator(MultipleLocator(60))
 
 
 def _least_by_angle(angle: Array, action: Array) -> tuple[Array, Array]:

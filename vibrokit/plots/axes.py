@@ -78,6 +78,12 @@ def add_legend(ax: Axes, given: Axes | None, handles: Sequence[Any]) -> None:
             sample.set_linewidth(max(1.0, sample.get_linewidth()))
 
 
+def scientific(value: float) -> str:
+    """Return a number with a power of ten, as mathematics in a text of Matplotlib."""
+    mantissa, _, exponent = f"{value:.3e}".partition("e")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
 def named(artists: Iterable[Any]) -> list[Any]:
     """Return the artists that have a name for the legend."""
     return [artist for artist in artists if artist.get_label() and not str(artist.get_label()).startswith("_")]

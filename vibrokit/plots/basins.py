@@ -49,18 +49,7 @@ _SADDLE_MARKERS: Mapping[str, Style] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BasinArtists(Artists):
-    """Basins and attractors.
-
-    Attributes
-    ----------
-    ax : Axes
-    image : AxesImage
-        The cells.
-    hatching : Rectangle or None
-        Seen where motion leaves the region.
-    attractors : tuple of Line2D
-        The markers of each attractor.
-    """
+    """The `image` of the cells, `hatching` where motion leaves the region, and the markers of the `attractors`."""
 
     image: AxesImage
     hatching: Rectangle | None
@@ -69,19 +58,7 @@ class BasinArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SectionArtists(BasinArtists):
-    """Basins, attractors, saddles and manifolds.
-
-    Attributes
-    ----------
-    ax, image, hatching, attractors
-        As in `BasinArtists`.
-    stable, unstable : tuple of Line2D
-        Branches of the manifolds.
-    cycles : tuple of Line2D
-        Limit cycles.
-    saddles : tuple of Line2D
-        The markers of each saddle.
-    """
+    """Also branches of `stable` and `unstable` manifolds, limit cycles as curves, and the markers of the `saddles`."""
 
     stable: tuple[Line2D, ...]
     unstable: tuple[Line2D, ...]

@@ -28,16 +28,7 @@ _OTHER_MARKS = ("^", "<", ">", "h", "d", "X")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BifurcationArtists(Artists):
-    """A bifurcation diagram.
-
-    Attributes
-    ----------
-    ax : Axes
-    branches : tuple of Line2D
-        The points of each branch, in the order of their numbers.
-    marks : tuple of Line2D
-        Bifurcations, kind by kind: one for those with an x, and one for each without.
-    """
+    """Points of each branch; `marks` of bifurcations kind by kind: one for those with an x, one for each without."""
 
     branches: tuple[Line2D, ...]
     marks: tuple[Line2D, ...]
@@ -45,16 +36,7 @@ class BifurcationArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FractionArtists(Artists):
-    """Basin fractions.
-
-    Attributes
-    ----------
-    ax : Axes
-    areas : tuple of PolyCollection
-        The area of each branch.
-    remainder : PolyCollection or None
-        What leads to none of the branches; None if it vanishes.
-    """
+    """The area of each branch, and what leads to none of them, if that does not vanish."""
 
     areas: tuple[PolyCollection, ...]
     remainder: PolyCollection | None

@@ -23,15 +23,7 @@ _LABELS = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MarginalArtists(Artists):
-    """Marginal densities.
-
-    Attributes
-    ----------
-    ax : Axes
-    lines : tuple of Line2D
-        One for each time.
-    legend : Legend
-    """
+    """A line for each time."""
 
     lines: tuple[Line2D, ...]
     legend: Legend
@@ -58,34 +50,19 @@ def marginal_lines(
     for number, (time, density) in enumerate(zip(moments, np.asarray(densities), strict=True)):
         shade = shades(0.9 * number / max(len(moments) - 1, 1))
         lines += ax.plot(places, density, color=shade, label=f"$t$ = {time:.4g} s")
-    ax.set_xlabel(_LABELS[axis][0])
-    ax.set_ylabel(_LABELS[axis][1])
-    ax.set_ylim(bottom=0.0)
-    return MarginalArtists(ax, tuple(lines), ax.legend(fontsize=8, frameon=False))
+    return MarginalArtists(ax, tuple(lines), _label(ax, axis))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DensityArtists(Artists):
-    """A density on the section.
-
-    Attributes
-    ----------
-    ax : Axes
-    image : QuadMesh
-    """
+    """Shades."""
 
     image: QuadMesh
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SampledArtists(Artists):
-    """A density and a sample.
-
-    Attributes
-    ----------
-    ax : Axes
-    line, dots : Line2D
-    """
+    """The density as a `line`, the sample as `dots`."""
 
     line: Line2D
     dots: Line2D
@@ -110,10 +87,7 @@ def sampled_density(
     (dots,) = axes.plot(
         (edges[1:] + edges[:-1]) / 2, shares, ".", color=colour(1), markersize=4, label=f"{np.size(sample)} simulations"
     )
-    axes.set_xlabel(_LABELS["x"][0])
-    axes.set_ylabel(_LABELS["x"][1])
-    axes.set_ylim(bottom=0.0)
-    axes.legend(fontsize=8, frameon=False)
+    _label(axes, "x")
     return SampledArtists(axes, line, dots)
 
 
@@ -130,8 +104,14 @@ def density_map(x: ArrayLike, v: ArrayLike, density: ArrayLike, *, ax: Axes | No
     """
     axes = axes_or_new(ax)
     image = axes.pcolormesh(x, v, np.transpose(density), cmap="magma_r", shading="nearest", rasterized=True)
-    figure = axes.get_figure(root=True)
-    if figure is not None:
-        figure.colorbar(image, ax=axes, label=r"density $p$ (s m$^{-2}$)")
+    axes.figure.colorbar(image, ax=axes, label=r"density $p$ (s m$^{-2}$)")
     phase_plane(axes)
     return DensityArtists(axes, image)
+
+
+def _label(axes: Axes, axis: str) -> Legend:
+    """Label the axes of a density of x or of v; return the legend."""
+    across, up = _LABELS[axis]
+    axes.set(xlabel=across, ylabel=up)
+    axes.set_ylim(bottom=0.0)
+    return axes.legend(fontsize=8, frameon=False)

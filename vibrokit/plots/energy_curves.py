@@ -18,14 +18,7 @@ _STYLES = ("-", "--", ":", "-.")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class EnergyCurveArtists(Artists):
-    """Actions of exit paths along a parameter.
-
-    Attributes
-    ----------
-    ax : Axes
-    curves : tuple of Line2D
-        One for each path.
-    """
+    """A curve for each path."""
 
     curves: tuple[Line2D, ...]
 

@@ -12,28 +12,14 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new, colour
+from vibrokit.plots.axes import axes_or_new, colour, draw, phase_plane
 
 _CELLS = 120  # along each side, of the density
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class EscapeArtists(Artists):
-    """Realizations on their way out.
-
-    Attributes
-    ----------
-    ax : Axes
-    density : QuadMesh
-        How many samples of all realizations are in each cell.
-    lines : LineCollection
-        The realizations.
-    path : Line2D or None
-        The path that was given.
-    ends : Line2D
-        Where they leave.
-    attractors, saddles : tuple of Line2D
-    """
+    """Samples in each cell, realizations and where they leave, the `path` that was given, attractors and saddles."""
 
     density: QuadMesh
     lines: LineCollection
@@ -73,16 +59,10 @@ def escapes(
     )
     axes.add_collection(lines)
     (ends,) = axes.plot(paths[:, -1, 0], paths[:, -1, 1], ".", color="0.2", markersize=4)
-    drawn = None
-    if path is not None:
-        curve = np.asarray(path, dtype=float)
-        (drawn,) = axes.plot(curve[:, 0], curve[:, 1], color="crimson", linewidth=1.6)
-    known = tuple(
-        axes.plot(own[:, 0], own[:, 1], "o", color=colour(label), markeredgecolor="white", markersize=7)[0]
-        for label, own in enumerate(points)
-    )
-    crosses = tuple(axes.plot(own[:, 0], own[:, 1], "x", color="black", markersize=6)[0] for own in saddles)
-    axes.set_xlabel("displacement $x$ (m)")
-    axes.set_ylabel("velocity $v$ (m s$^{-1}$)")
+    drawn = None if path is None else draw(axes, path, color="crimson", linewidth=1.6)
+    dots = {"linestyle": "none", "marker": "o", "markeredgecolor": "white", "markersize": 7}
+    known = tuple(draw(axes, own, color=colour(label), **dots) for label, own in enumerate(points))
+    crosses = tuple(draw(axes, own, linestyle="none", marker="x", color="black", markersize=6) for own in saddles)
+    phase_plane(axes)
     axes.figure.colorbar(density, ax=axes, label="log$_{10}$ of the samples in a cell")
     return EscapeArtists(axes, density, lines, drawn, ends, known, crosses)

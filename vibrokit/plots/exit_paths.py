@@ -27,18 +27,7 @@ _LONE_DOTS: Mapping[str, Any] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExitPathArtists(Artists):
-    """Exit paths over the section.
-
-    Attributes
-    ----------
-    ax : Axes
-    section : SectionArtists
-        What lies under the paths.
-    strands : tuple of tuple of Line2D
-        The lines or dots of each path.
-    starts, ends : tuple of Line2D
-        The markers at both ends of each path.
-    """
+    """The `section` under the paths, the lines or dots of each path, and the markers at both of its ends."""
 
     section: SectionArtists
     strands: tuple[tuple[Line2D, ...], ...]
@@ -48,17 +37,7 @@ class ExitPathArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HistoryArtists(Artists):
-    """Momentum and action along exit paths.
-
-    Attributes
-    ----------
-    ax : Axes
-        The upper axes of the first path.
-    momenta, actions : tuple of Line2D
-        The line of each path.
-    momentum_points, action_points : tuple of Line2D
-        The samples on the section of each path.
-    """
+    """Lines of each path, and its samples on the section; `ax` are the upper axes of the first path."""
 
     momenta: tuple[Line2D, ...]
     momentum_points: tuple[Line2D, ...]

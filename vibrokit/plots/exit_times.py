@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import DASHES, axes_or_new, colour, mark, named, span
+from vibrokit.plots.axes import DASHES, MARKS, axes_or_new, colour, mark, named, span
 
 _FILLS = ("none", "full", "left", "bottom", "right", "top")
 _POINTS: dict[str, Any] = {"marker": "o", "markersize": 4.5, "capsize": 2.5, "linewidth": 1.0}
@@ -69,15 +69,7 @@ class ArrheniusLine:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExitTimeArtists(Artists):
-    """Mean exit times.
-
-    Attributes
-    ----------
-    ax : Axes
-    points : tuple of ErrorbarContainer
-        One for each exit.
-    legend : Legend or None
-    """
+    """Points of each exit."""
 
     points: tuple[ErrorbarContainer, ...]
     legend: Legend | None
@@ -85,19 +77,7 @@ class ExitTimeArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SlopeArtists(Artists):
-    """Local slopes of ln τ.
-
-    Attributes
-    ----------
-    ax : Axes
-    points : tuple of ErrorbarContainer
-        One for each exit that has two intensities or more.
-    limits : tuple of Line2D
-        Activation energies.
-    bounds : tuple of Rectangle
-        What lies between their bounds.
-    legend : Legend or None
-    """
+    """Points of each exit with two intensities or more; activation energies, and what lies between their `bounds`."""
 
     points: tuple[ErrorbarContainer, ...]
     limits: tuple[Line2D, ...]
@@ -107,17 +87,7 @@ class SlopeArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ReconciliationArtists(Artists):
-    """Mean exit times by several methods.
-
-    Attributes
-    ----------
-    ax : Axes
-    points : tuple of ErrorbarContainer
-        One for each exit and method.
-    lines : tuple of Line2D
-        Of slope ΔU, one for each exit with an energy.
-    legend : Legend or None
-    """
+    """Points of each exit and method; a line of slope ΔU for each exit with an energy."""
 
     points: tuple[ErrorbarContainer, ...]
     lines: tuple[Line2D, ...]
@@ -162,7 +132,7 @@ def reconciled_times(
     ax : matplotlib Axes, optional
     """
     axes = axes_or_new(ax, width=7.0, height=4.8)
-    markers = dict(zip(dict.fromkeys(methods), itertools.cycle("osD^vP*X")))
+    markers = dict(zip(dict.fromkeys(methods), itertools.cycle(MARKS)))
     points, drawn, places = list[ErrorbarContainer](), list[Line2D](), list[float]()
     for one, method in zip(exits, methods, strict=True):
         inverse, log_times, errors = one.in_order()

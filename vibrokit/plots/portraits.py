@@ -19,14 +19,7 @@ _DENSE = 20_000  # samples of a line above which it is drawn thin, as pixels
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PortraitArtists(Artists):
-    """A trajectory in the phase plane.
-
-    Attributes
-    ----------
-    ax : Axes
-    line : Line2D
-    stops : tuple of Line2D
-    """
+    """The `line` of a trajectory, and the `stops`."""
 
     line: Line2D
     stops: tuple[Line2D, ...]
@@ -34,18 +27,7 @@ class PortraitArtists(Artists):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MotionArtists(Artists):
-    """Steady motions in the phase plane.
-
-    Attributes
-    ----------
-    ax : Axes
-    orbits, points : tuple of Line2D
-        The line and the markers of each motion.
-    stops : tuple of Line2D
-        The face of each stop.
-    walls : tuple of Rectangle
-        The hatched part behind each stop.
-    """
+    """Orbit and section points of each motion; the face of each stop and the hatched part behind it."""
 
     orbits: tuple[Line2D, ...]
     points: tuple[Line2D, ...]

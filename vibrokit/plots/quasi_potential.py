@@ -29,19 +29,7 @@ _PATH: dict[str, Any] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class QuasiPotentialArtists(Artists):
-    """A quasi-potential on the section.
-
-    Attributes
-    ----------
-    ax : Axes
-    image : AxesImage
-    contours : QuadContourSet or None
-        None if the quasi-potential is flat or unknown.
-    attractor : Line2D
-    others, saddles, paths : tuple of Line2D
-        The markers of each.
-    colorbar : Colorbar
-    """
+    """Shades and level lines, which a flat or unknown potential has not; markers of attractors, saddles and `paths`."""
 
     image: AxesImage
     contours: QuadContourSet | None

@@ -28,17 +28,7 @@ _LINE = 40  # characters that have room beside the mass
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SceneArtists(Artists):
-    """A scene.
-
-    Attributes
-    ----------
-    ax : Axes
-    mass : Rectangle
-    spring : Line2D
-    damper : tuple of Line2D
-    stops : tuple of Rectangle
-    texts : tuple of Text
-    """
+    """The parts of a scene."""
 
     mass: Rectangle
     spring: Line2D

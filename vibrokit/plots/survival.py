@@ -17,16 +17,7 @@ from vibrokit.plots.axes import axes_or_new, colour
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SurvivalArtists(Artists):
-    """The share of walkers that have not left.
-
-    Attributes
-    ----------
-    ax : Axes
-    steps : Line2D
-        The share that was seen.
-    law : Line2D
-        The exponential law with the mean that was estimated.
-    """
+    """The share that was seen, in `steps`, and the exponential `law` with the mean that was estimated."""
 
     steps: Line2D
     law: Line2D

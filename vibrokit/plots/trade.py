@@ -18,16 +18,7 @@ _FLOOR = 1e-17  # an error of exactly 0 would have no place on a logarithmic axi
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TradeArtists(Artists):
-    """Work and precision.
-
-    Attributes
-    ----------
-    ax : Axes
-    ensembles, spreads, alone : tuple
-        For each stepper: the line of ensembles, the shade up to the 90 % quantile, the line of single trajectories.
-    defaults : tuple of Line2D
-        Rings around the default settings.
-    """
+    """For each stepper: ensembles, `spreads` up to the 90 % quantile, single trajectories; rings around `defaults`."""
 
     ensembles: tuple[Line2D, ...]
     spreads: tuple[PolyCollection, ...]

@@ -14,16 +14,16 @@ from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
+from vibrokit.results.attractor import Attractor, attractor_variables, read_attractors
 from vibrokit.results.basins import UNSETTLED, read_region, region_variables
-from vibrokit.results.bifurcation import BIFURCATIONS, Bifurcation
-from vibrokit.results.fields import LARGEST, STATE, Field, Length, Number, Variable, Vectors, Whole, Word
+from vibrokit.results.bifurcation import Bifurcation
+from vibrokit.results.fields import LARGEST, Field, Number, Variable, Whole, Word
 from vibrokit.results.labels import label_of
 from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
 from vibrokit.results.region import Region
 from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.summary import Summary
-from vibrokit.results.table import Table
+from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.bifurcation import BifurcationArtists, FractionArtists
@@ -35,7 +35,7 @@ class _Findings(Field):
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         texts = [json_text(findings_data(findings)) for findings in values]
-        yield name, ((record,), np.array(texts, dtype=str), {"long_name": "findings at the value, as JSON"})
+        yield name, ((record,), np.array(texts, dtype=str), {"long_name": self.long_name})
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
         return [findings_from(json_data(text)) for text in arrays.words(name, (arrays.size(record),))]
@@ -43,13 +43,16 @@ class _Findings(Field):
 
 _STATES = Table(
     "value",
-    {"value": Number("value of the parameter", "", -LARGEST, LARGEST), "findings": _Findings()},
+    {
+        "value": Number("value of the parameter", "", -LARGEST, LARGEST),
+        "findings": _Findings("findings at the value, as JSON"),
+    },
     index="value",
 )
 _ATTRACTORS = Table(
     "attractor",
     {
-        **ATTRACTOR_FIELDS,
+        **fields_of(Attractor),
         "label": Whole("label of the attractor at its value; negative if none was given", low=UNSETTLED),
         "basin_fraction": Number("share of the region's cells that lead to the attractor; NaN if it is not known"),
         "basin_fraction_error": Number("standard error of the share"),
@@ -59,18 +62,7 @@ _OWNERS = Table(
     "attractor", {"at": Whole("place of the value at which it exists"), "branch": Whole("number of its branch")}
 )
 _BRANCHES = Table("branch", {"name": Word("name of the branch")})
-_MARKS = Table(
-    "bifurcation",
-    {
-        "kind": Word("kind of the bifurcation", known=BIFURCATIONS),
-        "value": Number("value of the parameter at the bifurcation", "", -LARGEST, LARGEST),
-        "error": Number("error of the value", "", 0.0, LARGEST),
-        "branch": Whole("number of the branch"),
-        "period": Whole("period of the orbit in forcing periods", low=1),
-        "point": Vectors(Length("point", "points"), STATE),
-        "side": Word("side of the stop that is grazed", known=("", "left", "right")),
-    },
-)
+_MARKS = Table("bifurcation", fields_of(Bifurcation))
 
 
 class Continuation(AlongParameter):

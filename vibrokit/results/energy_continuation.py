@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 import xarray
@@ -14,9 +14,9 @@ from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.fields import LARGEST, Word
+from vibrokit.results.fields import LARGEST
 from vibrokit.results.summary import Summary
-from vibrokit.results.table import Table
+from vibrokit.results.table import Table, documented, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.energy_curves import EnergyCurveArtists
@@ -24,27 +24,16 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class EnergyBranch:
-    """An exit path followed along a parameter; NaN in its arrays where it is not known.
+    """An exit path followed along a parameter; NaN in its arrays, of a number for each value, where it is not known."""
 
-    Attributes
-    ----------
-    source, target : str
-        Names of the attractors between which it leads, ``"exit"`` or ``"escape"`` for a target that is no attractor.
-    action : array (values,)
-        In m² s⁻³.
-    error : array (values,)
-        Numerical error of the action, by the certificate of the path.
-    derivative : array (values,)
-        Derivative of the action in the parameter.
-    """
-
-    source: str
-    target: str
-    action: Array
-    error: Array
-    derivative: Array
+    source: Annotated[str, "name of the attractor that is left"]
+    target: Annotated[str, 'name of the attractor that is reached; "exit" or "escape" if it is none']
+    action: Annotated[Array, "action of the path (m² s⁻³)"]
+    error: Annotated[Array, "numerical error of the action, by the certificate of the path"]
+    derivative: Annotated[Array, "derivative of the action in the parameter"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,13 +53,7 @@ class LeastPathChange:
     after: int
 
 
-_BRANCHES = Table(
-    "branch",
-    {
-        "source": Word("attractor that is left"),
-        "target": Word("attractor that is reached"),
-    },
-)
+_BRANCHES = Table("branch", fields_of(EnergyBranch))
 _ARRAYS = {"action": "action of the path", "error": "numerical error", "derivative": "derivative in the parameter"}
 
 

@@ -11,6 +11,7 @@ import dataclasses
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -31,8 +32,14 @@ def _about(long_name: str, units: str = "1") -> dict[str, Any]:
     return {"long_name": long_name, "units": units} if units else {"long_name": long_name}
 
 
+@dataclasses.dataclass(frozen=True)
 class Field(ABC):
     """One attribute of many records. In every method `record` is their dimension and `name` that of the array."""
+
+    noun: ClassVar[str] = ""  # the type of the attribute, if the annotation does not tell it
+
+    long_name: str
+    units: str = "1"
 
     @abstractmethod
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
@@ -48,9 +55,6 @@ class Scalar(Field):
     """A value of each record. Abstract."""
 
     dtype: ClassVar[type] = float
-
-    long_name: str
-    units: str = "1"
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         yield name, ((record,), np.array(values, dtype=self.dtype), _about(self.long_name, self.units))
@@ -95,20 +99,23 @@ class Flag(Scalar):
 
 @dataclasses.dataclass(frozen=True)
 class Word(Scalar):
-    """A text; one of `known`, if that is given."""
+    """A text; one of `known`, if that is given, which may be an enumeration."""
 
     dtype: ClassVar[type] = str
 
     units: str = ""
-    known: tuple[str, ...] = ()
+    known: tuple[str, ...] | type[StrEnum] = ()
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        return arrays.words(name, (arrays.size(record),), self.known)
+        words = arrays.words(name, (arrays.size(record),), tuple(self.known))
+        return words if isinstance(self.known, tuple) else [self.known(word) for word in words]
 
 
 @dataclasses.dataclass(frozen=True)
 class BySide(Scalar):
     """A number, 0 or more, for each side of the mass; NaN on a side without a stop."""
+
+    noun: ClassVar[str] = "dict of str to float"
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         rows = np.array([[value.get(side, np.nan) for side in SIDES] for value in values], dtype=float)
@@ -124,9 +131,9 @@ class BySide(Scalar):
 class ByName(Field):
     """A number by name for each record; NaN where a record has none. The names of all records are a coordinate."""
 
-    what: str  # is named
-    long_name: str
-    units: str
+    noun: ClassVar[str] = "dict of str to float"
+
+    what: str = ""  # is named
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         dimension = f"{record}_{self.what}"
@@ -183,13 +190,13 @@ class Length:
 
 @dataclasses.dataclass(frozen=True)
 class Series(Field):
-    """An array of finite numbers; whole ones from `low` on if `whole`."""
+    """An array of finite numbers; with `low`, of whole ones from that on, which may be listed as a tuple."""
 
-    length: Length
-    long_name: str
-    units: str = "1"
-    whole: bool = False
-    low: int = 0
+    noun: ClassVar[str] = "array (count,)"
+
+    length: Length = dataclasses.field(kw_only=True)
+    low: int | None = None
+    listed: bool = False
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         pieces = [np.asarray(value, dtype=float) for value in values]
@@ -198,21 +205,22 @@ class Series(Field):
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
         pieces = self.length.take(arrays, record, name, finite=True)
-        if not self.whole:
+        if self.low is None:
             return pieces
         for piece in pieces:
             if not np.all((piece == np.floor(piece)) & (piece >= self.low) & (piece <= LARGEST_WHOLE)):
                 raise ResultFileError(f"its array {name!r} holds numbers that are not whole, or below {self.low}")
-        return [piece.astype(np.int64) for piece in pieces]
+        wholes = [piece.astype(np.int64) for piece in pieces]
+        return [tuple(whole.tolist()) for whole in wholes] if self.listed else wholes
 
 
 @dataclasses.dataclass(frozen=True)
 class Spectrum(Field):
     """An array of complex numbers, real and imaginary parts apart; `finite`: neither NaN nor infinity."""
 
-    length: Length
-    long_name: str
-    units: str = "1"
+    noun: ClassVar[str] = "complex array (count,)"
+
+    length: Length = dataclasses.field(kw_only=True)
     finite: bool = True
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
@@ -268,8 +276,11 @@ STATE = Columns(PLANE.first, Column("state", "state of the noise"))
 class Vectors(Field):
     """An array (length, n) of finite vectors, each column an array of its own."""
 
-    length: Length
-    columns: Columns
+    noun: ClassVar[str] = "array (count, n)"
+
+    units: str = ""
+    length: Length = dataclasses.field(kw_only=True)
+    columns: Columns = dataclasses.field(kw_only=True)
     prefixed: bool = True  # whether the names of the arrays contain that of the attribute
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import counted
+from vibrokit.results.fields import PLANE, Length, Vectors, Whole
 from vibrokit.results.sentenced import Sentenced
+from vibrokit.results.table import documented
 
 
 class ManifoldEnd(Sentenced):
@@ -24,31 +27,23 @@ class ManifoldEnd(Sentenced):
     TOO_EXTREME = "too-extreme", "The multiplier of the saddle is too extreme to follow the branch over one period."
 
 
+_CURVE = Vectors(
+    "(x, v) along the branch, outwards from the saddle",
+    length=Length("vertex", "vertices", ragged=True), columns=PLANE, prefixed=False,
+)  # fmt: skip
+
+
+@documented
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Manifold:
-    """One branch of a manifold on the section.
+    """One branch of a manifold on the section."""
 
-    Attributes
-    ----------
-    saddle : int
-        Place of its saddle among those of the structure.
-    point : int
-        Which of the saddle's points it starts from.
-    stable : bool
-    side : int
-        +1 or −1: along the eigenvector or against it.
-    curve : array (count, 2)
-        (x, v) along the branch, outwards from the saddle.
-    end : ManifoldEnd
-        Why it ends.
-    """
-
-    saddle: int
-    point: int
-    stable: bool
-    side: int
-    curve: NDArray[np.float64]
-    end: ManifoldEnd
+    saddle: Annotated[int, "place of its saddle among those of the structure"]
+    point: Annotated[int, "point of the saddle from which the branch starts"]
+    stable: Annotated[bool, "whether the branch belongs to the stable manifold"]
+    side: Annotated[int, Whole("along the eigenvector (1) or against it (-1)", low=-1, high=1)]
+    curve: Annotated[NDArray[np.float64], _CURVE]
+    end: Annotated[ManifoldEnd, "why the branch ends"]
 
     @property
     def arc_length(self) -> float:

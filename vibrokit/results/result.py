@@ -204,9 +204,9 @@ class Result(Record):
 
     def _title(self, energy: ActivationEnergy) -> str:
         """What pictures call a path."""
-        mantissa, _, exponent = f"{energy.value:.3e}".partition("e")
-        value = f"{mantissa} × 10$^{{{int(exponent)}}}$" if exponent else mantissa
-        return f"{self.exit_of(energy)}, $\\Delta U$ = {value} m$^2$ s$^{{-3}}$"
+        from vibrokit.plots.axes import scientific
+
+        return f"{self.exit_of(energy)}, $\\Delta U$ = ${scientific(energy.value)}$ m$^2$ s$^{{-3}}$"
 
     @called
     def plot_quasi_potential(self, source: int | str | None = None, ax: Any = None) -> QuasiPotentialArtists:

@@ -10,25 +10,22 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import grid_variables, read_grid
-from vibrokit.results.fields import PLANE, STATE, Length, Variable, Vectors, Whole, Word
+from vibrokit.results.fields import Variable
+from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region, centres
 from vibrokit.results.structure import Structure
-from vibrokit.results.table import Table
+from vibrokit.results.table import Table, fields_of
 
 Array = NDArray[np.float64]
 
-_POINTS = Vectors(Length("visit", "points on the section"), STATE)
-_CURVE = Vectors(Length("vertex", "vertices", ragged=True), PLANE, prefixed=False)
-_ATTRACTORS = Table(
-    "attractor",
-    {"label": Whole("label of the attractor"), "name": Word("name of the attractor"), "points": _POINTS},
-    index="label",
-)
+_OF_ATTRACTORS = {name: fields_of(Attractor)[name] for name in ("label", "name", "points")}
+_ATTRACTORS = Table("attractor", _OF_ATTRACTORS, index="label")
 _LISTS = {
-    "saddles": Table("saddle", {"points": _POINTS}),
-    "chaotic": Table("chaotic_saddle", {"points": _POINTS}),
-    "stable": Table("stable_manifold", {"points": _CURVE}),
+    "saddles": Table("saddle", {"points": _OF_ATTRACTORS["points"]}),
+    "chaotic": Table("chaotic_saddle", {"points": _OF_ATTRACTORS["points"]}),
+    "stable": Table("stable_manifold", {"points": fields_of(Manifold)["curve"]}),
 }
 
 

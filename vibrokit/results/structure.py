@@ -9,54 +9,24 @@ import xarray
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.attractor import ATTRACTOR_FIELDS, Attractor, attractor_variables, read_attractors
-from vibrokit.results.basins import NOT_FOLLOWED, Basins, grid_variables, read_grid
-from vibrokit.results.fields import PLANE, STATE, Flag, Length, Number, Series, Vectors, Whole, Word
+from vibrokit.results.attractor import Attractor, attractor_variables, read_attractors
+from vibrokit.results.basins import Basins, grid_variables, read_grid
 from vibrokit.results.labels import label_of
-from vibrokit.results.manifold import Manifold, ManifoldEnd
+from vibrokit.results.manifold import Manifold
 from vibrokit.results.record import Record
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
 from vibrokit.results.summary import Summary
 from vibrokit.results.survival import Survival
-from vibrokit.results.table import Table
+from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.basins import SectionArtists
     from vibrokit.plots.portraits import MotionArtists
 
-_ENDS = {end.value: end for end in ManifoldEnd}
-
-_ATTRACTORS = Table("attractor", ATTRACTOR_FIELDS, index="label")
-_SADDLES = Table(
-    "saddle",
-    {
-        "kind": Word("kind of the unstable orbit", known=("saddle", "flip saddle", "repeller", "chaotic")),
-        "period": Whole("period in forcing periods; 0 for a chaotic set"),
-        "duration": Number("time after which the motion repeats; NaN for a chaotic set", "s"),
-        "points": ATTRACTOR_FIELDS["points"],
-        "nodes": Vectors(Length("node", "nodes along the orbit"), STATE),
-        "orbit": ATTRACTOR_FIELDS["orbit"],
-        **{name: ATTRACTOR_FIELDS[name] for name in ("multipliers", "exponents")},
-        "leads_to": Series(
-            Length("side", "sides"), "label of the attractor that each unstable branch reaches; negative as in basin",
-            whole=True, low=NOT_FOLLOWED,
-        ),
-        **{name: ATTRACTOR_FIELDS[name] for name in ("residual", "error")},
-        "embedded": Flag("whether the orbit lies inside a chaotic set on the boundary"),
-    },
-)  # fmt: skip
-_MANIFOLDS = Table(
-    "manifold",
-    {
-        "saddle": Whole("place of the saddle that the branch belongs to"),
-        "point": Whole("point of the saddle from which the branch starts"),
-        "stable": Flag("whether the branch belongs to the stable manifold"),
-        "side": Whole("along the eigenvector (1) or against it (-1)", low=-1, high=1),
-        "curve": Vectors(Length("vertex", "vertices", ragged=True), PLANE, prefixed=False),
-        "end": Word("why the branch ends", known=tuple(_ENDS)),
-    },
-)
+_ATTRACTORS = Table("attractor", fields_of(Attractor), index="label")
+_SADDLES = Table("saddle", fields_of(Saddle))
+_MANIFOLDS = Table("manifold", fields_of(Manifold))
 
 
 class Structure(Record):
@@ -228,24 +198,22 @@ def _described(attractor: Attractor) -> str:
 
 
 def _saddles(arrays: Arrays, attractors: int) -> tuple[Saddle, ...]:
-    saddles = []
-    for values in _SADDLES.read(arrays):
-        values["leads_to"] = tuple(values["leads_to"].tolist())
-        saddles.append(Saddle(**values))
-        if any(label >= attractors for label in values["leads_to"]):
-            raise ResultFileError(f"a saddle leads to {values['leads_to']}, and there are {attractors} attractors")
-        if len(values["points"]) == 0:
-            raise ResultFileError(f"a {values['kind']} orbit has no points")
-        nodes, period = len(values["nodes"]), max(1, values["period"])
-        if values["kind"] != "chaotic" and nodes != 1 and (not nodes or nodes % period):
+    saddles = tuple(Saddle(**values) for values in _SADDLES.read(arrays))
+    for one in saddles:
+        if any(label >= attractors for label in one.leads_to):
+            raise ResultFileError(f"a saddle leads to {one.leads_to}, and there are {attractors} attractors")
+        if len(one.points) == 0:
+            raise ResultFileError(f"a {one.kind} orbit has no points")
+        nodes, period = len(one.nodes), max(1, one.period)
+        if one.kind != "chaotic" and nodes != 1 and (not nodes or nodes % period):
             raise ResultFileError(
                 f"an orbit of period {period} has {nodes} nodes; 1 or a multiple of the period is valid"
             )
-    return tuple(saddles)
+    return saddles
 
 
 def _manifolds(arrays: Arrays, saddles: tuple[Saddle, ...]) -> tuple[Manifold, ...]:
-    manifolds = tuple(Manifold(**values | {"end": _ENDS[values["end"]]}) for values in _MANIFOLDS.read(arrays))
+    manifolds = tuple(Manifold(**values) for values in _MANIFOLDS.read(arrays))
     for one in manifolds:
         known = one.saddle < len(saddles) and one.point < len(saddles[one.saddle].points)
         if not known or one.side == 0:

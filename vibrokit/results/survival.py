@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.results.fields import Length, Series
+from vibrokit.results.table import documented
 
+_SETTLED = Series(
+    "forcing periods until the start settled; -1 if it did not", length=Length("start", "starts"), low=-1
+)  # fmt: skip
+
+
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class Survival:
     """Long runs of starts that had not settled: how many settled after all, and when.
 
-    Attributes
-    ----------
-    stepper : str
-        Stepper of the integration.
-    starts : int
-    periods : int
-        Largest number of periods for which each was followed.
-    survivors : int
-        Starts that had not settled by then.
-    lifetime : float
-        Mean time until a start settles (periods), by maximum likelihood from those that did and those that did not;
-        infinite if none did.
-    lifetime_error : float
-        Its standard error.
-    settled_after : int array (starts,)
-        When each settled (periods); −1 where it did not.
+    The lifetime is the estimate of maximum likelihood from the starts that settled and those that did not.
     """
 
-    stepper: str
-    starts: int
-    periods: int
-    survivors: int
-    lifetime: float
-    lifetime_error: float
-    settled_after: NDArray[np.int64]
+    stepper: Annotated[str, "stepper of the integration"]
+    starts: Annotated[int, "number of starts"]
+    periods: Annotated[int, "forcing periods for which starts were followed"]
+    survivors: Annotated[int, "starts that had not settled by then"]
+    lifetime: Annotated[float, "mean time until a start settles, in forcing periods; infinite if none did"]
+    lifetime_error: Annotated[float, "standard error of the lifetime, in forcing periods"]
+    settled_after: Annotated[NDArray[np.int64], _SETTLED]
 
     def __str__(self) -> str:
         words = (

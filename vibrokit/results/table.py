@@ -1,16 +1,28 @@
-"""Tables: the attributes of records as arrays of a dataset, declared once and used to write and to read."""
+"""Tables: the attributes of records as arrays of a dataset, declared once and used to write, to read and to describe.
+
+``period: Annotated[int, "period in forcing periods"]`` declares an attribute: these words describe it in files and in
+the docstring of its class. ``Annotated[float, "time after which it repeats", "s"]`` has a unit; where more is to be
+said, `Annotated` takes a field.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.fields import Field, Variable
+from vibrokit.results.fields import Field, Flag, Number, Scalar, Variable, Whole, Word
+
+T = TypeVar("T")
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,3 +51,72 @@ class Table:
 
     def _name(self, attribute: str) -> str:
         return self.record if attribute == self.index else f"{self.record}_{attribute}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Part(Field):
+    """A dataclass of numbers, or None: each of its attributes is an array, and a flag tells which there are."""
+
+    units: str = ""
+    kind: type[Any] = dataclasses.field(kw_only=True)
+    flag: str = dataclasses.field(kw_only=True)
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        known = [value is not None for value in values]
+        yield from Flag(f"whether there is {self.long_name}").variables(record, f"{record}_{self.flag}", known)
+        for attribute, field in fields_of(self.kind).items():
+            own = [np.nan if value is None else getattr(value, attribute) for value in values]
+            yield from field.variables(record, f"{name}_{attribute}", own)
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        fields = fields_of(self.kind)
+        known = Flag("").read(arrays, record, f"{record}_{self.flag}")
+        columns = [field.read(arrays, record, f"{name}_{own}") for own, field in fields.items()]
+        rows = (self.kind(**dict(zip(fields, row, strict=True))) for row in zip(*columns, strict=True))
+        return [row if has else None for has, row in zip(known, rows, strict=True)]
+
+
+# Declared by annotations
+
+_BY_TYPE: dict[Any, type[Scalar]] = {float: Number, int: Whole, bool: Flag, str: Word}
+
+
+def _declared(kind: type) -> Iterator[tuple[str, Field | None, str, str, str]]:
+    """Each attribute of a dataclass that says what it is: its field, if files hold it, its type, text and unit."""
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        if not hasattr(hint, "__metadata__"):
+            continue
+        own, said = hint.__origin__, hint.__metadata__
+        field: Field | None = said[0] if isinstance(said[0], Field) else None
+        if field is not None:
+            yield name, field, "" if get_origin(own) is tuple else field.noun, field.long_name, field.units
+            continue
+        if own in _BY_TYPE:
+            field = _BY_TYPE[own](*said)
+        elif isinstance(own, type) and issubclass(own, StrEnum):
+            field = Word(said[0], known=own)
+        yield name, field, "", said[0], said[1] if len(said) > 1 else ""
+
+
+def _noun(kind: Any) -> str:
+    """A type in words: ``"tuple of Survival"``, ``"ExitPath or None"``."""
+    if get_origin(kind) is tuple:
+        return f"tuple of {_noun(get_args(kind)[0])}"
+    return " or ".join(map(_noun, get_args(kind))) or kind.__name__.removesuffix("Type")
+
+
+def fields_of(kind: type) -> dict[str, Field]:
+    """Return the fields that the annotations of a dataclass declare, by attribute."""
+    return {name: field for name, field, *_ in _declared(kind) if field is not None}
+
+
+def documented(kind: type[T]) -> type[T]:
+    """Describe the attributes of a dataclass in its docstring, as its annotations declare them."""
+    lines, hints = [(kind.__doc__ or "").rstrip(), "", "    Attributes", "    ----------"], get_type_hints(kind)
+    for name, _, noun, text, units in _declared(kind):
+        raised = re.sub(r"(?<=[a-z])-?\d", lambda power: power[0].translate(_RAISED), units)
+        first, semicolon, rest = text.partition(";")
+        words = f"{first[:1].upper()}{first[1:]}{f' ({raised})' if units not in ('', '1') else ''}{semicolon}{rest}."
+        lines += [f"    {name} : {noun or _noun(hints[name])}", textwrap.indent(textwrap.fill(words, 112), " " * 8)]
+    kind.__doc__ = "\n".join(lines)
+    return kind
