@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.comparison.difference_bounds import difference_bounds
-from vibrokit.comparison.in_trees import cycle_of, tree_costs
+from vibrokit.comparison.in_trees import tree_costs
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def cycle_hierarchy(energies: Array, lower: Array, upper: Array) -> tuple[Cycle,
         found |= {group: _left(group, energies, lower, upper) for group in groups if group not in found}
         home = {label: place for place, group in enumerate(groups) for label in group}
         exits = {place: found[group] for place, group in enumerate(groups) if np.isfinite(found[group].energy)}
-        closed = cycle_of({place: home[cycle.target] for place, cycle in exits.items()})
+        closed = _cycle_of({place: home[cycle.target] for place, cycle in exits.items()})
         if not closed:
             break
         joined = tuple(sorted(label for place in closed for label in groups[place]))
@@ -63,6 +63,21 @@ def cycle_hierarchy(energies: Array, lower: Array, upper: Array) -> tuple[Cycle,
         return max(inner.energy for inner in known if set(inner.members) <= set(cycle.members))
 
     return tuple(sorted(known, key=rank))  # not by energy alone: rounding must not put a group before its members
+
+
+def _cycle_of(arcs: dict[int, int]) -> list[int]:
+    """Return the nodes of a cycle of arcs, at most one from each node; empty if there is no cycle."""
+    done: set[int] = set()
+    for start in arcs:
+        visited: list[int] = []
+        node = start
+        while node in arcs and node not in done:
+            done.add(node)
+            visited.append(node)
+            node = arcs[node]
+        if node in visited:
+            return visited[visited.index(node) :]
+    return []
 
 
 def _left(group: tuple[int, ...], energies: Array, lower: Array, upper: Array) -> Cycle:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from enum import StrEnum
+from typing import Annotated
 
 from vibrokit.results.rated import HELD, METASTABLE
+from vibrokit.results.table import documented
 
 DEVIATIONS = 1.96
 """Standard errors on each side of a value in an interval of 95 %."""
@@ -41,43 +43,22 @@ OF_STATES = (Kind.OCCUPANCY, Kind.DENSITY_SHARE, Kind.WEIGHT_EXPONENT)
 """Kinds that belong to a state and not to an exit."""
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """One number by one method.
+    """One number by one method, with its 95 % interval or its bounds; NaN where one is not known."""
 
-    Attributes
-    ----------
-    kind : Kind
-    source : int
-        Label of the attractor that is left, or whose share it is.
-    target : int or None
-        Label of the state that is reached, as in `ExitRate`; None for all exits together, and for shares.
-    method : str
-        Name of the analyzer of the result.
-    intensity : float
-        D (m² s⁻³); NaN where it does not depend on D.
-    value, lower, upper : float
-        The number and its 95 % interval, or bounds; NaN where none is known.
-    event : str
-        What counts as an exit, as in `ExitRate`; empty for quantities that do not depend on it.
-    relaxations : float
-        Mean time until the source is left, in its relaxation times; NaN where that is not known.
-    core_share : float
-        Share of the core of the source in its own basin, or that of the target if it is smaller; NaN where neither is
-        known.
-    """
-
-    kind: Kind
-    source: int
-    target: int | None
-    method: str
-    intensity: float
-    value: float
-    lower: float
-    upper: float
-    event: str = ""
-    relaxations: float = math.nan
-    core_share: float = math.nan
+    kind: Annotated[Kind, "what the number is"]
+    source: Annotated[int, "label of the attractor that is left, or whose share it is"]
+    target: Annotated[int | None, "label of what is reached, as in `ExitRate`; None for all exits together or a share"]
+    method: Annotated[str, "name of the result's analyzer"]
+    intensity: Annotated[float, "noise intensity D; NaN where it does not matter", "m2 s-3"]
+    value: Annotated[float, "value, in the unit that its kind has", ""]
+    lower: Annotated[float, "lower end of its interval", ""]
+    upper: Annotated[float, "upper end of its interval", ""]
+    event: Annotated[str, "what counts as an exit, as in `ExitRate`; empty where that does not matter"] = ""
+    relaxations: Annotated[float, "mean time until the source is left in its relaxation times"] = math.nan
+    core_share: Annotated[float, "smaller share of the cores of source and target in their own basins"] = math.nan
 
     @property
     def metastable(self) -> bool:

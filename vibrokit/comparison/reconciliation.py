@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import xarray
@@ -12,17 +11,24 @@ from vibrokit.comparison.verdicts import Agreement, Verdict, exit_name
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.fields import Number, Whole, Word
+from vibrokit.results.attractor import Attractor
+from vibrokit.results.fields import Whole
 from vibrokit.results.labels import goal_of, label_of
 from vibrokit.results.record import Record
 from vibrokit.results.summary import Summary
-from vibrokit.results.table import Table
+from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.exit_times import ReconciliationArtists
 
 _DRAWN = ("intensity", "value", "error")  # of a quantity
 _ANY = -3  # in files: the label of leaving at all
+_TARGET = Whole("label of what is reached; -1 for another exit, -2 for escape, -3 for leaving at all", low=_ANY)
+_QUANTITIES, _VERDICTS = (
+    Table(name, fields_of(kind) | {"target": _TARGET}) for name, kind in (("quantity", Quantity), ("verdict", Verdict))
+)
+_OF_ATTRACTORS = {name: fields_of(Attractor)[name] for name in ("label", "name")}
+_NAMES = Table("attractor", _OF_ATTRACTORS, index="label")
 
 
 class Reconciliation(Record):
@@ -173,67 +179,16 @@ class Reconciliation(Record):
         ):
             raise ResultFileError("its settings have no level, or no methods by name")
         names = tuple(values["name"] for values in _NAMES.read(arrays))
-        quantities = tuple(Quantity(**_typed(v, names, kind=Kind)) for v in _QUANTITIES.read(arrays))
-        verdicts = tuple(Verdict(**_typed(v, names, kind=Kind, code=Agreement)) for v in _VERDICTS.read(arrays))
+        quantities, verdicts = _QUANTITIES.read(arrays), _VERDICTS.read(arrays)
+        for values in (*quantities, *verdicts):
+            if max(values["source"], values["target"]) >= len(names):
+                raise ResultFileError(f"a number is of attractor {values['source']}, and there are {len(names)}")
+            values["target"] = None if values["target"] == _ANY else values["target"]
         return cls(
             attractors=names,
             methods=tuple(methods),
             level=level,
-            quantities=quantities,
-            verdicts=verdicts,
+            quantities=tuple(Quantity(**values) for values in quantities),
+            verdicts=tuple(Verdict(**values) for values in verdicts),
             **provenance,
         )
-
-
-def _typed(values: dict[str, Any], names: Sequence[str], **types: Any) -> dict[str, Any]:
-    """Values of a table with their words as codes and the label of leaving at all as None."""
-    if max(values["source"], values["target"]) >= len(names):
-        raise ResultFileError(f"a number is of attractor {values['source']}, and there are {len(names)}")
-    words = {name: kind(values[name]) for name, kind in types.items()}
-    return {**values, **words, "target": None if values["target"] == _ANY else values["target"]}
-
-
-_NAMES = Table("attractor", {"label": Whole("label"), "name": Word("name of the attractor")}, index="label")
-_SHARED = {
-    "kind": Word("what the number is", known=tuple(Kind)),
-    "source": Whole("label of the attractor that is left, or whose share it is"),
-    "target": Whole("label of what is reached; -1 for another exit, -2 for escape, -3 for leaving at all", low=_ANY),
-}
-_QUANTITIES = Table(
-    "quantity",
-    {
-        **_SHARED,
-        "method": Word("method"),
-        "intensity": Number("noise intensity; NaN where it does not matter", "m2 s-3"),
-        "value": Number("value, in the unit that its kind has", ""),
-        "lower": Number("lower end of its interval", ""),
-        "upper": Number("upper end of its interval", ""),
-        "event": Word("what counts as an exit"),
-        "relaxations": Number("mean time until the source is left in its relaxation times"),
-        "core_share": Number("smaller share of the cores of source and target in their own basins"),
-    },
-)
-_VERDICTS = Table(
-    "verdict",
-    {
-        **_SHARED,
-        "code": Word("verdict", known=tuple(Agreement)),
-        "one": Word("one method"),
-        "other": Word("other method"),
-        "statistic": Number("sum of squared differences over combined errors"),
-        "terms": Whole("number of its terms"),
-        "p_value": Number("probability of a larger sum"),
-        "deviation": Number("largest difference in combined errors"),
-        "intensity": Number("noise intensity of the largest difference", "m2 s-3"),
-        "error": Number("least combined standard error", ""),
-        "less_certain": Word("method with the larger error"),
-        "remedy": Word("what refines it"),
-        "first": Number("first slope", "m2 s-3"),
-        "last": Number("last slope", "m2 s-3"),
-        "energy": Number("energy that the slopes tend to", "m2 s-3"),
-        "relaxations": Number("mean time until the source is left in its relaxation times"),
-        "core_share": Number("smaller share of the cores of source and target in their own basins"),
-        "event_one": Word("what counts as an exit for one method"),
-        "event_other": Word("what counts as an exit for the other method"),
-    },
-)

@@ -22,6 +22,8 @@ from vibrokit.text_table import text_table
 
 Array = NDArray[np.float64]
 
+_ROUNDING = 1e-12  # of sums of energies
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StationaryWeights:
@@ -172,7 +174,10 @@ class Transitions(metaclass=Constructed):
     @property
     def leading(self) -> tuple[int, ...]:
         """Labels of those that may be the most stable, within the bounds; empty where weights are not known."""
-        return tuple(np.flatnonzero(self._differences[0].max(axis=1) <= 0).tolist()) if self.known else ()
+        if not self.known:
+            return ()
+        rounding = _ROUNDING * self.energies[np.isfinite(self.energies)].max()
+        return tuple(np.flatnonzero(self._differences[0].max(axis=1) <= rounding).tolist())
 
     @property
     def most_stable(self) -> int | None:

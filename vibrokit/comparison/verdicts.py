@@ -6,10 +6,12 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from enum import StrEnum
+from typing import Annotated
 
 from vibrokit.comparison.quantities import Kind
 from vibrokit.results.labels import exit_between
 from vibrokit.results.rated import HELD, METASTABLE
+from vibrokit.results.table import documented
 
 
 class Agreement(StrEnum):
@@ -45,61 +47,32 @@ _SENTENCES = {
 }
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """Whether two methods agree on one exit, or on the share of one state.
+    """Whether two methods agree on one exit, or on the share of one state; NaN or empty where nothing applies."""
 
-    Attributes
-    ----------
-    code : Agreement
-    kind : Kind
-        What was compared: mean times at common intensities, energies, or occupancies.
-    source : int
-    target : int or None
-        As in `Quantity`.
-    one, other : str
-        The methods.
-    statistic : float
-        Sum of the squares of (difference over combined error); NaN where nothing was compared.
-    terms : int
-        How many there are: common intensities, or 1.
-    p_value : float
-        Probability of a larger sum if all errors are normal and independent.
-    deviation, intensity : float
-        The largest single difference, one less other, in combined errors, and its D (m² s⁻³; NaN for an energy).
-    error : float
-        Least combined standard error: of ΔU (m² s⁻³), of ln τ, or of ln of the odds of a share.
-    less_certain, remedy : str
-        The method with the larger error, or without a number, and the setting of it to change first.
-    first, last, energy : float
-        Where slopes drift: the first and the last one, D descending, and the energy they tend to (m² s⁻³).
-    relaxations, core_share : float
-        Where a state is not metastable: the largest ones, as in `Quantity`.
-    event_one, event_other : str
-        Where they differ: what counts as an exit.
-    """
-
-    code: Agreement
-    kind: Kind
-    source: int
-    target: int | None
-    one: str
-    other: str
-    statistic: float = math.nan
-    terms: int = 0
-    p_value: float = math.nan
-    deviation: float = math.nan
-    intensity: float = math.nan
-    error: float = math.nan
-    less_certain: str = ""
-    remedy: str = ""
-    first: float = math.nan
-    last: float = math.nan
-    energy: float = math.nan
-    relaxations: float = math.nan
-    core_share: float = math.nan
-    event_one: str = ""
-    event_other: str = ""
+    code: Annotated[Agreement, "verdict"]
+    kind: Annotated[Kind, "what was compared: mean times at common intensities, energies or shares"]
+    source: Annotated[int, "label of the attractor that is left, or whose share it is"]
+    target: Annotated[int | None, "label of what is reached, as in `Quantity`"]
+    one: Annotated[str, "one method"]
+    other: Annotated[str, "other method"]
+    statistic: Annotated[float, "sum of squared differences over combined errors"] = math.nan
+    terms: Annotated[int, "number of its terms: common intensities, or 1"] = 0
+    p_value: Annotated[float, "probability of a larger sum, if all errors are normal and independent"] = math.nan
+    deviation: Annotated[float, "largest difference, one less other, in combined errors"] = math.nan
+    intensity: Annotated[float, "noise intensity D of the largest difference; NaN for an energy", "m2 s-3"] = math.nan
+    error: Annotated[float, "least combined standard error of ΔU, of ln τ, or of ln of the odds", ""] = math.nan
+    less_certain: Annotated[str, "method with the larger error, or without a number"] = ""
+    remedy: Annotated[str, "setting of that method to change first"] = ""
+    first: Annotated[float, "where slopes drift, the first one, D descending", "m2 s-3"] = math.nan
+    last: Annotated[float, "where slopes drift, the last one", "m2 s-3"] = math.nan
+    energy: Annotated[float, "energy that the slopes tend to", "m2 s-3"] = math.nan
+    relaxations: Annotated[float, "where a state is not metastable, its mean time in relaxation times"] = math.nan
+    core_share: Annotated[float, "where a state is not metastable, the share of its core in its basin"] = math.nan
+    event_one: Annotated[str, "what counts as an exit for one method, where they differ"] = ""
+    event_other: Annotated[str, "what counts as an exit for the other method"] = ""
 
     def about(self, names: Sequence[str]) -> str:
         """Return what the verdict is about: an exit, or the share of a state."""

@@ -29,8 +29,6 @@ HELD = 0.5
 
 Array = NDArray[np.float64]
 
-_DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
-
 
 class RatedResult(Result):
     """Exit rates at finite noise, and activation energies.
@@ -57,40 +55,36 @@ class RatedResult(Result):
     @property
     def rates(self) -> tuple[ExitRate, ...]:
         """Exit rates of all attractors at all intensities."""
+        return tuple(rate for rate in self._entries() if np.isfinite((rate.log_value, rate.log_error)).all())
+
+    def _entries(self) -> list[ExitRate]:
+        """The rate to each target at each intensity, also where it is not known."""
         arrays = Arrays(self.data)
         if "log_rate" not in arrays:
-            return ()
+            return []
         labels = arrays.wholes("source", (None,), 0, len(self.names) - 1).tolist()
-        values, errors = (
-            arrays.numbers(name, (len(labels), None, None), finite=False) for name in ("log_rate", "log_rate_error")
-        )
+        values = arrays.numbers("log_rate", (len(labels), None, None), finite=False)
+        errors = arrays.numbers("log_rate_error", values.shape, finite=False)
         intensities = arrays.numbers("rate_intensity", values.shape[:2], finite=False)
         methods = np.reshape(arrays.words("rate_method", values.shape[:2]), values.shape[:2])
         targets = arrays.wholes("rate_target", (values.shape[0], values.shape[2]), ESCAPED, len(self.names) - 1)
         events = arrays.words("rate_event", (len(labels),))
-        bounds = [
+        lower, upper = (
             arrays.numbers(name, values.shape, finite=False) if name in arrays else np.full(values.shape, np.nan)
             for name in ("log_rate_lower", "log_rate_upper")
-        ]
-        known = np.argwhere(np.isfinite(values) & np.isfinite(errors)).tolist()
-        return tuple(
+        )
+        return [
             ExitRate(
                 labels[s], int(targets[s, k]), float(intensities[s, i]), float(values[s, i, k]),
-                float(errors[s, i, k]), events[s], str(methods[s, i]), *(float(ends[s, i, k]) for ends in bounds),
+                float(errors[s, i, k]), events[s], str(methods[s, i]), float(lower[s, i, k]), float(upper[s, i, k]),
             )
-            for s, i, k in known
-        )  # fmt: skip
+            for s, i, k in np.ndindex(values.shape)
+        ]  # fmt: skip
 
     @property
     def log_rates(self) -> xarray.DataArray:
         """ln of the rates (s⁻¹) over (intensity, source, target), by names; −∞ where no rate is known."""
-        known, names = self.intensities, list(self.names)
-        values = np.full((len(known), len(names), len(names)), -np.inf)
-        for rate in self.rates:
-            if rate.target >= 0:
-                values[known.index(rate.intensity), rate.source, rate.target] = rate.log_value
-        coordinates = {"intensity": known, "source": names, "target": names}
-        return xarray.DataArray(values, coordinates, ("intensity", "source", "target"), "log_rates")
+        return self._between("log_rates", [(rate, rate.log_value) for rate in self.rates], -np.inf)
 
     @property
     def log_rate_bounds(self) -> tuple[xarray.DataArray, xarray.DataArray]:
@@ -98,23 +92,19 @@ class RatedResult(Result):
 
         They are the method's 95 % interval if it has one, otherwise two error estimates on each side.
         """
-        known, size = self.intensities, len(self.names)
-        bounds = [np.full((len(known), size, size), end) for end in (-np.inf, np.inf)]
-        data = self.data.transpose("source", "intensity_index", "exit_index", ...)
-        values, errors = data["log_rate"].values, data["log_rate_error"].values
-        with np.errstate(invalid="ignore"):  # of a rate that was not seen
-            intervals = [values - _DEVIATIONS * errors, values + _DEVIATIONS * errors]
-        if "log_rate_lower" in data and "log_rate_upper" in data:
-            intervals = [data["log_rate_lower"].values, data["log_rate_upper"].values]
-        sources, targets, intensities = (data[name].values for name in ("source", "rate_target", "rate_intensity"))
-        for s, i, k in np.argwhere(~np.isnan(intervals[0]) & ~np.isnan(intervals[1])).tolist():
-            if targets[s, k] >= 0:
-                for ends, interval in zip(bounds, intervals, strict=True):
-                    ends[known.index(intensities[s, i]), sources[s], targets[s, k]] = interval[s, i, k]
-        dims = ("intensity", "source", "target")
-        coordinates = {"intensity": known, "source": list(self.names), "target": list(self.names)}
-        lower, upper = (xarray.DataArray(ends, coordinates, dims) for ends in bounds)
-        return lower.rename("lower"), upper.rename("upper")
+        known = [rate for rate in self._entries() if not np.isnan((rate.log_lower, rate.log_upper)).any()]
+        lower = self._between("lower", [(rate, rate.log_lower) for rate in known], -np.inf)
+        return lower, self._between("upper", [(rate, rate.log_upper) for rate in known], np.inf)
+
+    def _between(self, name: str, found: Iterable[tuple[ExitRate, float]], unknown: float) -> xarray.DataArray:
+        """Numbers of rates between attractors over (intensity, source, target)."""
+        known, names = self.intensities, list(self.names)
+        values = np.full((len(known), len(names), len(names)), unknown)
+        for rate, value in found:
+            if rate.target >= 0:
+                values[known.index(rate.intensity), rate.source, rate.target] = value
+        coordinates = {"intensity": known, "source": names, "target": names}
+        return xarray.DataArray(values, coordinates, ("intensity", "source", "target"), name)
 
     @property
     def relaxations(self) -> Array:
