@@ -7,7 +7,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.results.codes import Code
-from vibrokit.structure.barrier_tops import speed_to_reach, tops_around
+from vibrokit.structure.rest import SteadyForce, tops_around
 
 WEAK = (vk.Harmonic(0.007, 0.84),)
 
@@ -26,7 +26,7 @@ def found_in(osc, **given):
 def test_a_region_contains_the_tops_of_a_softening_spring(cubic):
     """V = x²/2 − a x⁴/4 has its tops at ±1/√a, of height 1/(4a)."""
     osc, top = scene(vk.CubicSpring(1.0, cubic), damping=0.0045), 1 / math.sqrt(-cubic)
-    lower, upper = tops_around(osc, -0.02, 0.02)
+    lower, upper = tops_around(osc, -0.02, 0.02, 0.02)
     assert (lower.place, upper.place) == pytest.approx((-top, top), rel=1e-9)
     assert (lower.speed, upper.speed) == pytest.approx(2 * [top / math.sqrt(2)], rel=1e-3)
     structure = found_in(osc)
@@ -64,7 +64,7 @@ def test_a_region_that_leaves_out_a_top_says_so():
 
 
 def test_a_mass_needs_the_speed_of_the_potential_to_reach_a_place():
-    assert speed_to_reach(scene(vk.CustomSpring("4*x")), -1.0, 3.0) == pytest.approx(6.0, rel=1e-4)
+    assert SteadyForce(scene(vk.CustomSpring("4*x"))).speed_to_reach(-1.0, 3.0) == pytest.approx(6.0, rel=1e-4)
 
 
 def test_a_libration_is_recorded_where_its_points_are():

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +12,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.grid import cell_findings
 from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.search import persistent_stepper
+from vibrokit.structure.persistence import persistent_stepper
 
 
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
@@ -20,6 +22,9 @@ def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
     assert hammering.impacts > 0
     assert sum(hammering.hits.values()) == hammering.impacts
     assert hammering.basin_fraction > clear.basin_fraction > 0  # as the paper says of ω = 0.570
+    assert {finding.code: finding.values["count"] for finding in structure.findings} == {
+        Code.STEADY_STATES: 2, Code.SADDLES: 1,
+    }  # fmt: skip
     for attractor in structure.attractors:
         assert np.abs(attractor.multipliers).max() < 1
         # Liouville: both multipliers together are what friction leaves of an area, exp(−2ζω_n T).
@@ -61,95 +66,46 @@ def test_labels_are_where_the_flow_leads(paper):
     assert np.mean(nearest == basins.labels.ravel()[picked]) > 0.9  # cells on a boundary may differ by the step
 
 
-@pytest.mark.slow
-def test_duffing_has_a_small_and_a_large_orbit():
-    osc = vk.load_scene("duffing")
-    structure = vk.find_structure(osc, cells=(60, 60), region=((-3, 3), (-3, 3)))
-    sizes = [np.abs(osc.trajectory(a.points[0], 1).x).max() for a in structure.attractors]
-    assert len(sizes) == 2
-    assert min(sizes) < 1 < max(sizes)
-
-
-def test_the_double_well_is_symmetric_to_the_last_cell():
-    structure = vk.find_structure(vk.load_scene("double-well"), cells=(80, 80), region=((-2, 2), (-2, 2)))
-    labels = structure.basins.labels
-    np.testing.assert_array_equal(labels, 1 - labels[::-1, ::-1])
+UNDAMPED = vk.load_scene("hertz-0.570").replace({"damping_ratio": 0.0})
+TWO_TONES = vk.Oscillator(
+    natural_frequency=1.0, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5))
+)
+CHAOTIC = vk.Oscillator(
+    natural_frequency=1.0, damping_ratio=0.15, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Harmonic(0.5, 1.2),)
+)
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("osc", "given", "error", "words"),
     [
-        ({"damping_ratio": 0.0}, "damping"),
+        (UNDAMPED, {}, StructureError, "damping"),
+        (TWO_TONES, {}, NoSectionError, "no common period"),
+        (CHAOTIC, {"budget": 1, "starts": (4, 4), "cells": (4, 4)}, StructureError, "raise budget"),
     ],
 )
-def test_scenes_without_attractors_are_refused(change, words):
-    with pytest.raises(StructureError, match=words):
-        vk.find_structure(vk.load_scene("hertz-0.570").replace(change))
+def test_scenes_without_attractors_are_refused(osc, given, error, words):
+    with pytest.raises(error, match=words):
+        vk.find_structure(osc, **given)
 
 
-def test_no_common_period_is_said():
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.1,
-        excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5)),
-    )
-    with pytest.raises(NoSectionError, match="no common period"):
-        vk.find_structure(osc)
-
-
-@pytest.mark.parametrize("bounds", [((1, -1), (0, 1)), ((0, 0), (0, 1)), ((0, float("nan")), (0, 1)), 3, ((0, 1),)])
-def test_bad_regions(bounds):
-    with pytest.raises(StructureError, match="region"):
-        Region.of(bounds)
-
-
-@pytest.mark.parametrize("budget", [0, -1, 1.5, True])
-def test_bad_budgets(budget):
-    with pytest.raises(StructureError, match="budget"):
-        vk.find_structure(vk.load_scene("hertz-0.570"), budget=budget)
-
-
-def test_a_budget_too_small_is_said():
-    chaotic = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.15, spring=vk.CubicSpring(-1.0, 1.0),
-        excitations=(vk.Harmonic(0.5, 1.2),),
-    )  # fmt: skip
-    with pytest.raises(StructureError, match="raise budget"):
-        vk.find_structure(chaotic, budget=1, starts=(4, 4), cells=(4, 4))
+BAD = {
+    "region": (StructureError, [((1, -1), (0, 1)), ((0, 0), (0, 1)), ((0, math.nan), (0, 1)), 3, ((0, 1),)]),
+    "cells": (StructureError, [200, (0, 2), (2.5, 3), (10**6, 10**6)]),
+    "starts": (StructureError, [None, (0, 0)]),
+    "settling": (StructureError, [0, -1.0, "a"]),
+    "budget": (StructureError, [0, -1, 1.5, True, 10**30]),
+    "edge_budget": (StructureError, [0, 1.5, "a", True]),
+    "time_limit": (StructureError, [0, -1.0, math.nan, "1", True]),
+    "rng": (ParameterError, [-1, "x", 1.5]),
+}
 
 
 @pytest.mark.parametrize(
-    "bad",
-    [
-        {"cells": 200}, {"cells": (0, 2)}, {"cells": (2.5, 3)}, {"cells": (10**6, 10**6)}, {"starts": None},
-        {"starts": (0, 0)}, {"settling": 0}, {"settling": -1.0}, {"settling": "a"}, {"budget": 10**30},
-        {"edge_budget": 0}, {"edge_budget": 1.5}, {"edge_budget": "a"}, {"edge_budget": True},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_bad_counts(bad):
-    with pytest.raises(StructureError, match=next(iter(bad))):
-        vk.find_structure(vk.load_scene("hertz-0.570"), **bad)
-
-
-@pytest.mark.parametrize("rng", [-1, "x", 1.5])
-def test_bad_seeds(rng):
-    with pytest.raises(ParameterError, match="rng"):
-        vk.find_structure(vk.load_scene("hertz-0.570"), rng=rng)
-    with pytest.raises(ParameterError, match="rng"):
-        vk.load_scene("hertz-0.570").trajectory([0, 0], 1, rng=rng)
-
-
-@pytest.mark.slow
-def test_a_scene_whose_noise_depends_on_the_state():
-    well = vk.load_scene("double-well")
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.05,
-        spring=well.spring,
-        noise=vk.StateDependentNoise(0.01, "1 + c*x**2", c=0.5),
-    )
-    assert len(vk.find_structure(osc, cells=(20, 20), starts=(8, 8)).attractors) == 2
+    ("name", "error", "value"), [(name, error, value) for name, (error, values) in BAD.items() for value in values]
+)
+def test_bad_arguments(name, error, value):
+    with pytest.raises(error, match=name):
+        vk.find_structure(vk.load_scene("hertz-0.570"), **{name: value})
 
 
 def van_der_pol():
@@ -166,20 +122,6 @@ def test_a_limit_cycle():
     assert cycle.points[0, 0] == pytest.approx(2.0086198608748431, abs=1e-9)
     assert cycle.basin_fraction == 1.0
     assert np.sort(np.abs(cycle.multipliers))[-1] == pytest.approx(1.0, abs=1e-8)
-
-
-def test_equilibria_have_eigenvalues():
-    structure = vk.find_structure(vk.load_scene("double-well"), cells=(40, 40), region=((-2, 2), (-2, 2)))
-    zeta = 0.05
-    for well in structure.attractors:
-        exact = -zeta + 1j * np.sqrt(2 - zeta**2) * np.array([-1, 1])
-        np.testing.assert_allclose(np.sort_complex(well.exponents), np.sort_complex(exact), atol=1e-9)
-    (hilltop,) = structure.saddles
-    np.testing.assert_allclose(hilltop.points, 0.0, atol=1e-9)
-    exact = -zeta + np.sqrt(1 + zeta**2) * np.array([1, -1])
-    np.testing.assert_allclose(hilltop.exponents, exact, atol=1e-9)
-    np.testing.assert_allclose(hilltop.multipliers, np.exp(2 * np.pi * exact), rtol=1e-8)
-    assert set(hilltop.leads_to) == {0, 1}
 
 
 def test_what_escapes_is_said_to_have_left():
@@ -199,13 +141,6 @@ def test_cells_without_an_attractor_are_findings():
         Code.CELLS_UNSETTLED: 1 / 8, Code.CELLS_LEFT_REGION: 2 / 8, Code.CELLS_AT_COPIES: 1 / 8,
     }  # fmt: skip
     assert cell_findings(Basins(Region((0, 1), (0, 1)), np.zeros((3, 2), dtype=np.int16))) == ()
-
-
-def test_what_was_found_is_in_the_findings(paper):
-    _, structure = paper
-    steady, saddles = structure.findings
-    assert (steady.code, steady.values["count"]) == (Code.STEADY_STATES, 2)
-    assert (saddles.code, saddles.values["count"]) == (Code.SADDLES, 1)
 
 
 # --- settings
@@ -312,7 +247,7 @@ def test_an_interrupt_at_any_moment_leaves_what_was_found(well):
         assert len(part.manifolds) <= 4 if doing == "manifolds" else not part.manifolds
 
 
-@pytest.mark.parametrize("share", [1e-4, 0.05, 0.2, 0.5, 0.9])
+@pytest.mark.parametrize("share", [1e-4, 0.2, 0.9, 1e6])
 def test_a_time_limit_leaves_what_was_found(well, share):
     osc, whole, _ = well
     limit = share * whole.seconds
@@ -321,6 +256,8 @@ def test_a_time_limit_leaves_what_was_found(well, share):
     for stopped in part.found(Code.STOPPED):
         assert stopped.values["reason"] == "time limit"
     assert part.complete == (not part.found(Code.STOPPED))
+    if part.complete:
+        np.testing.assert_array_equal(part.basins.labels, whole.basins.labels)
 
 
 RESTLESS = {  # rf-driven Josephson junction (Phys. Rev. A 36, 2455); megastable oscillator; a ball on a stiff table
@@ -356,19 +293,6 @@ def test_a_search_that_is_stopped_says_what_its_starts_were_doing(name, tmp_path
     if name != "bouncing":  # most of its starts have settled by then
         with pytest.raises(StructureError, match="no attractors"):
             vk.LeastAction().run(osc.replace(noise=vk.WhiteNoise(1e-3)), part)
-
-
-def test_enough_time_changes_nothing(well):
-    osc, whole, _ = well
-    part = vk.find_structure(osc, **WELL, time_limit=1e6)
-    assert part.complete
-    np.testing.assert_array_equal(part.basins.labels, whole.basins.labels)
-
-
-@pytest.mark.parametrize("limit", [0, -1.0, float("nan"), "1", True])
-def test_bad_time_limits(limit):
-    with pytest.raises(StructureError, match="time_limit must be"):
-        vk.find_structure(vk.load_scene("double-well"), time_limit=limit)
 
 
 def test_forces_of_the_stops_along_an_orbit(paper):

@@ -10,7 +10,6 @@ from vibrokit.results.codes import Code
 from vibrokit.structure.harmonic_balance import balances_of
 from vibrokit.structure.known_motions import known_motions
 from vibrokit.structure.regions import search_region
-from vibrokit.structure.roots import bracketed_roots
 from vibrokit.structure.scales import length_of
 
 
@@ -29,14 +28,6 @@ def tube(hertz=58.0, *more):
         natural_frequency=250.7133, damping_ratio=0.008, barriers=stops,
         excitations=(vk.Harmonic(17.142857, 2 * math.pi * hertz), *more),
     )  # fmt: skip
-
-
-def test_pairs_of_roots_between_two_samples_are_found():
-    places = np.linspace(-1.0, 1.0, 12)
-    roots = [-0.31, -0.31 + 1e-6, 0.5]
-    values = np.prod([places - root for root in roots], axis=0)
-    assert bracketed_roots(lambda x: math.prod(x - root for root in roots), places, values) == pytest.approx(roots)
-    assert bracketed_roots(lambda x: x * x + 1e-9, places, places**2 + 1e-9) == []
 
 
 @pytest.mark.parametrize(

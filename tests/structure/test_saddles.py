@@ -17,7 +17,7 @@ from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import equilibria, find_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import classify_grid
-from vibrokit.structure.boundaries.edges import Straddles, meeting_cells, spread
+from vibrokit.structure.boundaries.meetings import meeting_cells
 from vibrokit.structure.boundaries.saddles import SaddleSearch
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -109,16 +109,6 @@ def test_stops_whose_force_jumps():
     (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS, cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
     assert saddle.leads_to == (0, 1)
-
-
-@pytest.mark.slow
-def test_a_third_state_of_the_noise():
-    osc = double_well(noise=Coloured(intensity=0.01, rate=0.3))
-    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
-    np.testing.assert_allclose(saddle.points, [[0, 0, 0]], atol=1e-12)
-    grows, falls = hilltop(0.05, 1.0)
-    np.testing.assert_allclose(saddle.exponents, [grows, -0.3, falls], rtol=1e-9)
-    assert (saddle.kind, saddle.leads_to) == ("saddle", (0, 1))
 
 
 def mapped_by_scipy(force, state, duration, stop=None):
@@ -236,31 +226,6 @@ def test_the_paper_scene_has_one_boundary_saddle(stops):
     check_against_scipy(osc, found[0], paper_force, stop=0.5)
 
 
-def test_edge_tracks_are_trajectories_on_the_boundary(stops):
-    osc, _, classifier, basins = stops
-
-    def tracked():
-        straddles = Straddles(classifier, basins, 4, np.random.default_rng(0))
-        for _ in range(30):
-            straddles.advance()
-        return straddles.tracks()
-
-    tracks, again = tracked(), tracked()
-    assert len(tracks) >= 2
-    for track, same in zip(tracks, again, strict=True):
-        assert track.labels == (0, 1)
-        np.testing.assert_array_equal(track.points, same.points)
-        # From point to point they follow the map, to what two sides may be apart.
-        images = osc.section_map(track.points[:-1], stepper=classifier.stepper)
-        assert np.linalg.norm(images - track.points[1:], axis=1).max() < 1e-7
-        # Once at the saddle, the two sides part as the derivative of that map says, here by differences.
-        around = track.points[-1] + 1e-6 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-        ends = osc.section_map(around, stepper=classifier.stepper)
-        derivative = np.stack([ends[0] - ends[1], ends[2] - ends[3]], axis=1) / 2e-6
-        unstable = np.abs(np.linalg.eigvals(derivative)).max()
-        np.testing.assert_allclose(track.stretches[-5:], np.log(unstable), rtol=1e-3)
-
-
 @pytest.mark.slow
 def test_an_unstable_limit_cycle_parts_rest_from_motion():
     # x″ + v (2ζ − a x² + b x⁴) + x = 0 averages to 2ζ/2 − a A²/8 + b A⁴/16 = 0 on its cycles (first order in these).
@@ -288,13 +253,6 @@ def test_cells_that_did_not_settle_are_passed_over():
     near = meeting_cells(Basins(region, np.array([[1], [0], [-1], [1], [-2]], dtype=np.int16)))
     assert {pair: cells.tolist() for pair, cells in near.items()} == {(-2, 1): [[4, 3]], (0, 1): [[1, 0]]}
     assert meeting_cells(Basins(region, np.zeros((5, 1), dtype=np.int16))) == {}
-
-
-def test_starts_are_spread():
-    lines = np.repeat(np.linspace(0, 1, 101), 4).reshape(-1, 2, 2)
-    picked = np.sort(spread(lines, 3, np.random.default_rng(0))[:, 0, 0])
-    assert np.diff(picked).min() >= 0.25  # of three points in [0, 1] at best 0.5; picked one by one, half of that
-    assert len(spread(lines[:2], 16, np.random.default_rng(0))) == 2
 
 
 def test_one_basin_has_no_boundary():
@@ -368,35 +326,14 @@ def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_stri
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(slopes)), np.sort(saddle.multipliers.real), rtol=1e-5)
 
 
-class TestEdgeBudget:
-    OSC = vk.load_scene("hertz-0.570")
-
-    def straddles(self, budget):
-        attractors = orbits(self.OSC, (0.3, 0.0), (0.53, -0.04))
-        classifier, basins = settled(self.OSC, attractors, ((-1.2, 1.2), (-1.2, 1.2)))
-        return Straddles(classifier, basins, 9, np.random.default_rng(0), budget=budget)
-
-    def test_boundaries_that_it_is_too_small_for_are_named(self):
-        structure = vk.find_structure(self.OSC, edge_budget=10_000, manifolds=False)
-        assert not structure.saddles
-        (finding,) = structure.found(Code.EDGE_BUDGET)
-        assert finding.values == {"count": 1, "budget": 10_000}
-        others = (Code.BOUNDARY_LOST, Code.CHAOTIC_EDGE, Code.EDGE_NOT_CONVERGED)
-        assert not any(structure.found(code) for code in others)
-        assert structure.settings["edge_budget"] == 10_000
-
-    def test_it_is_not_spent_where_the_first_cut_shows_that_it_is_too_small(self):
-        whole = self.straddles(np.inf)
-        assert not whole.spent
-        assert len(whole)
-        part = self.straddles(whole.sections // 2)
-        assert part.spent
-        assert part.sections < whole.sections / 3
-        assert not len(part)
-
-    def test_one_that_is_large_enough_changes_nothing(self):
-        few, many = (self.straddles(budget) for budget in (1e7, np.inf))
-        assert few.ends.tobytes() == many.ends.tobytes()
+def test_boundaries_that_an_edge_budget_is_too_small_for_are_named():
+    structure = vk.find_structure(vk.load_scene("hertz-0.570"), edge_budget=10_000, manifolds=False)
+    assert not structure.saddles
+    (finding,) = structure.found(Code.EDGE_BUDGET)
+    assert finding.values == {"count": 1, "budget": 10_000}
+    others = (Code.BOUNDARY_LOST, Code.CHAOTIC_EDGE, Code.EDGE_NOT_CONVERGED)
+    assert not any(structure.found(code) for code in others)
+    assert structure.settings["edge_budget"] == 10_000
 
 
 def test_basins_that_a_saddle_connects_count_as_one_where_a_saddle_to_others_is_missing():
@@ -415,3 +352,13 @@ def test_basins_that_a_saddle_connects_count_as_one_where_a_saddle_to_others_is_
     right = {attractor.label for attractor in structure.attractors if attractor.points[0, 0] > 0}
     assert 0 < len(right & set(hilltop.leads_to)) < len(set(hilltop.leads_to))
     assert len(structure.saddles) == 3
+
+
+@pytest.mark.slow
+def test_a_third_state_of_the_noise():
+    osc = double_well(noise=Coloured(intensity=0.01, rate=0.3))
+    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
+    np.testing.assert_allclose(saddle.points, [[0, 0, 0]], atol=1e-12)
+    grows, falls = hilltop(0.05, 1.0)
+    np.testing.assert_allclose(saddle.exponents, [grows, -0.3, falls], rtol=1e-9)
+    assert (saddle.kind, saddle.leads_to) == ("saddle", (0, 1))

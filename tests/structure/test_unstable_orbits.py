@@ -107,23 +107,19 @@ def test_a_repeller():
     np.testing.assert_allclose(sorted(orbit.exponents, key=np.imag), [0.5 - 0.75**0.5 * 1j, 0.5 + 0.75**0.5 * 1j])
 
 
-@pytest.mark.parametrize("period", [0, -1, 1.0, True, "1", None, 10**9])
-def test_bad_periods(period):
-    with pytest.raises(StructureError, match="period must be"):
-        unstable_orbits(vk.load_scene("duffing"), period)
+BAD = {
+    "period must be": [{"period": period} for period in (0, -1, 1.0, True, "1", None, 10**9)],
+    "starts must be": [{"starts": starts} for starts in (3, (0, 1), (1.0, 2), (10**5, 10**5), None, (1, 2, 3))],
+    "region": [{"region": ((1, -1), (0, 1))}],
+}
 
 
-@pytest.mark.parametrize("starts", [3, (0, 1), (1.0, 2), (10**5, 10**5), None, (1, 2, 3)])
-def test_bad_starts(starts):
-    with pytest.raises(StructureError, match="starts must be"):
-        unstable_orbits(vk.load_scene("duffing"), 1, starts=starts)
+@pytest.mark.parametrize(("words", "given"), [(words, given) for words, many in BAD.items() for given in many])
+def test_bad_arguments(words, given):
+    with pytest.raises(StructureError, match=words):
+        unstable_orbits(vk.load_scene("duffing"), **({"period": 1} | given))
 
 
 def test_only_equilibria_without_forcing():
     with pytest.raises(StructureError, match="equilibria"):
         unstable_orbits(vk.load_scene("double-well"), 2)
-
-
-def test_bad_regions():
-    with pytest.raises(StructureError, match="region"):
-        unstable_orbits(vk.load_scene("duffing"), 1, region=((1, -1), (0, 1)))

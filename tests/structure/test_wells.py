@@ -6,7 +6,7 @@ import pytest
 import vibrokit as vk
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.region import Region
-from vibrokit.structure.basins.wells import wells
+from vibrokit.structure.basins.stop_cells import wells
 
 TINY = 1e-14  # friction that depends on x: too little to change the motion, enough that energy is not asked for
 

@@ -15,7 +15,7 @@ from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, Bound
-from vibrokit.structure.boundaries.edges import meeting_cells
+from vibrokit.structure.boundaries.meetings import meeting_cells
 
 _EXACT = (ExitState.MIRRORED, ExitState.ATTAINED, ExitState.BARRIER)
 """Energies with bounds that no graph gave."""

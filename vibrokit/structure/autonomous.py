@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -18,26 +20,22 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.borders import intervals_within
+from vibrokit.structure.circle import turn_of, wrapped
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
-from vibrokit.structure.orbits import CONVERGED, Orbit
-from vibrokit.structure.roots import bracketed_roots
-from vibrokit.structure.scales import size_of, units_of
+from vibrokit.structure.orbits import CONVERGED, EQUAL, Orbit
+from vibrokit.structure.rest import SteadyForce
+from vibrokit.structure.scales import size_of, states_at, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
 """Parts of 2π/ω_n: over one of them the motion at an equilibrium is linearized."""
-_PLACES = 1024  # at which the force at rest is compared with 0
-_ONE_PLACE = 1e-14  # of the range: distance of two results that are one
-_AT_REST = 1e-6  # largest relative motion of a state that counts as an equilibrium
-_SAMPLES = 256  # in 2π/ω_n, along a path in which turning points are searched for
-_RECURRENCE = 1e-2  # of the extent of the motion: distance between turning points from which Newton's method starts
-_MOST_TURNS = 256  # turning points in one cycle
-_MOST_TRIALS = 8  # recurrences from which Newton's method may fail
-_LONGEST_STEP = 0.25  # of the duration: what one Newton step may change in it
+_SAMPLES = 256  # in 2π/ω_n, along a path in which a cycle is searched for
+_RECURRENCE = 1e-2  # of the extent of the motion: distance of two passages from which Newton's method starts
 
 Array = NDArray[np.float64]
+Passage = tuple[float, Array]
+"""A time (s), and the state then."""
 
 
 class Equilibrium(Orbit):
@@ -70,7 +68,7 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
 
     A StructureError is raised for a scene with periodic excitation, and if no equilibrium is near the guess.
     """
-    refuse_forcing(osc)
+    _refuse_forcing(osc)
     units = units_of(osc)
     (point,), (residual,), (jacobian,) = newton(scaled(equilibrium_equations(osc), units), guess[None])
     if not residual <= CONVERGED * (1.0 + float(np.linalg.norm(guess / units))):
@@ -89,38 +87,20 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
     return Equilibrium(point[None], 1, 0.0, monodromy[None], float(residual))
 
 
-def equilibria(osc: Oscillator, low: float, high: float) -> list[Equilibrium]:
+@functools.lru_cache(maxsize=256)
+def equilibria(osc: Oscillator, low: float, high: float) -> tuple[Equilibrium, ...]:
     """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 
-    A force changes its sign at a pole, too, so each interval between borders of the forces is searched by itself.
-    Where the force comes near 0 between the places where it is evaluated and turns back, a node and a saddle next to it
-    are both found. A StructureError is raised for a scene with periodic excitation.
+    A StructureError is raised for a scene with periodic excitation.
     """
-    refuse_forcing(osc)
-    field, rest = VectorField(osc), np.zeros(1 if osc.noise is None else 1 + len(osc.noise.extra_states))
-
-    def force(places: Array) -> Array:
-        states = np.hstack([places[:, None], np.broadcast_to(rest, (len(places), len(rest)))])
-        return field.rate(states)[:, 1]
-
-    def force_at(x: float) -> float:
-        found = float(force(np.array([x]))[0])
-        if not math.isfinite(found):
-            raise StructureError(
-                f"the force at rest has no value at x = {x:.6g}, where it is needed: a formula is 0/0 there, or "
-                "infinite; write it without that division, or give a region without that place."
-            )
-        return found
-
-    guesses, found = list[float](), list[Equilibrium]()
-    for one, other in intervals_within(osc, low, high):
-        places = np.linspace(one, other, _PLACES)
-        guesses += bracketed_roots(force_at, places, force(places))
-    for guess in sorted(guesses):
+    _refuse_forcing(osc)
+    found = list[Equilibrium]()
+    for state in states_at(osc, np.array([(place, 0.0) for place in SteadyForce(osc).zeros(low, high)]).reshape(-1, 2)):
         with contextlib.suppress(StructureError):  # a force that jumps has no equilibrium where it does
-            found.append(refine_equilibrium(osc, np.concatenate([[guess], rest])))
-    apart = _ONE_PLACE * (high - low)
-    return [one for at, one in enumerate(found) if not at or abs(one.point[0] - found[at - 1].point[0]) > apart]
+            rest = refine_equilibrium(osc, state)
+            if not found or abs(rest.point[0] - found[-1].point[0]) > 1e-14 * (high - low):
+                found.append(rest)
+    return tuple(found)
 
 
 def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex128]:
@@ -128,12 +108,12 @@ def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex12
 
     A StructureError is raised for a scene with periodic excitation, and for a point that is not at rest.
     """
-    refuse_forcing(osc)
+    _refuse_forcing(osc)
     place, field = np.array(point, dtype=float), VectorField(osc)
     exponents = np.linalg.eigvals(field.jacobian(place)).astype(complex)
     speed = float(np.linalg.norm(field.rate(place)))
     fastest = max(float(np.abs(exponents).max()), 1.0 / osc.time_unit)
-    if not speed <= _AT_REST * fastest * (size_of(osc) + float(np.linalg.norm(place))):
+    if not speed <= EQUAL * fastest * (size_of(osc) + float(np.linalg.norm(place))):
         raise StructureError(
             f"{tuple(np.round(place, 6).tolist())} is not an equilibrium: the state moves at {speed:.2e} per second "
             "there; give a point at rest."
@@ -141,8 +121,7 @@ def equilibrium_exponents(osc: Oscillator, point: Array) -> NDArray[np.complex12
     return exponents[np.argsort(-exponents.real, kind="stable")]
 
 
-def refuse_forcing(osc: Oscillator) -> None:
-    """Raise StructureError for a scene with periodic excitation."""
+def _refuse_forcing(osc: Oscillator) -> None:
     if not osc.autonomous:
         raise StructureError(
             f"the scene has periodic excitation (period {osc.section_interval:.6g} s), and only scenes without it "
@@ -150,36 +129,41 @@ def refuse_forcing(osc: Oscillator) -> None:
         )
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Cycle(Orbit):
-    """A closed orbit of a scene without periodic excitation, from a turning point (v = 0); its period is 1.
+    """A closed orbit of a scene without periodic excitation; its period is 1.
 
-    One eigenvalue of its monodromy matrix is 1: that of a shift along the cycle.
+    It starts at a turning point (v = 0); motion that turns over has none, and starts at some x. One eigenvalue of its
+    monodromy matrix is 1: that of a shift along the cycle.
     """
 
     kind: ClassVar[str] = "limit cycle"
 
+    pinned: int = 1  # the coordinate that is given at the start: v, or x where motion turns over
+
     def refined(self, osc: Oscillator, stepper: Stepper) -> Cycle:
         """Return the cycle that Newton's method finds from here with another stepper; may raise StructureError."""
-        return refine_cycle(osc, self.point, self.duration, stepper)
+        return refine_cycle(osc, self.point, self.duration, stepper, pinned=self.pinned)
 
 
-def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Stepper) -> Cycle:
-    """Refine a cycle by Newton's method on the turning point (v = 0) and the duration until the residual stays.
+def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Stepper, *, pinned: int = 1) -> Cycle:
+    """Refine a cycle by Newton's method on its start and the duration until the residual stays.
 
-    `state` is near a turning point of the cycle; its v is set to 0. A StructureError is raised for a scene with
-    periodic excitation, and if the iteration does not converge to a cycle.
+    `state` is near a turning point of the cycle, and its v is set to 0; where x is pinned, that stays what it is. A
+    StructureError is raised for a scene with periodic excitation, and if the iteration does not converge to a cycle.
     """
-    refuse_forcing(osc)
-    guess = np.array(state, dtype=float)
-    guess[1] = duration
+    _refuse_forcing(osc)
+    start = np.array(state, dtype=float)
+    start[pinned] *= pinned == 0
+    guess = _with(start, pinned, duration)
 
     def limited(unknowns: Array, steps: Array) -> Array:
-        most = _LONGEST_STEP * unknowns[:, 1]
-        steps[:, 1] = np.clip(steps[:, 1], -most, most)
+        most = 0.25 * unknowns[:, pinned]
+        steps[:, pinned] = np.clip(steps[:, pinned], -most, most)
         return steps
 
-    units, start = units_of(osc), turning_point(guess)
-    equations = scaled(cycle_equations(osc, stepper), units)
+    units = units_of(osc)
+    equations = scaled(cycle_equations(osc, stepper, pinned, start[pinned]), units)
     (unknowns,), (residual,), (monodromy,) = newton(equations, guess[None], limited=limited)
     if not residual <= CONVERGED * (1.0 + float(np.linalg.norm(start / units))):
         raise StructureError(
@@ -187,45 +171,44 @@ def refine_cycle(osc: Oscillator, state: Array, duration: float, stepper: Steppe
             f"the residual is {residual:.1e}. The start is too far away, or the cycle is one of a family; follow the "
             "motion for longer, take a finer stepper, or give the scene damping."
         )
-    cycle = Cycle(turning_point(unknowns)[None], 1, float(unknowns[1]), monodromy[None], float(residual))
-    check_cycle(cycle, VectorField(osc).rate(cycle.point), size_of(osc), stepper)
+    point, duration = _with(unknowns, pinned, start[pinned]), float(unknowns[pinned])
+    cycle = Cycle(point[None], 1, duration, monodromy[None], float(residual), pinned)
+    _check(cycle, VectorField(osc).rate(point), size_of(osc), stepper)
     return cycle
 
 
-def cycle_equations(osc: Oscillator, stepper: Stepper) -> Callable[[Array], Evaluation]:
+def cycle_equations(
+    osc: Oscillator, stepper: Stepper, pinned: int = 1, level: float = 0.0
+) -> Callable[[Array], Evaluation]:
     """Return the equations of one cycle; attached is the derivative of the flow over the duration.
 
-    v is 0 at the turning point, so the duration takes its place among the unknowns.
+    A coordinate of the start is given, so that the duration takes its place among the unknowns.
     """
     field = VectorField(osc)
 
     def evaluate(unknowns: Array) -> Evaluation:
-        start, duration = turning_point(unknowns[0])[None], float(unknowns[0, 1])
+        start, duration = _with(unknowns, pinned, level), float(unknowns[0, pinned])
         if not duration > 0:
             raise StructureError(f"Newton's method for a limit cycle reached the duration {duration:g} s.")
         found = linear_map(osc, start, stepper, interval=duration)
         jacobians = found.derivatives - np.eye(start.shape[1])
-        jacobians[:, :, 1] = field.rate(found.images)
-        return Evaluation(found.images - start, jacobians, found.derivatives)
+        jacobians[:, :, pinned] = field.rate(found.images)
+        return Evaluation(wrapped(osc, found.images - start), jacobians, found.derivatives)
 
     return evaluate
 
 
-def turning_point(unknowns: Array) -> Array:
-    """Return the state that unknowns stand for, with v = 0 in place of the duration."""
-    point = unknowns.copy()
-    point[1] = 0.0
-    return point
+def _with(states: Array, coordinate: int, value: float) -> Array:
+    changed = states.copy()
+    changed[..., coordinate] = value
+    return changed
 
 
-def check_cycle(cycle: Orbit, rate: Array, size: float, stepper: Stepper) -> None:
-    """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself.
-
-    A StructureError is raised for both.
-    """
+def _check(cycle: Cycle, rate: Array, size: float, stepper: Stepper) -> None:
+    """Refuse an equilibrium, which repeats after any time, and a derivative that does not map the rate to itself."""
     speed = float(np.linalg.norm(rate))
     place = tuple(np.round(cycle.point, 6).tolist())
-    if speed * cycle.duration < _AT_REST * (size + float(np.linalg.norm(cycle.point))):
+    if speed * cycle.duration < EQUAL * (size + float(np.linalg.norm(cycle.point))):
         raise StructureError(
             f"Newton's method converged to the equilibrium {place}, not to a cycle; start farther from it."
         )
@@ -241,21 +224,23 @@ def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: floa
     """Find the cycle that the motion from a state settles on, by the recurrence of its turning points.
 
     The motion is followed for twice `longest`, the longest duration of a cycle (s). The point of the cycle is the
-    turning point of greatest x. A StructureError is raised for a scene with periodic excitation, and for motion that
-    does not repeat within that time.
+    turning point of greatest x, or x = 0 if it turns over. A StructureError is raised for a scene with periodic
+    excitation, and for motion that does not repeat within that time.
     """
-    refuse_forcing(osc)
+    _refuse_forcing(osc)
     spacing = osc.time_unit / _SAMPLES
-    count = math.ceil(2 * longest / spacing)
-    path = record(osc, Flow.STATE, stepper, np.array(state, dtype=float), 0.0, spacing, count)
+    path = record(
+        osc, Flow.STATE, stepper, np.array(state, dtype=float), 0.0, spacing, math.ceil(2 * longest / spacing)
+    )
+    for speed, duration in _turning_over(osc, path, spacing):
+        with contextlib.suppress(StructureError):
+            return refine_cycle(osc, np.array([0.0, speed, *path[-1, 2:]]), duration, stepper, pinned=0)
     extent = float(np.ptp(path[len(path) // 2 :, :2], axis=0).max())
-    # From the last turn backwards, where the motion is closest to the cycle.
-    before = np.flatnonzero((path[:-1, 1] > 0) & (path[1:, 1] <= 0))[::-1][:_MOST_TURNS]
-    turns: list[tuple[float, Array]] = []
-    failures: list[StructureError] = []
-    for index in before:
-        turns.append(_turn(osc, path[index], index * spacing, spacing, stepper))
-        (last, here), (time, there) = turns[0], turns[-1]
+    turns, failures = list[Passage](), list[StructureError]()
+    for turn in _turning_points(osc, path, spacing, stepper):
+        turns.append(turn)
+        last, here = turns[0]
+        time, there = turn
         if time == last or last - time > longest or float(np.abs(here - there).max()) > _RECURRENCE * extent:
             continue
         highest = max(turns[1:], key=lambda turn: float(turn[1][0]))[1]
@@ -263,7 +248,7 @@ def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: floa
             cycle = refine_cycle(osc, highest, last - time, stepper)
         except StructureError as error:
             failures.append(error)
-            if len(failures) == _MOST_TRIALS:
+            if len(failures) == 8:
                 break
             continue
         off = abs(cycle.duration - (last - time)) / cycle.duration + np.abs(cycle.point - highest).max() / extent
@@ -276,12 +261,30 @@ def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: floa
     )
 
 
-def _turn(osc: Oscillator, state: Array, time: float, spacing: float, stepper: Stepper) -> tuple[float, Array]:
-    """Locate the turning point between a sample and the next: its time, and the state there."""
+def _turning_points(osc: Oscillator, path: Array, spacing: float, stepper: Stepper) -> Iterator[Passage]:
+    """Locate the last turning points of greatest x, from the end backwards, where motion is closest to the cycle."""
 
-    def after(delay: float) -> Array:
+    def after(state: Array, delay: float) -> Array:
         return run_ensemble(osc, Flow.STATE, stepper, state[None], interval=delay).states[0] if delay else state
 
-    end = after(spacing)
-    delay = spacing if end[1] >= 0 else float(brentq(lambda delay: after(delay)[1], 0.0, spacing, xtol=1e-9 * spacing))
-    return time + delay, after(delay)
+    for index in np.flatnonzero((path[:-1, 1] > 0) & (path[1:, 1] <= 0))[::-1][:256]:
+        start, delay = path[index], spacing
+        if after(start, spacing)[1] < 0:
+            delay = float(brentq(lambda delay, start=start: after(start, delay)[1], 0.0, spacing, xtol=1e-9 * spacing))
+        yield index * spacing + delay, after(start, delay)
+
+
+def _turning_over(osc: Oscillator, path: Array, spacing: float) -> Iterator[tuple[float, float]]:
+    """The speed at x = 0 and the duration of motion that turns over, by its last passages; nothing if it does not."""
+    turn, (x, v) = turn_of(osc), path[:, :2].T
+    turns = np.floor(x / turn) if turn else np.zeros(len(x))
+    passed = np.flatnonzero(np.diff(turns))[-17:]
+    if len(passed) < 2 or len(set(np.sign(np.diff(turns)[passed]).tolist())) != 1:
+        return
+    levels = turn * np.maximum(turns[passed], turns[passed + 1])
+    parts = (levels - x[passed]) / (x[passed + 1] - x[passed])
+    speeds, times = v[passed] + parts * (v[passed + 1] - v[passed]), spacing * (passed + parts)
+    for back in range(2, len(passed) + 1):
+        if abs(speeds[-1] - speeds[-back]) < _RECURRENCE * np.abs(speeds).max():
+            yield float(speeds[-1]), float(times[-1] - times[-back])
+            return

@@ -13,9 +13,6 @@ from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
 
-_DECADES, _PER_DECADE = 12, 32  # distances from a border, above and below 1 m, at which forces are compared with 0
-_BESIDE = 1e-9  # of an interval: so near to a border its force is finite
-
 Array = NDArray[np.float64]
 
 
@@ -31,7 +28,7 @@ def length_between_borders(osc: Oscillator) -> float:
         return nearest if math.isfinite(nearest) else 0.0
     side = 1.0 if low >= 0.0 else -1.0
     near, far = sorted((abs(low), abs(high)))
-    away = near + np.geomspace(10.0**-_DECADES, 10.0**_DECADES, 2 * _DECADES * _PER_DECADE + 1)
+    away = near + np.geomspace(1e-12, 1e12, 24 * 32 + 1)
     away = away[away < far]
     states = np.zeros((len(away), 2 + len(osc.noise.extra_states if osc.noise else ())))
     states[:, 0] = side * away
@@ -66,7 +63,7 @@ def intervals_within(osc: Oscillator, low: float, high: float) -> list[tuple[flo
     """
     domain, found = osc.model.domain, []
     for one, other in domain.intervals(low, high):
-        beside = _BESIDE * (other - one)
+        beside = 1e-9 * (other - one)
         first, last = (beside * bool(domain.borders(end - beside, end + beside)) for end in (one, other))
         found.append((one + first, other - last))
     return found

@@ -5,16 +5,10 @@ The flow stays on the line; points are compared on the circle.
 
 from __future__ import annotations
 
-import concurrent.futures
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels.ensemble import Ensemble, run_ensemble
-from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.repetition import period_along_x
 
 Array = NDArray[np.float64]
@@ -49,18 +43,3 @@ def shifted(states: Array, distance: Array | float) -> Array:
     moved = np.array(states, dtype=float)
     moved[..., 0] += distance
     return moved
-
-
-def advanced(
-    osc: Oscillator,
-    stepper: Stepper,
-    states: Array,
-    middle: float = 0.0,
-    executor: concurrent.futures.Executor | None = None,
-) -> tuple[Ensemble, NDArray[np.int64]]:
-    """Integrate states (count, n) over one section; return where they end on the turn around a place, and the turns."""
-    ended = run_ensemble(osc, Flow.STATE, stepper, states, visits=1, executor=executor)
-    turns = turns_to(osc, ended.states, middle)
-    away = -turn_of(osc) * turns
-    moved = dataclasses.replace(ended, states=shifted(ended.states, away), visits=shifted(ended.visits, away[:, None]))
-    return moved, turns.astype(np.int64)

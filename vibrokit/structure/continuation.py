@@ -31,14 +31,7 @@ from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.searched_value import SearchedValue, searched_value
-from vibrokit.structure.tracing.branches import (
-    Tracing,
-    bifurcations_of,
-    branch_findings,
-    branch_names,
-    thinned,
-    without_fraction,
-)
+from vibrokit.structure.tracing.branches import Tracing, thinned, without_fraction
 from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -162,26 +155,24 @@ class ContinuationRun:
 
     def record(self, work: Work) -> Continuation:
         """Return the record of all that was found."""
-        tracing, declared, request, numbered = self.tracing, self.line.entry.declared, self.request, self.numbered
-        bifurcations = bifurcations_of(tracing, numbered)
+        tracing, declared, request = self.tracing, self.line.entry.declared, self.request
         states = tuple(self._states())
         states += tuple(self._copies(states[-1])) if self.still and states and not self.work.stopped else ()
         arguments = {name: getattr(request, name) for name in ("region", "cells", "starts", "stepper", "rng")}
         arguments |= {"parameter": self.line.argument, "values": tuple(self.values)}
         nothing = [finding for at in states for finding in at.findings if finding.code is Code.NOTHING_AT]
-        findings = branch_findings(tracing, numbered, bifurcations, len(states))
         return Continuation(
             parameter=self.line.path,
             symbol=declared.symbol,
             unit=declared.unit,
             region=self.region,
             states=states,
-            branch_names=branch_names(tracing, numbered),
-            bifurcations=bifurcations,
+            branch_names=tracing.names,
+            bifurcations=tracing.bifurcations,
             complete=not self.work.stopped,
             scene=scene_data(self.osc),
             settings=plain(arguments),
-            findings=(*findings, *nothing, *self.work.findings),
+            findings=(*tracing.findings(len(states)), *nothing, *self.work.findings),
             stats=work.stats,
             seed=request.rng,
             seconds=work.seconds,
@@ -200,11 +191,6 @@ class ContinuationRun:
                 advance()
                 if self.still and not found.refused:
                     break
-
-    @cached_property
-    def numbered(self) -> list[list[int]]:
-        """The branch of each attractor, once the stages are over."""
-        return self.tracing.numbered()
 
     @cached_property
     def tracing(self) -> Tracing:
@@ -252,7 +238,9 @@ class ContinuationRun:
         places = {value: index for index, value in enumerate(self.tracing.values)}
         for at in self.found:
             index = places.get(at.value)
-            pairs = [] if index is None else list(zip(self.tracing.found[index], self.numbered[index], strict=True))
+            pairs = (
+                [] if index is None else list(zip(self.tracing.found[index], self.tracing.numbered[index], strict=True))
+            )
             pairs.sort(key=lambda pair: order_of(pair[0]))  # as find_structure does, for the same names
             named = labelled([attractor for attractor, _ in pairs], has_stops=bool(self.osc.barriers))
             yield SteadyStates(

@@ -15,10 +15,7 @@ MARGIN = 1.0
 """Fraction of its width and height by which a region is widened on every side; beyond that a curve is outside."""
 
 _FLOOR = 0.01  # shortest chord that is divided because of its angle, in units of the spacing
-_REST = 1e-5  # length of an image, relative to the region, below which a curve has converged to a point
-_SEEDS = 5
-_THINNING = 1.1  # largest ratio of the lengths of a curve before and after it is thinned
-_MOST_VERTICES, _MOST_IMAGES = 100_000, 5000
+_MOST_VERTICES = 100_000
 
 Array = NDArray[np.float64]
 Images = Callable[[Array, int], Array]
@@ -137,7 +134,7 @@ class Domain:
 @np.errstate(invalid="ignore", over="ignore")  # motion that has left the region may be anywhere
 def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, ManifoldEnd]:
     """Join the images of a domain to a curve (count, 2) until it is long enough, leaves the region, or converges."""
-    fractions = np.linspace(0.0, 1.0, _SEEDS)
+    fractions = np.linspace(0.0, 1.0, 5)
     states = domain(fractions)
     curve = [domain.point[None], states]
     if not limits.inside(np.concatenate(curve)).all():
@@ -146,7 +143,7 @@ def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, Manifol
     if remaining <= 0.0:
         return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_VERTICES)
     extent, left = 0.0, limits.applications
-    for count in range(1, _MOST_IMAGES + 1):
+    for count in range(1, 5001):
         before, known = curve[-1][-2], (fractions, images(states, 1))
         fractions, states, left = _image(domain, images, count, known, before, remaining, limits, left - len(states))
         if left < 0:
@@ -161,7 +158,7 @@ def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, Manifol
         curve.append(joined[1:])
         vertices, remaining = vertices + len(joined) - 1, remaining - _length(joined)
         last, extent = extent, float(limits.shape(joined)[0].sum())
-        if extent < min(last, _REST):
+        if extent < min(last, 1e-5):  # widths of the region: it converges to a point
             return np.concatenate(curve), ManifoldEnd.AT_REST
     return np.concatenate(curve), ManifoldEnd.TOO_SLOW
 
@@ -184,7 +181,7 @@ def _image(
     """
     fractions, states = known
     while True:
-        needed = limits.needed(states, _THINNING * remaining)
+        needed = limits.needed(states, 1.1 * remaining)
         fractions, states = fractions[:needed], states[:needed]
         coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(fractions) > domain.resolution)
         left -= count * int(coarse.sum())

@@ -25,33 +25,26 @@ from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
-from vibrokit.results.survival import Survival
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
-from vibrokit.structure.barrier_tops import in_front_of_stops, tops_around
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.basins.grid import BasinGrid, with_fractions
+from vibrokit.structure.basins.grid import SETTLING, BasinGrid, with_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN, centres
-from vibrokit.structure.boundaries.saddles import SaddleSearch
+from vibrokit.structure.boundaries.saddles import SOON, SaddleSearch
 from vibrokit.structure.circle import turn_of
 from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
+from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_stepper, slowest_rate, wait_of
 from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
-from vibrokit.structure.scales import states_at
-from vibrokit.structure.search import LONGEST_PERIOD, Search, persistent_stepper
+from vibrokit.structure.rest import in_front_of_stops, tops_around
+from vibrokit.structure.scales import length_of, states_at
+from vibrokit.structure.search import LONGEST_PERIOD, Search
 from vibrokit.structure.validation import Request
 from vibrokit.symbolic.flow_kind import Flow
 
-_FOLDS = 30  # e-foldings of the linear damping, or of the slowest deviation from an attractor, for a transient
-_LEAST_WAIT = 200
-_LONGEST_WAIT = 20_000
-_LIFETIMES = 5  # of chaotic transients for a cell
-_EDGE_WAIT, _LEAST_EDGE_WAIT = 0.25, 128  # of a transient, and sections: a motion on a boundary converges to its saddle
-_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS, _STEPS_LOCATED = 10**7, 5 * 10**9, 1000  # of edge tracking: 10 to 20 s
-_SEARCH_SETTLING = 1e-3
-_CLEAR = 0.25  # of the distance between two equilibria
-_WIDENINGS, _FOLLOWED_ON = 2, 64  # of the region, and cells whose motion is followed on to see whether it needs one
+_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS = 10**7, 5 * 10**9  # of edge tracking: 10 to 20 s
 _MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
 _MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
+_WIDENINGS = 2  # of the region
 
 Array = NDArray[np.float64]
 
@@ -62,12 +55,12 @@ class Finder:
     def __init__(self, osc: Oscillator, request: Request, executor: concurrent.futures.Executor | None) -> None:
         self.osc, self.request, self.region, self.executor = osc, request, request.region, executor
         self.rng = np.random.default_rng(request.rng)
-        self.wait = _wait(osc)
+        self.wait = wait_of(osc)
         self.budget = request.budget or self.wait
         self.orbit_stepper = request.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
         self.stepper = request.stepper or ensemble_stepper(osc, Flow.STATE)
         self.searched = self.region or search_region(osc)
-        self.search = Search(osc, self.searched, _SEARCH_SETTLING, self._search_stepper(), self.orbit_stepper, executor)
+        self.search = Search(osc, self.searched, SETTLING, self._search_stepper(), self.orbit_stepper, executor)
         self.attractors: tuple[Attractor, ...] = ()
         self.circle = False  # whether states a turn apart along x are one
         self.grid: BasinGrid | None = None
@@ -96,10 +89,10 @@ class Finder:
 
     def _find_attractors(self) -> None:
         """Search from a grid of starts, and choose a stepper with which every attractor persists."""
-        starts = np.concatenate(
-            [_starts(self.osc, each, self.request.starts, self.rng) for each in self._start_regions()]
-        )
-        self.search.run(starts, self.budget, self.budget >= self.wait)
+        # One region is that of the expected motion, the other contains the tops of barriers around it.
+        regions = [self.searched, *([] if self.region is not None else regions_over_tops(self.osc, self.searched))]
+        starts = [_starts(self.osc, region, self.request.starts, self.rng) for region in regions]
+        self.search.run(np.concatenate(starts), self.budget, self.budget >= self.wait)
         if not self.search.attractors:
             raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
         self._add_rests()
@@ -109,9 +102,9 @@ class Finder:
         self._choose_stepper()
         lifetimes = [survival.lifetime for survival in self.search.survival if np.isfinite(survival.lifetime)]
         if self.request.budget is None:
-            slow = [_periods(self.osc, rate) for rate in map(_slowest_rate, self.attractors) if rate > 0]
-            waits = [self.budget, *slow, *(math.ceil(_LIFETIMES * lifetime) for lifetime in lifetimes)]
-            self.budget = min(_LONGEST_WAIT, max(waits))
+            slow = [periods_of(self.osc, rate) for rate in map(slowest_rate, self.attractors) if rate > 0]
+            waits = [self.budget, *slow, *(math.ceil(5 * lifetime) for lifetime in lifetimes)]
+            self.budget = min(LONGEST_WAIT, max(waits))
 
     def _add_rests(self) -> None:
         """Add the equilibria of the region around what was found, which may be wider than that of the search."""
@@ -123,17 +116,9 @@ class Finder:
             del self.frame
 
     def _choose_stepper(self) -> None:
-        """Choose a stepper with which every attractor persists, unless one is given."""
         if self.request.stepper is None:
-            self.stepper = persistent_stepper(
-                self.osc, self.attractors, self.stepper, self.settling * self.frame.widths
-            )
-
-    def _start_regions(self) -> list[Region]:
-        """Regions of starts: that of the expected motion, and one that contains the tops of barriers around it."""
-        if self.region is not None:
-            return [self.region]
-        return [self.searched, *regions_over_tops(self.osc, self.searched)]
+            distances = self.settling * self.frame.widths
+            self.stepper = persistent_stepper(self.osc, self.attractors, self.stepper, distances)
 
     def _order(self) -> None:
         """Sort the attractors and name them, unless that was done."""
@@ -155,7 +140,7 @@ class Finder:
     def settling(self) -> float:
         """Distance at which a state counts as settled, in widths; less than that between a node and a saddle."""
         gaps = np.diff([float(rest.point[0]) for rest in self.search.at_rest]) / self.frame.widths[0]
-        return float(min([self.request.settling, *(_CLEAR * gaps)]))
+        return float(min([self.request.settling, *(0.25 * gaps)]))
 
     @property
     def classifier(self) -> BasinClassifier:
@@ -188,7 +173,7 @@ class Finder:
         assert self.grid is not None
         labels, region = self.grid.basins.labels, self.grid.basins.region
         lost = np.flatnonzero(np.isin(labels, (ESCAPED, UNSETTLED)))
-        some = lost[:: -(-len(lost) // _FOLLOWED_ON)] if len(lost) else lost
+        some = lost[:: -(-len(lost) // 64)] if len(lost) else lost
         return self.search.go_on(centres(self.osc, region, labels.shape, some), self.budget)
 
     def _fill_grid(self) -> None:
@@ -202,31 +187,24 @@ class Finder:
     def _find_saddles(self) -> None:
         """Track the boundaries between basins to the saddles on them."""
         assert self.grid is not None
-        basins = self.grid.basins
-        sections = max(_LEAST_EDGE_WAIT, math.ceil(_EDGE_WAIT * self.wait))
+        # By located contacts a section takes as long as a thousand steps.
+        steps = self.stepper.steps_in(self.osc, self.osc.section_interval) or 1000
         self.saddle_search = SaddleSearch(
-            self.classifier, basins, self.orbit_stepper, sections=sections, margin=self.request.margin or MARGIN,
-            budget=self.request.edge_budget or self._edge_budget(),
+            self.classifier, self.grid.basins, self.orbit_stepper,
+            sections=max(SOON, math.ceil(0.25 * self.wait)), margin=self.request.margin or MARGIN,
+            budget=self.request.edge_budget or min(_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS // steps),
         )  # fmt: skip
         self.saddle_search.run(self.rng)
-
-    def _edge_budget(self) -> int:
-        """Sections for edge tracking; a section takes as long as its steps, and by located contacts as long as 10³."""
-        steps = self.stepper.steps_in(self.osc, self.osc.section_interval) or _STEPS_LOCATED
-        return min(_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS // steps)
 
     def _grow_manifolds(self) -> None:
         """Grow the manifolds of each saddle that is an orbit."""
         assert self.saddle_search is not None
-        saddles = {
-            n: s
-            for n, s in enumerate(self.saddle_search.saddles)
-            if s.kind in ("saddle", "flip saddle") and not s.embedded
-        }
-        count = sum(map(branch_count, saddles.values()))
+        every = enumerate(self.saddle_search.saddles)
+        saddles = [(n, one) for n, one in every if one.kind in ("saddle", "flip saddle") and not one.embedded]
+        count = sum(branch_count(saddle) for _, saddle in saddles)
         length = default_arc_length(self.frame, max(count, 1))
         with stage("manifolds", unit=BRANCHES, total=count):
-            for index, saddle in saddles.items():
+            for index, saddle in saddles:
                 known = self.manifolds
                 try:
                     for branch in grow_manifolds(
@@ -264,12 +242,11 @@ class Finder:
         )
 
     def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
-        search, saddles = self.search, self.saddle_search
-        found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
+        search, region, found = self.search, grid.basins.region, list[Finding]()
+        found.append(Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts))
         if shift := turn_of(self.osc):
             found.append(Finding.of(Code.ON_CIRCLE if self.circle else Code.SHIFTED_COPIES, shift=shift))
-        where = self.osc.model.conditions
-        if search.diverged and where:
+        if search.diverged and (where := self.osc.model.conditions):
             found.append(Finding.of(Code.STARTS_ENDED, count=search.diverged, starts=search.starts, where=where))
         elif search.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
@@ -280,64 +257,23 @@ class Finder:
         if followed := search.beyond["followed"]:
             settled = followed - search.beyond["diverged"] - search.beyond["moving"]
             found.append(Finding.of(Code.FOLLOWED_ON, settled=settled, **search.beyond))
-        outside = sum(not lies_in(grid.basins.region, attractor) for attractor in self.attractors)
-        if outside:
+        if outside := sum(not lies_in(region, attractor) for attractor in self.attractors):
             (x_min, x_max), (v_min, v_max) = frame_of(self.osc, self.attractors).bounds.tolist()
-            found.append(
-                Finding.of(
-                    Code.REGION_TOO_SMALL, count=outside, x_min=x_min, x_max=x_max, v_min=v_min, v_max=v_max
-                )
-            )  # fmt: skip
-        found += self._tops_outside(grid.basins.region)
-        found += search.findings
-        found += [_survival_finding(survival) for survival in search.survival]
-        found += grid.findings
-        if saddles is not None:
+            bounds = {"x_min": x_min, "x_max": x_max, "v_min": v_min, "v_max": v_max}
+            found.append(Finding.of(Code.REGION_TOO_SMALL, count=outside, **bounds))
+        if self.attractors and not self.circle:
+            x = np.concatenate([attractor.orbit[:, 0] for attractor in self.attractors])
+            tops = tops_around(self.osc, float(x.min()), float(x.max()), length_of(self.osc))
+            places = sorted(top.place for top in in_front_of_stops(self.osc, tops))
+            found += [Finding.of(Code.TOPS_OUTSIDE, place=x) for x in places if not region.x[0] <= x <= region.x[1]]
+        names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
+        survivals = [{name: getattr(one, name) for name in names} for one in search.survival]
+        found += [*search.findings, *(Finding.of(Code.SURVIVAL, **values) for values in survivals), *grid.findings]
+        if (saddles := self.saddle_search) is not None:
             found += saddles.findings
-            outside = sum(not lies_in(grid.basins.region, saddle) for saddle in saddles.saddles)
+            outside = sum(not lies_in(region, saddle) for saddle in saddles.saddles)
             found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
         return (*found, *self.without_manifolds, *self.work.findings)
-
-    def _tops_outside(self, region: Region) -> list[Finding]:
-        """Report tops of potential barriers around the attractors that the region does not contain."""
-        if self.circle or not self.attractors:
-            return []
-        x = np.concatenate([attractor.orbit[:, 0] for attractor in self.attractors])
-        tops = in_front_of_stops(self.osc, tops_around(self.osc, float(x.min()), float(x.max())))
-        places = sorted(top.place for top in tops if not region.x[0] <= top.place <= region.x[1])
-        return [Finding.of(Code.TOPS_OUTSIDE, place=place) for place in places]
-
-
-def _survival_finding(survival: Survival) -> Finding:
-    names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
-    return Finding(Code.SURVIVAL, values={name: getattr(survival, name) for name in names})
-
-
-def _wait(osc: Oscillator) -> int:
-    """Return the periods that a transient needs, by the damping."""
-    rate = osc.damping_ratio * osc.natural_frequency
-    if rate == 0 and osc.model.undamped:
-        raise StructureError(
-            "the scene has no damping (damping_ratio is 0, the stops are elastic), and undamped motion has no "
-            "attractors; give it damping."
-        )
-    slowest = rate if osc.damping_ratio < 1 else osc.natural_frequency / (2 * osc.damping_ratio)
-    return _periods(osc, slowest) if slowest else _LEAST_WAIT
-
-
-def _periods(osc: Oscillator, rate: float) -> int:
-    """Return the periods in which deviations that fall at a rate (s⁻¹) are gone."""
-    return min(_LONGEST_WAIT, _LEAST_WAIT + math.ceil(_FOLDS / (rate * osc.section_interval)))
-
-
-def _slowest_rate(attractor: Attractor) -> float:
-    """Return the rate (s⁻¹) at which the slowest deviation from an orbit or an equilibrium falls; 0 for other sets."""
-    if not attractor.repeats:
-        return 0.0
-    rates = attractor.exponents.real
-    if attractor.kind == "limit cycle":  # a shift along it does not fall
-        rates = np.delete(rates, np.argmin(np.abs(rates)))
-    return float(-rates.max())
 
 
 def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.random.Generator) -> Array:
@@ -350,11 +286,8 @@ def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> st
     """Return why there is no structure, and what to change; `wait` is the budget that the damping requires."""
     advice = "raise budget" if budget < wait else "widen the region or raise budget"
     if search.diverged > search.starts / 2:
-        advice = "most motions grow without bound; narrow the region, or check the signs of the forces"
-        if where := search.osc.model.conditions:
-            advice = (
-                f"most motions end where the forces do ({where}); narrow the region, or check the signs of the forces"
-            )
+        ended = f"end where the forces do ({where})" if (where := search.osc.model.conditions) else "grow without bound"
+        advice = f"most motions {ended}; narrow the region, or check the signs of the forces"
     if search.stalled > search.starts / 2:
         advice = f"{search.stalled} need too many steps; take softer laws, or friction that is smoother"
     return (

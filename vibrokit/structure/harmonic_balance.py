@@ -14,16 +14,11 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.borders import intervals_within
+from vibrokit.structure.rest import SteadyForce
 from vibrokit.structure.roots import bracketed_roots
-from vibrokit.structure.tones import SAMPLES, Tone, tones
+from vibrokit.structure.tones import Tone, tones
 
 _AMPLITUDES, _PHASES = 200, 128  # of the trial motions
-_LEAST_SWING, _MOST_SWING = 1e-3, 1e3  # of the deflection: range of amplitudes, where the damping does not bound it
-_BEYOND = 2.0  # times the amplitude that the damping allows, so that the curve of needed force turns back before it
-_PLACES, _FARTHEST, _MOST_RESTS = 513, 4.0, 5  # within so many lengths of x = 0, where rests are searched for
-_TONES, _LEAST_TONE = 8, 1e-3  # of each excitation, and the least of them, of the largest
-_CENTRINGS = 4  # Newton steps for the centre of a motion, from that of the amplitude before
 
 Array = NDArray[np.float64]
 
@@ -43,54 +38,12 @@ class Balance(NamedTuple):
         return self.centre + swing.real, -self.frequency * swing.imag
 
 
-def tones_of(osc: Oscillator, count: int = _TONES) -> list[Tone]:
-    """Return the tones of the periodic excitations, the lowest of each, without those that are far weaker."""
+def tones_of(osc: Oscillator, count: int = 8) -> list[Tone]:
+    """Return the tones of the periodic excitations, the lowest of each, without those a thousand times weaker."""
     force = VectorField(osc).excitation
     periods = {index: part.period for index, part in enumerate(osc.excitations) if part.period is not None}
     known = {index: period for index, period in periods.items() if math.isfinite(period)}
-    return [tone for i, period in known.items() for tone in tones(partial(force, i), period, count, _LEAST_TONE)[1]]
-
-
-class SteadyForce:
-    """The force on the mass (m s⁻²) without the periodic part of the excitations."""
-
-    def __init__(self, osc: Oscillator) -> None:
-        self.field, self.osc = VectorField(osc), osc
-        self._extra = len(osc.noise.extra_states) if osc.noise else 0
-        periods = {i: part.period for i, part in enumerate(osc.excitations) if part.period is not None}
-        now = sum(self.field.excitation(index, 0.0) for index in periods)
-        self._periodic = now - sum(self._mean(*each) for each in periods.items() if math.isfinite(each[1]))
-
-    def _mean(self, index: int, period: float) -> float:
-        return float(np.mean([self.field.excitation(index, period * k / SAMPLES) for k in range(SAMPLES)]))
-
-    def __call__(self, states: Array) -> Array:
-        """Return the force at states (…, 2)."""
-        with np.errstate(all="ignore"):  # a force may be singular
-            rates: Array = self.field.rate(self._padded(states))[..., 1] - self._periodic
-        return rates
-
-    def slope(self, states: Array) -> Array:
-        """Return the derivatives of the force by x and v at states (…, 2), shape (…, 2)."""
-        with np.errstate(all="ignore"):
-            derivatives: Array = self.field.jacobian(self._padded(states))[..., 1, :2]
-        return derivatives
-
-    def _padded(self, states: Array) -> Array:
-        return np.concatenate([states, np.zeros((*states.shape[:-1], self._extra))], axis=-1) if self._extra else states
-
-    def rests(self, length: float) -> list[float]:
-        """Return the places nearest to x = 0, within some lengths of it, where this force is 0 at rest."""
-
-        def at_rest(x: float) -> float:
-            return float(self(np.array([[x, 0.0]]))[0])
-
-        found = list[float]()
-        for low, high in intervals_within(self.osc, -_FARTHEST * length, _FARTHEST * length):
-            places = np.linspace(low, high, _PLACES)
-            values = self(np.stack([places, np.zeros_like(places)], axis=1))
-            found += bracketed_roots(at_rest, places, values)
-        return sorted(sorted(found, key=abs)[:_MOST_RESTS])
+    return [tone for i, period in known.items() for tone in tones(partial(force, i), period, count, 1e-3)[1]]
 
 
 @functools.lru_cache(maxsize=256)
@@ -111,10 +64,11 @@ def _about(osc: Oscillator, steady: SteadyForce, tone: Tone, rest: float) -> Ite
     """The motions about one rest that one tone keeps up."""
     natural = osc.natural_frequency
     deflection, damping = tone.force / natural**2, 2 * osc.damping_ratio * natural * tone.frequency
-    most = min(_MOST_SWING * deflection, tone.force / damping if damping else math.inf)
+    most = min(1e3 * deflection, tone.force / damping if damping else math.inf)
     if not most > 0:
         return
-    amplitudes = np.geomspace(min(most, deflection) * _LEAST_SWING, _BEYOND * most, _AMPLITUDES)
+    # To twice what the damping allows, so that the curve of needed force turns back before the end.
+    amplitudes = np.geomspace(1e-3 * min(most, deflection), 2 * most, _AMPLITUDES)
     centres = [rest]
     for amplitude in amplitudes:
         centres.append(_centre(steady, tone.frequency, amplitude, centres[-1]))
@@ -152,7 +106,7 @@ def _missing(steady: SteadyForce, frequency: float, amplitude: float, centre: fl
 
 def _centre(steady: SteadyForce, frequency: float, amplitude: float, centre: float) -> float:
     """Centre of the motion of an amplitude on which the mean force is 0, by Newton steps from a centre near it."""
-    for _ in range(_CENTRINGS):
+    for _ in range(4):
         motion = _motion(frequency, amplitude, centre)
         force, slope = float(np.mean(steady(motion))), float(np.mean(steady.slope(motion)[:, 0]))
         step = -force / slope if slope else math.nan

@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
 from vibrokit.structure.borders import connected
-from vibrokit.structure.harmonic_balance import SteadyForce, balances_of, tones_of
+from vibrokit.structure.harmonic_balance import balances_of, tones_of
+from vibrokit.structure.orbits import SAMPLES
+from vibrokit.structure.rest import SteadyForce
 from vibrokit.structure.scales import length_of, states_at
-
-_TONES = 64  # of each excitation
-_SAMPLES = 1024  # of a section interval, along which a response is compared with the stops
-_BEYOND = 1.01  # of the distance to a stop: amplitude of the motion that touches it
 
 Array = NDArray[np.float64]
 
@@ -38,9 +36,9 @@ def known_motions(osc: Oscillator, region: Region) -> Array:
 def _responses(osc: Oscillator, steady: SteadyForce, rest: float) -> list[tuple[float, float]]:
     """States at t = 0 of the linear response about a rest, and of the motions of its shape that touch a stop."""
     slope = steady.slope(np.array([[rest, 0.0]]))[0]
-    times = osc.section_interval / _SAMPLES * np.arange(_SAMPLES)
-    motion = np.zeros((_SAMPLES, 2))
-    for tone in tones_of(osc, _TONES):
+    times = osc.section_interval / SAMPLES * np.arange(SAMPLES)
+    motion = np.zeros((SAMPLES, 2))
+    for tone in tones_of(osc, 64):
         inertia = -(tone.frequency**2) - slope[0] - 1j * tone.frequency * slope[1]
         if not inertia:
             return []
@@ -53,6 +51,6 @@ def _responses(osc: Oscillator, steady: SteadyForce, rest: float) -> list[tuple[
     for barrier in osc.barriers:
         reach, gap = float((barrier.sign * motion[:, 0]).max()), barrier.sign * (barrier.position - rest)
         if reach > 0 and gap > 0:
-            ratio = _BEYOND * gap / reach
+            ratio = 1.01 * gap / reach
             found.append((rest + ratio * float(motion[0, 0]), ratio * float(motion[0, 1])))
     return found

@@ -39,13 +39,8 @@ from vibrokit.symbolic.flow_kind import Flow
 
 BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
-_START = 1e-6  # extent of the domain from the saddle, relative to the region
-_CLOSE = 1e-9  # largest error of the saddle, relative to the region
-_REFINEMENTS = 2  # of the default stepper
-_PARTS = 64  # of 2π/ω_n, over which the multipliers of an equilibrium are taken
-_NEAREST = 1e-13  # smallest distance from the saddle at which the domain may start, because of rounding
-_LENGTH, _TOTAL_LENGTH = 10.0, 160.0  # default arc length, of a branch and of all, in diagonals of the region
-_LEAST_GROWTH, _MOST_GROWTH = 2.0, 8.0  # ratio of the lengths of an image and the one before, if it can be chosen
+_START, _NEAREST = 1e-6, 1e-13  # of the region: extent of the domain from the saddle, and what rounding leaves of it
+_CLOSE = 1e-9  # of the region: largest error of the saddle
 _WEAKEST = 1e-8  # smallest multiplier, relative to the other one, that rounding leaves different from zero
 
 Array = NDArray[np.float64]
@@ -79,7 +74,7 @@ def branch_count(saddle: Saddle) -> int:
 
 def default_arc_length(region: Any, branches: int = 1) -> float:
     """Return 10 diagonals of a region for each of a few branches; many branches share 160 diagonals."""
-    return min(_LENGTH, _TOTAL_LENGTH / branches) * float(np.linalg.norm(np.diff(Region.of(region).bounds)))
+    return min(10.0, 160.0 / branches) * float(np.linalg.norm(np.diff(Region.of(region).bounds)))
 
 
 def grow_manifolds(
@@ -171,11 +166,11 @@ def _branch(
     flow = Flow.STATE_REVERSED if backwards else Flow.STATE
     once = FlowMap(osc, stepper or _default_stepper(osc, flow), flow, saddle.period, osc.section_interval)
     if osc.autonomous:
-        once = dataclasses.replace(once, periods=1, interval=min(once.interval, math.log(_MOST_GROWTH) / rate))
+        once = dataclasses.replace(once, periods=1, interval=min(once.interval, math.log(8) / rate))
     else:
-        once, point = _with_fixed_point(once, here, limits, _REFINEMENTS if stepper is None else 0)
+        once, point = _with_fixed_point(once, here, limits, 2 if stepper is None else 0)
     interval, periods = once.interval, once.periods
-    repeats = math.ceil(math.log(_LEAST_GROWTH) / (rate * interval * periods))
+    repeats = math.ceil(math.log(2) / (rate * interval * periods))
     repeats += repeats % 2 if multiplier < 0 else 0
     images = dataclasses.replace(once, periods=periods * repeats)
     limits = dataclasses.replace(limits, applications=most_sections / images.periods)
@@ -201,7 +196,7 @@ class _Linearised:
 def _linearised(osc: Oscillator, saddle: Saddle, place: int) -> _Linearised:
     """Refine a point of the saddle. The duration of an equilibrium is short, to keep both multipliers moderate."""
     if osc.autonomous:
-        point, duration = refine_equilibrium(osc, saddle.points[place]).point, osc.section_interval / _PARTS
+        point, duration = refine_equilibrium(osc, saddle.points[place]).point, osc.section_interval / 64
         derivative = VectorField(osc).jacobian(point)
         exponents, vectors = np.linalg.eig(derivative)
         return _Linearised(point, derivative, np.exp(duration * exponents), vectors, duration)

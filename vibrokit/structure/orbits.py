@@ -29,6 +29,8 @@ EQUAL = 1e-6
 """Distance, relative to the size of an orbit, below which two points are one."""
 CONVERGED = 1e-6
 """Largest residual, relative to the size of the motion, of an orbit that Newton's method has found."""
+SAMPLES = 1024
+"""Of an orbit in a section interval, for records and pictures."""
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,6 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.orbits import EQUAL, Orbit, least_period, refine_orbit, same_point, visited
 
-_TRIES = 4  # closest returns of each period that are refined
-_NEAR = 4.0  # times the spacing of the sample: largest distance of a return
-
 Array = NDArray[np.float64]
 
 
@@ -29,8 +26,8 @@ def orbits_inside(osc: Oscillator, points: Array, stepper: Stepper, most: int, l
     known = np.empty((0, points.shape[1]))
     for period in range(1, min(longest, len(points) - 1) + 1):
         apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
-        for start in np.argsort(apart)[:_TRIES]:
-            if apart[start] > _NEAR * max(spacing, float(apart.min())) or apart[start] > 0.1 * np.ptp(points):
+        for start in np.argsort(apart)[:4]:
+            if apart[start] > 4 * max(spacing, float(apart.min())) or apart[start] > 0.1 * np.ptp(points):
                 break
             try:
                 orbit = refine_orbit(osc, points[start], period, stepper)

@@ -9,28 +9,21 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
-from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
-from vibrokit.structure.barrier_tops import speed_to_reach, tops_around
 from vibrokit.structure.basins.stop_cells import MARGIN, is_extended
 from vibrokit.structure.borders import between_borders
 from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
-from vibrokit.structure.harmonic_balance import SteadyForce
-from vibrokit.structure.scales import length_of, states_at, units_of
+from vibrokit.structure.rest import SteadyForce, tops_around
+from vibrokit.structure.scales import length_of, units_of
 from vibrokit.structure.validation import DEFAULT_CELLS
 
 _MARGIN = 0.25  # of the width, on each side
-_RESTING = 1e-3
-_SHALLOWEST, _DEPTHS = 1e-9, 400  # of depths in a stop, relative to the largest, at which its force is sampled
-_PLACES = 64  # in a turn, for the mean force
 _SAME_PLACE = 1e-6  # relative: difference of two places that are the same
-_COMPARED = 256  # points of an attractor
 _RESOLVED = 2 * MARGIN + 1  # cells: fewer do not lead to one attractor with all those around them
 
 Array = NDArray[np.float64]
@@ -48,7 +41,7 @@ def regions_over_tops(osc: Oscillator, searched: Region) -> list[Region]:
     low, high = over_tops(osc, (), *searched.x)
     if (low, high) == searched.x:
         return []
-    speed = max(osc.natural_frequency * max(-low, high), speed_to_reach(osc, low, high))
+    speed = max(osc.natural_frequency * max(-low, high), SteadyForce(osc).speed_to_reach(low, high))
     return [_without_deep_contact(osc, between_borders(osc, Region((low, high), (-speed, speed))))]
 
 
@@ -57,7 +50,7 @@ def _speed_of_turning(osc: Oscillator) -> float:
     turn, damping = turn_of(osc), 2 * osc.damping_ratio * osc.natural_frequency
     if not turn:
         return 0.0
-    places = np.stack([np.linspace(0.0, turn, _PLACES, endpoint=False), np.zeros(_PLACES)], axis=1)
+    places = np.stack([np.linspace(0.0, turn, 64, endpoint=False), np.zeros(64)], axis=1)
     drift = abs(float(SteadyForce(osc)(places).mean())) / damping if damping else 0.0
     return (1 + 2 * _MARGIN) * max(drift, turn / osc.section_interval)
 
@@ -84,10 +77,10 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     x, v = points.T
     low, high = min([x.min(), *places]), max([x.max(), *places])
     low, high = over_tops(osc, attractors, low, high)
-    crossing = speed_to_reach(osc, low, high)
+    crossing = SteadyForce(osc).speed_to_reach(low, high)
     swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
     widest = max(swings)
-    least = 0.5 * max(gap, turn) or (widest if widest > _RESTING * length_of(osc) else length_of(osc))
+    least = 0.5 * max(gap, turn) or (widest if widest > 1e-3 * length_of(osc) else length_of(osc))
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
@@ -104,10 +97,10 @@ def over_tops(osc: Oscillator, attractors: Sequence[Attractor], low: float, high
     A top is left out where a grid around it would not resolve the attractors, the stops, and the lower top.
     """
     held = bool(osc.barriers)
-    for top in tops_around(osc, low, high):
+    for top in tops_around(osc, low, high, length_of(osc)):
         wider = min(low, top.place), max(high, top.place)
         widths = (1 + 2 * _MARGIN) * np.array([wider[1] - wider[0], 2 * top.speed])
-        inside = [np.array([high - low, 2 * speed_to_reach(osc, low, high)])] if held else []
+        inside = [np.array([high - low, 2 * SteadyForce(osc).speed_to_reach(low, high)])] if held else []
         cells = np.abs(np.array([*inside, *_differences(osc, attractors)]).reshape(-1, 2)) / (widths / DEFAULT_CELLS)
         if np.all(cells[: len(inside)] >= _RESOLVED) and np.all(cells[len(inside) :].max(axis=1) >= _RESOLVED):
             low, high, held = *wider, True
@@ -124,9 +117,9 @@ def _differences(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Array
 
 
 def _met(one: Attractor) -> Array:
-    """Points of an attractor on the section, at most so many; of a limit cycle, those of its orbit."""
+    """Points of an attractor on the section, at most 256; of a limit cycle, those of its orbit."""
     points = one.orbit if one.kind == "limit cycle" else one.points[:, :2]
-    return points[:: -(-len(points) // _COMPARED)]
+    return points[:: -(-len(points) // 256)]
 
 
 def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Attractor]:
@@ -206,10 +199,10 @@ def _without_deep_contact(osc: Oscillator, region: Region, kept: tuple[float, fl
 
 def _reached_depth(osc: Oscillator, barrier: Barrier, speed: float, most: float) -> float:
     """Depth (m), at most `most`, at which the force beyond that at first touch has stopped a mass of some speed."""
-    depths = most * np.concatenate([[0.0], np.geomspace(_SHALLOWEST, 1.0, _DEPTHS)])
-    places = np.stack([barrier.position + barrier.sign * depths, np.zeros_like(depths)], axis=1)
-    force = -barrier.sign * VectorField(osc).rate(states_at(osc, places))[:, 1]
-    energy = cumulative_trapezoid(force - force[0], depths, initial=0.0)
+    steady, depths = SteadyForce(osc), most * np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 400)])
+    places = barrier.position + barrier.sign * depths
+    touching = barrier.sign * float(steady.at_rest(places[:1])[0])
+    energy = depths * touching - np.concatenate([[0.0], np.cumsum(steady.work(places)[1])])
     beyond = np.flatnonzero(~(energy <= 0.5 * speed**2))
     return float(depths[beyond[0]]) if beyond.size else most
 

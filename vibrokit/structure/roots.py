@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-_LEAST = 1e-8  # of the distance between samples: where a function is nearest to 0, to rounding
-
 Array = NDArray[np.float64]
 
 
@@ -30,7 +28,7 @@ def bracketed_roots(function: Callable[[float], float], places: Array, values: A
         nearest = minimize_scalar(
             lambda place, side=side: side * function(place),
             bounds=(low, high),
-            options={"xatol": _LEAST * (high - low)},
+            options={"xatol": 1e-8 * (high - low)},
         )
         if nearest.fun <= 0:
             found += [float(brentq(function, low, nearest.x)), float(brentq(function, nearest.x, high))]

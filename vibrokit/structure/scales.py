@@ -21,11 +21,6 @@ from vibrokit.structure.harmonic_balance import Balance, balances_of
 from vibrokit.structure.roots import bracketed_roots
 
 _RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
-_PHASES = 128  # of the trial motions
-_SAMPLES, _LEAST_SAMPLES = 64, 512  # of a force in 2π/ω_n, and in all; its maximum is refined from the largest
-_LONGEST = 1024  # units of 2π/ω_n over which a force is sampled, if its period is longer
-_LEAST_GAIN = 1e-9  # of the power exchanged in a turn: less of it, gained or lost, is rounding
-_MOST_CYCLES = 4  # amplitudes of cycles
 _DECADES = 12  # above and below 1 m: deflections at which a spring is compared with a linear one, damping with 0
 
 Array = NDArray[np.float64]
@@ -104,7 +99,7 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
     Limit cycles, stable and unstable ones, have about these amplitudes (N. N. Bogoliubov and Y. A. Mitropolsky,
     "Asymptotic Methods in the Theory of Non-linear Oscillations", 1961, section 1).
     """
-    phases = 2 * math.pi / _PHASES * np.arange(_PHASES)
+    phases = 2 * math.pi / 128 * np.arange(128)
     shape = np.stack([np.cos(phases), -osc.natural_frequency * np.sin(phases)], axis=-1)
 
     def gain(logarithm: float) -> float:
@@ -112,12 +107,12 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
         with np.errstate(all="ignore"):  # a force may be singular
             powers = field.rate(states_at(osc, motion))[:, 1] * motion[:, 1]
         gained, exchanged = float(powers.mean()), float(np.abs(powers).mean())
-        return 0.0 if abs(gained) <= _LEAST_GAIN * exchanged else gained / exchanged
+        return 0.0 if abs(gained) <= 1e-9 * exchanged else gained / exchanged
 
     places = np.linspace(-_DECADES, _DECADES, 16 * _DECADES + 1) * math.log(10)
     gains = np.array([gain(place) for place in places])
     known = (gains != 0) & np.isfinite(gains).cumprod().astype(bool)
-    found = bracketed_roots(gain, places[known], gains[known])[:_MOST_CYCLES]
+    found = bracketed_roots(gain, places[known], gains[known])[:4]
     return float(f"{math.exp(max(found, default=-math.inf)):.9g}")
 
 
@@ -155,10 +150,8 @@ def _largest_force(field: VectorField, index: int, period: float | None, turn: f
 
     if period is None:
         return force(0.0)
-    span = min(period, _LONGEST * turn)
-    times, spacing = np.linspace(
-        0.0, span, max(_LEAST_SAMPLES, math.ceil(_SAMPLES * span / turn)), endpoint=False, retstep=True
-    )
+    span = min(period, 1024 * turn)
+    times, spacing = np.linspace(0.0, span, max(512, math.ceil(64 * span / turn)), endpoint=False, retstep=True)
     near = max(times, key=force)
     refined = minimize_scalar(
         lambda time: -force(time), bounds=(near - spacing, near + spacing), method="bounded",

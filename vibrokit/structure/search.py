@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import concurrent.futures
-import contextlib
 import dataclasses
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +23,12 @@ from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering, is_cycle
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
-from vibrokit.structure.basins.wells import wells
+from vibrokit.structure.basins.stop_cells import wells
 from vibrokit.structure.circle import shifted, turn_of, wrapped
 from vibrokit.structure.known_motions import known_motions
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
-from vibrokit.structure.rotations import find_rotation
-from vibrokit.structure.scales import turns_of, units_of
+from vibrokit.structure.persistence import is_on_cycle
+from vibrokit.structure.scales import units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
@@ -38,23 +36,8 @@ LONGEST_PERIOD = 16
 _LONGER_PERIOD = 256  # of orbits that are searched for among starts that settle slowly
 _RECURRENCE = 1e-5
 _NEAR = 1e-3  # distance, relative to the motion, between an orbit and its approximation by a coarse stepper
-_REACH = 0.1  # distance, relative to the motion, of a stable orbit that Newton's method finds from a guess
-_LOOSE = 1e-2  # recurrences from which Newton's method is tried
-_GUESSES = 8
-_FIRST_ROUND = 64  # periods; doubled from round to round
-_LONGER = 3  # times the periods before, of the next stretch
-_WATCHED = 64  # starts that are followed for a long time
-_MEASURED = 16  # starts of a Lyapunov exponent
-_LEAST_MEASURED, _MOST_MEASURED = 1000, 20_000  # periods
-_LEAST_STARTS = 4
-_VISITS = 2048  # of each survivor, to group survivors by attractor
-_OVERLAP = 4.0  # times the settling distance
-_SAMPLE = 4096  # points of a set that never repeats
-_FAILURES = 8  # states without a limit cycle after which the search for cycles ends
-_REFINEMENTS = 4  # of a stepper, until every attractor persists with it
-_LONG_PERIODS, _FEW_PERIODS, _MANY_TURNS = 512, 8, 8192  # for which that must; units of 2π/ω_n
-_LASTING = 2000  # periods for which other attractors must
-_LONGEST_CYCLE = 50  # units of 2π/ω_n
+_LOOSE = 1e-2  # the same, of recurrences from which Newton's method is tried
+_REACH = 0.1  # the same, of a stable orbit that Newton's method finds from a guess
 
 Array = NDArray[np.float64]
 
@@ -101,7 +84,8 @@ class Search:
                 if not len(states):
                     return
             if self.osc.autonomous:
-                self._add_cycles(states)
+                if unsettled := len(self._add_cycles(states)):
+                    self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
             elif patient or self.attractors:
                 self._watch(states)
             report(self.starts)
@@ -109,7 +93,7 @@ class Search:
     def add_rests(self, low: float, high: float) -> bool:
         """Add the stable equilibria between two places (m); return whether some were not known."""
         known = len(self.attractors)
-        self.at_rest = tuple(equilibria(self.osc, low, high))
+        self.at_rest = equilibria(self.osc, low, high)
         for rest in self.at_rest:
             self._add_orbit(rest.point, 1)
         return len(self.attractors) > known
@@ -120,8 +104,7 @@ class Search:
         if followed:
             states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD)
         if self.osc.autonomous:
-            self._try_cycles(states)
-            states = states[[not self._on_cycle(state) for state in states]]
+            states = self._add_cycles(states)
         gone, moving = self.diverged - counts[0], len(states) + self.stalled - counts[1]
         self.diverged, self.stalled = counts
         self.beyond = {"followed": followed, "diverged": gone, "moving": moving}
@@ -154,7 +137,7 @@ class Search:
         """
         arrival, end = self._arrival(), self.periods + periods
         while self.periods < end:
-            stretch = min(max(1, _LONGER * self.periods), end - self.periods)
+            stretch = min(max(1, 3 * self.periods), end - self.periods)
             ended, _, labels = follow(self.osc, states, arrival, stretch, self.stepper, self.executor)
             stalled = (labels == NOT_FOLLOWED) & self.region.contains(ended[:, :2])
             self.stalled += int(np.sum(stalled))
@@ -184,7 +167,7 @@ class Search:
         tried = 0
         for index in np.argsort(distance.min(axis=0)):
             nearest = float(distance[:, index].min())
-            if tried == _GUESSES or nearest > _LOOSE:
+            if tried == 8 or nearest > _LOOSE:
                 return
             if not self._known(path[0, index], _LOOSE):
                 self._add_orbit(path[0, index], int(np.argmin(distance[:, index])) + 1)
@@ -208,30 +191,23 @@ class Search:
             self.attractors.append(describe_orbit(self.osc, orbit, stepper))
         return same_point(self.osc, point, points, _NEAR)
 
-    def _add_cycles(self, states: Array) -> None:
-        """Add the limit cycles that states lie on."""
-        self._try_cycles(states)
-        unsettled = sum(not self._on_cycle(state) for state in states)
-        if unsettled:
-            self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
-
-    def _try_cycles(self, states: Array) -> None:
+    def _add_cycles(self, states: Array) -> Array:
+        """Add the limit cycles that states lie on, until eight lie on none; return the states that lie on none."""
         failures = 0
         for state in states:
-            if failures < _FAILURES and not self._on_cycle(state):
+            if failures < 8 and not self._on_cycle(state):
                 failures += not self._add_cycle(state)
+        return states[[not self._on_cycle(state) for state in states]]
 
     def _on_cycle(self, state: Array) -> bool:
-        return any(_is_on(self.osc, known, state) for known in self.attractors if known.kind == "limit cycle")
+        return any(is_on_cycle(self.osc, known, state) for known in self.attractors if known.kind == "limit cycle")
 
     def _add_cycle(self, state: Array) -> bool:
         """Add the limit cycle that a state lies on, if it is new; return whether there is a stable one."""
-        longest, cycle = _LONGEST_CYCLE * self.osc.section_interval, None
-        for find in (find_rotation, find_cycle) if turn_of(self.osc) else (find_cycle,):
-            with contextlib.suppress(StructureError):
-                cycle = find(self.osc, state, self.orbit_stepper, longest=longest)
-                break
-        if cycle is None:
+        try:
+            longest = 50 * self.osc.section_interval
+            cycle = find_cycle(self.osc, state, self.orbit_stepper, longest=longest)
+        except StructureError:
             return False
         along = int(np.argmin(np.abs(cycle.multipliers - 1.0)))  # 1, up to rounding: that of a shift in time
         if np.abs(np.delete(cycle.multipliers, along)).max() >= 1:
@@ -242,7 +218,7 @@ class Search:
 
     def _watch(self, states: Array) -> None:
         """Distinguish long transients from motion that never settles, by its survival at two accuracies."""
-        watched = states[np.linspace(0, len(states) - 1, min(_WATCHED, len(states))).astype(int)]
+        watched = states[np.linspace(0, len(states) - 1, min(64, len(states))).astype(int)]
         survivors = watched[:0]
         for stepper in (self.stepper, self.stepper.refined()):
             survival, survivors = watch(self.osc, watched, self._arrival(), stepper, executor=self.executor)
@@ -257,10 +233,10 @@ class Search:
         if not len(survivors):
             return
         osc, finer = self.osc, self.stepper.refined()
-        clouds = list(wrapped(osc, _section_path(osc, survivors, finer, _VISITS - 1)).transpose(1, 0, 2))
-        for group in separate([cloud[:, :2] / self.distances for cloud in clouds], _OVERLAP):
+        clouds = list(wrapped(osc, _section_path(osc, survivors, finer, 2047)).transpose(1, 0, 2))
+        for group in separate([cloud[:, :2] / self.distances for cloud in clouds], 4.0):
             periods = _measuring_time(osc)
-            few = survivors[group[: max(_LEAST_STARTS, _MEASURED * _LEAST_MEASURED // periods)]]
+            few = survivors[group[: max(4, 16_000 // periods)]]
             stepper = self.orbit_stepper if osc.barriers else finer  # without contacts fixed steps are as accurate
             estimate = lyapunov_exponent(osc, few, stepper, periods=periods, executor=self.executor)
             kind = kind_of(estimate)
@@ -268,13 +244,13 @@ class Search:
                 self.findings.append(Finding.of(Code.SLOW_SETTLING, count=len(group), period=_LONGER_PERIOD))
                 continue
             visits = np.concatenate([clouds[index] for index in group])
-            sample = visits[:: -(-len(visits) // _SAMPLE)]
+            sample = visits[:: -(-len(visits) // 4096)]
             self.attractors.append(describe_wandering(osc, kind, sample, estimate, self.survival, finer))
 
 
 def _rounds(wait: int) -> list[int]:
-    """Periods of each round, which double; twice the wait together."""
-    rounds, remaining, periods = [], 2 * wait, _FIRST_ROUND
+    """Periods of each round, which double from 64; twice the wait together."""
+    rounds, remaining, periods = [], 2 * wait, 64
     while remaining > 0:
         rounds.append(min(periods, remaining))
         remaining, periods = remaining - rounds[-1], 2 * periods
@@ -284,7 +260,7 @@ def _rounds(wait: int) -> list[int]:
 def _measuring_time(osc: Oscillator) -> int:
     """Periods in which motion that settles, however slowly, shows it: three e-foldings of the damping."""
     folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
-    return _LEAST_MEASURED if folds == 0 else min(_MOST_MEASURED, max(_LEAST_MEASURED, math.ceil(3 / folds)))
+    return 1000 if folds == 0 else min(20_000, max(1000, math.ceil(3 / folds)))
 
 
 def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: int) -> Array:
@@ -293,53 +269,3 @@ def _section_path(osc: Oscillator, states: Array, stepper: Stepper, sections: in
     for _ in range(sections):
         visits.append(run_ensemble(osc, Flow.STATE, stepper, visits[-1], 1).states)
     return np.array(visits)
-
-
-def _lasting(osc: Oscillator) -> int:
-    """Periods for which a repeating attractor must persist; fewer where one has many free oscillations."""
-    return min(_LONG_PERIODS, max(_FEW_PERIODS, math.ceil(_MANY_TURNS / turns_of(osc))))
-
-
-def _is_on(osc: Oscillator, cycle: Attractor, point: Array) -> bool:
-    """Whether a point lies on a limit cycle, within the spacing of its samples."""
-    orbit, extent = cycle.orbit, np.ptp(cycle.orbit, axis=0)
-    if cycle.turns:  # on which of its turns, only the speed can tell
-        turn = turn_of(osc)
-        first = orbit[:, 0].min() + (point[0] - orbit[:, 0].min()) % turn
-        places = first + turn * np.arange(abs(cycle.turns))
-        point = np.stack([places, np.full(len(places), point[1])], axis=1)[:, None]
-    spacing = np.linalg.norm(np.diff(orbit, axis=0) / extent, axis=1).max()
-    return bool(np.linalg.norm((orbit - point[..., :2]) / extent, axis=-1).min() <= spacing)
-
-
-def persistent_stepper(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> Stepper:
-    """Return a stepper, refined until every attractor persists with it within some distances, at most four times."""
-    for _ in range(_REFINEMENTS):
-        if _persist(osc, attractors, stepper, distances):
-            break
-        stepper = stepper.refined()
-    return stepper
-
-
-def _persist(osc: Oscillator, attractors: Sequence[Attractor], stepper: Stepper, distances: Array) -> bool:
-    """Whether motions that start on attractors, all followed together, are on them after a long time."""
-    starts = [_starts_on(known) for known in attractors]
-    periods = [_lasting(osc) * known.period if known.is_fixed else _LASTING for known in attractors]
-    counts = [len(states) for states in starts]
-    ends = run_ensemble(osc, Flow.STATE, stepper, np.concatenate(starts), np.repeat(periods, counts)).states
-    each = zip(attractors, np.split(ends, np.cumsum(counts)[:-1]), strict=True)
-    return all(_is_still_on(osc, known, end, distances) for known, end in each)
-
-
-def _starts_on(known: Attractor) -> Array:
-    """Return points of an attractor from which to see whether it persists: one if it repeats."""
-    return known.points[:1] if known.repeats else known.points[:: max(1, len(known.points) // _WATCHED)]
-
-
-def _is_still_on(osc: Oscillator, known: Attractor, ends: Array, distances: Array) -> bool:
-    """Whether motions (count, n) that started on an attractor are on it."""
-    if known.kind == "limit cycle":
-        return _is_on(osc, known, ends[0])
-    offsets = wrapped(osc, ends[:, None, :2] - known.points[None, :, :2])
-    apart = np.linalg.norm(offsets / distances, axis=2).min(axis=1)
-    return bool(np.mean(apart <= 2.0) > 0.9)

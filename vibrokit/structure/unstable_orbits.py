@@ -30,14 +30,8 @@ from vibrokit.structure.scales import states_at, units_of
 from vibrokit.structure.validation import check_means
 from vibrokit.symbolic.flow_kind import Flow
 
-_FINER = 8  # times as many cells on a side as starts, in which turning points of the map are searched for
-_ITERATIONS = 60
-_LEAST_FRACTION = 1e-3  # of a Newton step, below which a start has failed
-_LONGEST_STEP = 0.25  # of the region's widths
 _CONVERGED = 1e-9
 _APART = 1e-5  # of the region's widths: largest distance between an orbit of the coarser map and the refined one
-_LONGEST_PERIOD = 10_000
-_MOST_STARTS = 10**6
 
 Array = NDArray[np.float64]
 
@@ -102,17 +96,17 @@ def unstable_orbits(
     check_means(osc, stepper, executor)
     if classifier is not None and not isinstance(classifier, BasinClassifier):
         raise StructureError(f"classifier must be a BasinClassifier or None, got {shown(classifier)}.")
-    period = whole("period", period, 1, _LONGEST_PERIOD)
+    period = whole("period", period, 1, 10_000)
     if osc.autonomous and period != 1:
         raise StructureError(
             f"period must be 1, for equilibria, because the scene has no periodic excitation; got {period}."
         )
-    counts = pair("starts", starts, _MOST_STARTS)
+    counts = pair("starts", starts, 10**6)
     where = search_region(osc) if region is None else Region.of(region)
     orbit_stepper = stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)
     found = []
     with working(progress, time_limit), stage("unstable orbits", unit=TRAJECTORIES):
-        finer = (_FINER * counts[0], _FINER * counts[1])
+        finer = (8 * counts[0], 8 * counts[1])
         turning = _turning_cells(osc, period, where, finer, stepper or ensemble_stepper(osc, Flow.STATE), executor)
         guesses = states_at(osc, np.concatenate([where.cell_centres(counts), turning]))
         equations = equilibrium_equations(osc)
@@ -156,7 +150,7 @@ def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Ar
 
     def limited(places: Array, steps: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
-            longest = _LONGEST_STEP / np.linalg.norm(region.scaled(steps), axis=1, keepdims=True)
+            longest = 0.25 / np.linalg.norm(region.scaled(steps), axis=1, keepdims=True)
         return steps * np.minimum(1.0, longest)
 
     def converged(places: Array, sizes: Array) -> NDArray[np.bool_]:
@@ -167,8 +161,8 @@ def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Ar
     places, sizes, _ = newton(
         scaled(equations, units),
         starts,
-        iterations=_ITERATIONS,
-        least_fraction=_LEAST_FRACTION,
+        iterations=60,
+        least_fraction=1e-3,
         limited=limited,
         converged=converged,
     )

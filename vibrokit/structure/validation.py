@@ -23,7 +23,6 @@ from vibrokit.scene_file import scene_data
 
 DEFAULT_CELLS = (200, 200)
 """Of the finest basin grid."""
-_MOST_EDGE = 10**12  # sections
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Request:
             "refine": whole("refine", self.refine, 0, 10),
             "margin": None if self.margin is None else whole("margin", self.margin, 1, 100),
             "budget": None if self.budget is None else whole("budget", self.budget, 1, MOST_CELLS),
-            "edge_budget": None if self.edge_budget is None else whole("edge_budget", self.edge_budget, 1, _MOST_EDGE),
+            "edge_budget": None if self.edge_budget is None else whole("edge_budget", self.edge_budget, 1, 10**12),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -21,18 +21,11 @@ from vibrokit.results.survival import Survival
 from vibrokit.structure.attractors.wandering import LyapunovEstimate
 from vibrokit.structure.autonomous import equilibrium_exponents
 from vibrokit.structure.circle import turns_to, wrapped
-from vibrokit.structure.orbits import Orbit, visited
+from vibrokit.structure.orbits import EQUAL, SAMPLES, Orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAMPLES = 1024  # along one forcing period
 _WANDERING = 64  # periods of motion that never repeats
-_RESTING = 1e-6
-_TIGHTENED = 1  # time, for the error
-_FINER = 64  # samples of a stretch that is resolved further
-_REFINEMENTS = 6  # after which a touch that is not found counts as none
-_ENOUGH = 32  # samples in one contact, for its peak
-_PEAK_REFINEMENTS = 5  # each thirty times as fine as the one before
 
 Array = NDArray[np.float64]
 
@@ -51,7 +44,7 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
         multipliers=orbit.multipliers,
         exponents=equilibrium_exponents(osc, orbit.point) if resting else orbit.exponents,
         residual=orbit.residual,
-        error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
+        error=orbit.moved_by_tightening(osc, stepper, 1),
     )  # fmt: skip
 
 
@@ -104,12 +97,12 @@ def _described(osc: Oscillator, path: Path, stepper: Stepper, *, exponent_error:
 
 def _path_of(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Path:
     """Samples along an orbit, so many in a section interval."""
-    count = _SAMPLES * max(1, round(orbit.duration / osc.section_interval))
+    count = SAMPLES * max(1, round(orbit.duration / osc.section_interval))
     return _path(osc, wrapped(osc, orbit.point), orbit.duration, count, stepper)
 
 
 def _still(osc: Oscillator, path: Path) -> bool:
-    return bool(np.ptp(path.states, axis=0).max() < _RESTING * (size_of(osc) + np.abs(path.states).max()))
+    return bool(np.ptp(path.states, axis=0).max() < EQUAL * (size_of(osc) + np.abs(path.states).max()))
 
 
 def _path(osc: Oscillator, point: Array, duration: float, count: int, stepper: Stepper) -> Path:
@@ -121,9 +114,9 @@ def _wandering_path(osc: Oscillator, point: Array, stepper: Stepper) -> Path:
     """Return some periods, each started from the section as by the section map, whose attractor this is."""
     interval, pieces = osc.section_interval, []
     for _ in range(_WANDERING):
-        pieces.append(_path(osc, point, interval, _SAMPLES, stepper).states[:-1])
+        pieces.append(_path(osc, point, interval, SAMPLES, stepper).states[:-1])
         point = run_ensemble(osc, Flow.STATE, stepper, point[None], 1).states[0]
-    return Path(np.concatenate([*pieces, point[None]]), 0.0, interval / _SAMPLES)
+    return Path(np.concatenate([*pieces, point[None]]), 0.0, interval / SAMPLES)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -159,7 +152,7 @@ def contacts_along(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> 
             around = _around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, len(depth) - 1), stepper)
             peak = _peak(osc, around, stop, stepper)
             deepest, hardest = max(deepest, peak[0]), max(hardest, peak[1])
-    for unseen in _hidden(osc, path, barrier, stepper, _REFINEMENTS):
+    for unseen in _hidden(osc, path, barrier, stepper, 6):
         peak = _peak(osc, unseen, stop, stepper)
         entries, deepest, hardest = entries + 1, max(deepest, peak[0]), max(hardest, peak[1])
     return Contacts(entries, deepest, hardest)
@@ -171,11 +164,11 @@ def _depth_and_rate(states: Array, barrier: Barrier) -> tuple[Array, Array]:
 
 def _around(osc: Oscillator, path: Path, first: int, last: int, stepper: Stepper) -> Path:
     """Return the stretch between two samples, with enough samples for its peaks."""
-    if last - first >= _ENOUGH or first == last:
+    if last - first >= 32 or first == last:
         return Path(path.states[first : last + 1], path.start + first * path.spacing, path.spacing)
-    finer = path.spacing * (last - first) / _FINER
+    finer = path.spacing * (last - first) / 64
     begin = path.start + first * path.spacing
-    return Path(record(osc, Flow.STATE, stepper, path.states[first], begin, finer, _FINER), begin, finer)
+    return Path(record(osc, Flow.STATE, stepper, path.states[first], begin, finer, 64), begin, finer)
 
 
 def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, finer: int) -> list[Path]:
@@ -211,7 +204,7 @@ def _peak(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> tuple[flo
 def _greatest(osc: Oscillator, path: Path, measure: Callable[[Array], Array], stepper: Stepper) -> float:
     """Return the largest value of a function of the state along a path, from ever finer samples around it."""
     best = 0.0
-    for _ in range(_PEAK_REFINEMENTS):
+    for _ in range(5):
         values = measure(path.states)
         top = int(np.argmax(values))
         best = max(best, float(values[top]))

@@ -11,8 +11,6 @@ import numpy as np
 
 from vibrokit.results.attractor import Attractor
 
-_RATIO = 1.1  # least ratio of two amplitudes that are named small and large
-_SHIFT = 0.1  # least distance, in widths of the motion, of two places that are named left and right
 _SIZES: Mapping[int, tuple[str, ...]] = {2: ("small", "large"), 3: ("small", "medium", "large")}
 _PLACES: Mapping[int, tuple[str, ...]] = {2: ("left", "right"), 3: ("left", "middle", "right")}
 
@@ -37,10 +35,10 @@ def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, 
     ``clear`` runs clear of the stops, ``hammering`` hits them, ``pressed`` stays in contact with one. In a scene
     without stops an orbit is an ``oscillation``. An equilibrium clear of the stops is ``rest``, a limit cycle
     ``cycle``; motion that turns over is ``running``, with its turns in a period if these are more than one; motion that
-    never repeats is ``quasiperiodic`` or ``chaotic``. The period follows if it is not 1:
-    ``hammering-period-4``. Two or three attractors of one name become ``small-``, ``medium-`` and ``large-`` by
-    amplitude, or ``left-``, ``middle-`` and ``right-`` by place. Where neither distinguishes them, or where there are
-    more, all but the first are numbered.
+    never repeats is ``quasiperiodic`` or ``chaotic``. The period follows if it is not 1: ``hammering-period-4``. Two or
+    three attractors of one name become ``small-``, ``medium-`` and ``large-`` by amplitude if these are 10 % apart, or
+    ``left-``, ``middle-`` and ``right-`` by place if that differs by a tenth of their width. Where neither
+    distinguishes them, or where there are more, all but the first are numbered.
     """
     bases = [_base(attractor, has_stops) for attractor in attractors]
     names = list(bases)
@@ -76,13 +74,13 @@ def _base(attractor: Attractor, has_stops: bool) -> str:
 def _distinguishing(group: Sequence[Attractor]) -> tuple[str, ...]:
     """Words that distinguish attractors of one name; empty if there are none."""
     widths = [0.0 if one.turns else float(np.ptp(one.orbit[:, 0])) for one in group]
-    if len(group) in _SIZES and all(large > _RATIO * small > 0 for small, large in itertools.pairwise(sorted(widths))):
+    if len(group) in _SIZES and all(large > 1.1 * small > 0 for small, large in itertools.pairwise(sorted(widths))):
         return _in_order(_SIZES[len(group)], widths)
     if all(one.turns for one in group):
         middles = [float(np.sign(one.turns)) for one in group]
         return _in_order(_PLACES[2], middles) if sorted(middles) == [-1.0, 1.0] else ()
     middles = [float(one.orbit[:, 0].mean()) for one in group]
-    least = _SHIFT * max(*widths, 1e-9 * max(map(abs, middles)), 0.0)
+    least = 0.1 * max(*widths, 1e-9 * max(map(abs, middles)), 0.0)
     if len(group) in _PLACES and all(right - left > least for left, right in itertools.pairwise(sorted(middles))):
         return _in_order(_PLACES[len(group)], middles)
     return ()

@@ -15,23 +15,15 @@ from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
 from vibrokit.errors import StructureError
-from vibrokit.kernels.ensemble import Stop, run_ensemble
+from vibrokit.kernels.ensemble import Stop
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.survival import Survival
-from vibrokit.structure.basins.landings import landed
-from vibrokit.structure.circle import advanced, turn_of, wrapped
+from vibrokit.structure.basins.landings import followed
+from vibrokit.structure.circle import wrapped
 from vibrokit.structure.linear_map import linear_map
-from vibrokit.symbolic.flow_kind import Flow
-
-_TAILS = (0.0, 0.25, 0.5, 0.75, 0.875)  # fractions of the settled starts left out of the fit, the earliest first
-_LEAST_TAIL = 8
-_MISFIT = 1.1  # Lilliefors' 5% limit of √n times the distance between an exponential and its fit
-_BLOCKS = 20  # of time, for the standard error
-_SIGNIFICANT = 3.0  # standard errors
-_MOST_OF = 0.5  # fraction of a sample that must lie near another for both to be of one attractor
 
 Array = NDArray[np.float64]
 
@@ -50,37 +42,15 @@ def follow(
     was reached, ESCAPED where the motion diverged, NOT_FOLLOWED where it needs too many steps. Where x repeats, motion
     is moved back by whole turns.
     """
-    if turn_of(osc):
-        return _follow_on_circle(osc, states, stop, periods, stepper, executor)
-    ended = run_ensemble(osc, Flow.STATE, stepper, states, periods, stop=stop, executor=executor)
-    arrived = np.isin(ended.status, (REACHED, LEFT_BASIN))
-    return ended.states, ended.intervals, np.where(arrived, ended.label, _without(ended.status))
-
-
-def _without(status: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Labels of motion that has not arrived, by how it ended."""
-    return np.select([status == COMPLETED, status == STALLED], [UNSETTLED, NOT_FOLLOWED], ESCAPED)
-
-
-def _follow_on_circle(
-    osc: Oscillator,
-    states: Array,
-    stop: Stop,
-    periods: int,
-    stepper: Stepper,
-    executor: concurrent.futures.Executor | None,
-) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    here, alive = wrapped(osc, states), np.arange(len(states))
-    intervals = np.zeros(len(states), dtype=np.int64)
-    labels = np.full(len(states), UNSETTLED, dtype=np.int64)
-    for _ in range(periods):
-        ended, _turns = advanced(osc, stepper, here[alive], executor=executor)
-        here[alive] = ended.states
-        intervals[alive] += 1
-        labels[alive] = np.where(ended.status == COMPLETED, landed(stop, ended.states), _without(ended.status))
-        alive = alive[labels[alive] == UNSETTLED]
-        if not alive.size:
-            break
+    here, alive = np.array(wrapped(osc, states), dtype=float), np.arange(len(states))
+    intervals, labels = np.zeros(len(states), dtype=np.int64), np.full(len(states), UNSETTLED, dtype=np.int64)
+    while alive.size:
+        ended, _ = followed(osc, stepper, here[alive], periods - intervals[alive], stop, executor=executor)
+        here[alive], intervals[alive] = ended.states, intervals[alive] + ended.intervals
+        how = [np.isin(ended.status, (REACHED, LEFT_BASIN)), ended.status == COMPLETED, ended.status == STALLED]
+        ends = np.select(how, [ended.label, UNSETTLED, NOT_FOLLOWED], ESCAPED)
+        labels[alive] = ends
+        alive = alive[(ends == UNSETTLED) & (intervals[alive] < periods)]
     return here, intervals, labels
 
 
@@ -139,14 +109,15 @@ def fit_decay(settled_after: NDArray[np.int64], periods: int) -> tuple[float, fl
     times = np.sort(settled_after[settled_after >= 0]).astype(float)
     survivors = len(settled_after) - len(times)
     lifetime = error = math.inf
-    for fraction in _TAILS:
+    for fraction in (0.0, 0.25, 0.5, 0.75, 0.875):
         after = float(np.quantile(times, fraction)) if fraction and len(times) else 0.0
         tail, window = times[times > after] - 0.5 - after, periods - after  # in the middle of the period it ended in
-        if not len(tail) or (fraction and len(tail) < _LEAST_TAIL):
+        if not len(tail) or (fraction and len(tail) < 8):
             break
         lifetime, error = _fit_tail(tail, survivors, window)
         spent = np.expm1(-tail / lifetime) / np.expm1(-window / lifetime)
-        if np.abs(spent - (np.arange(len(tail)) + 0.5) / len(tail)).max() * math.sqrt(len(tail)) < _MISFIT:
+        distance = float(np.abs(spent - (np.arange(len(tail)) + 0.5) / len(tail)).max())
+        if distance * math.sqrt(len(tail)) < 1.1:  # Lilliefors' limit, at 5 %, for an exponential and its fit
             break
     return lifetime, error
 
@@ -239,7 +210,7 @@ def standard_error(rates: Array) -> float:
     correlation between starts (batch means; Asmussen & Glynn, *Stochastic Simulation*, IV.5). The larger one is
     returned; it is infinite for a single number.
     """
-    blocks = [block.mean() for block in np.array_split(rates, min(_BLOCKS, len(rates)))]
+    blocks = [block.mean() for block in np.array_split(rates, min(20, len(rates)))]
     scatters = [
         np.std(means, ddof=1) / math.sqrt(len(means)) for means in (blocks, rates.mean(axis=0)) if len(means) > 1
     ]
@@ -254,7 +225,7 @@ def kind_of(estimate: LyapunovEstimate) -> str | None:
     come closer by e or more in that time. In between it is quasiperiodic: the exponent cannot be distinguished from 0,
     and weak chaos would need more periods to be detected.
     """
-    noise = _SIGNIFICANT * estimate.error
+    noise = 3 * estimate.error
     if estimate.value > max(noise, estimate.resolution):
         return "chaotic"
     if estimate.value < -max(noise, 1.0 / (estimate.periods * estimate.interval)):
@@ -284,4 +255,4 @@ def separate(samples: list[Array], tolerance: float) -> list[NDArray[np.int64]]:
 
 def _overlap(one: cKDTree, other: cKDTree, tolerance: float) -> bool:
     near = (np.isfinite(a.query(b.data, distance_upper_bound=tolerance)[0]) for a, b in ((one, other), (other, one)))
-    return any(float(np.mean(close)) > _MOST_OF for close in near)
+    return any(float(np.mean(close)) > 0.5 for close in near)

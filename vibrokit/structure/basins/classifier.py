@@ -13,27 +13,23 @@ from numpy.typing import NDArray
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.staying import staying
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_BASIN, REACHED, STALLED
+from vibrokit.kernels.stopping import DIVERGED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins, exits_of
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
-from vibrokit.structure.basins.landings import Landings, landed
-from vibrokit.structure.basins.stop_cells import MARGIN, AttractorMask, core_of, is_extended, mask_of
-from vibrokit.structure.basins.wells import wells
-from vibrokit.structure.circle import advanced, shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.basins.landings import Landings, followed
+from vibrokit.structure.basins.stop_cells import MARGIN, AttractorMask, core_of, is_extended, mask_of, wells
+from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 
 CELLS = "cells"
 """Unit of stages that classify cells: a classifier advances them."""
 
-_FIRST_STRETCH = 8  # sections after which the trajectories still under way are packed together again
-_LONGEST_STRETCH = 64  # with an extended attractor: the sections of a stretch are kept in memory
 _CONFIRMED = 64  # sections that a trajectory must stay near an extended attractor
-_MISSES = 6  # of these sections that may fall into gaps of the attractor's sample
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -112,8 +108,10 @@ class BasinClassifier:
         """
         trajectories = _Trajectories(self, states, found)
         trajectories.to_section(start_time)
-        longest = self.budget if self.mask is None else _LONGEST_STRETCH
-        stretch, known = _FIRST_STRETCH, 0
+        # After a stretch, the trajectories still under way are packed together again. With an extended attractor the
+        # sections of a stretch are kept in memory.
+        longest = self.budget if self.mask is None else _CONFIRMED
+        stretch, known = 8, 0
         while (active := trajectories.active()).size:
             trajectories.follow(active, stretch)
             stretch = min(4 * stretch, longest)
@@ -190,8 +188,12 @@ class _Trajectories:
     def follow(self, which: Whole, most: int) -> None:
         """Integrate some trajectories by at most so many sections, and note what they reach."""
         classifier, mask = self.classifier, self.classifier.mask
-        ended = self._on_circle(which) if turn_of(classifier.osc) else self._on_line(which, most)
+        ended, turns = followed(
+            classifier.osc, classifier.stepper, self.states[which], np.minimum(self.remaining[which], most),
+            classifier.arriving, middle=self.middle, visits=0 if mask is None else most, executor=classifier.executor,
+        )  # fmt: skip
         self.states[which] = ended.states
+        self.turns[which] += turns
         self.sections += int(ended.intervals.sum())
         self.remaining[which] -= ended.intervals
         self.remaining[which[ended.status == STALLED]] = 0
@@ -201,24 +203,6 @@ class _Trajectories:
         if mask is not None:
             self._stay(which, ended, mask)
 
-    def _on_line(self, which: Whole, most: int) -> Ensemble:
-        classifier = self.classifier
-        return run_ensemble(
-            classifier.osc, Flow.STATE, classifier.stepper, self.states[which],
-            np.minimum(self.remaining[which], most), stop=classifier.arriving,
-            visits=0 if classifier.mask is None else most, executor=classifier.executor,
-        )  # fmt: skip
-
-    def _on_circle(self, which: Whole) -> Ensemble:
-        """Integrate over one section, and move motion back to the turn around the middle of the region."""
-        classifier = self.classifier
-        ended, turns = advanced(
-            classifier.osc, classifier.stepper, self.states[which], self.middle, classifier.executor
-        )  # fmt: skip
-        self.turns[which] += turns
-        label = np.where(ended.status == COMPLETED, landed(classifier.arriving, ended.states), UNSETTLED)
-        return dataclasses.replace(ended, label=label, status=np.where(label >= 0, REACHED, ended.status))
-
     def _arrive(self, which: Whole, labels: Whole) -> None:
         """Note what some trajectories have reached, by the labels of the test."""
         self.found[which] = self.classifier.landings.labels(labels, self.turns[which])
@@ -226,9 +210,10 @@ class _Trajectories:
     def _stay(self, which: Whole, ended: Ensemble, mask: AttractorMask) -> None:
         """Note which trajectories have stayed near an extended attractor, by the sections that they passed."""
         stayed, missed = self.stayed[which], self.missed[which]
+        misses = 6  # may fall into gaps of the attractor's sample
         found = staying(
-            ended.visits, ended.intervals, mask.frame.bounds, mask.entered, mask.near, _CONFIRMED, _MISSES,
-            stayed, missed,
+            ended.visits, ended.intervals, mask.frame.bounds, mask.entered, mask.near, _CONFIRMED, misses, stayed,
+            missed,
         )  # fmt: skip
         self.stayed[which], self.missed[which] = stayed, missed
         confirmed = (found >= 0) & (self.found[which] == NOT_FOLLOWED)

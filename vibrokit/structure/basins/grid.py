@@ -19,17 +19,15 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
-from vibrokit.structure.basins.stop_cells import MARGIN, agreeing, centres
+from vibrokit.structure.basins.stop_cells import FINEST, MARGIN, agreeing, centres
+from vibrokit.structure.persistence import persistent_stepper
 from vibrokit.structure.regions import on_circle
-from vibrokit.structure.search import persistent_stepper
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
 
-_COARSEST, _FEWEST = 4096, 400  # cells of the first grid, followed to the attractors; by default where that takes long
+_COARSEST = 4096  # cells of the first grid, followed to the attractors; fewer by default where that takes long
 _MOST_FIRST = 20_000_000  # sections that the first grid may take by default
 _MOST_SECTIONS = 5_000_000  # that the finer of two grids may take by default, about 10 s with stops
-_CHUNK = 2**15  # cells that are followed together: more need more memory, and are no faster
-_FINEST = 2048  # cells along a side of a grid that is refined for an attractor in a cell of another basin
 SETTLING = 1e-3  # of the region's widths, the default of `find_structure`
 _WITHOUT_ATTRACTOR = {
     UNSETTLED: Code.CELLS_UNSETTLED, ESCAPED: Code.CELLS_LEFT_REGION, NOT_FOLLOWED: Code.CELLS_NOT_FOLLOWED,
@@ -71,7 +69,7 @@ class BasinGrid:
     ) -> None:
         self._classifier, self._margin, self._refine = classifier, margin, refine
         self._most_sections = math.inf if cells is not None else _MOST_SECTIONS
-        coarsest = _COARSEST if cells is not None else min(_COARSEST, max(_FEWEST, _MOST_FIRST // classifier.budget))
+        coarsest = _COARSEST if cells is not None else min(_COARSEST, max(400, _MOST_FIRST // classifier.budget))
         whole = cells or DEFAULT_CELLS
         self._shapes = _shapes(whole, coarsest) if margin is not None else [whole]
         self._labels = np.full(whole, NOT_FOLLOWED, dtype=np.int16)
@@ -81,7 +79,7 @@ class BasinGrid:
 
     @property
     def basins(self) -> Basins:
-        """The labels of cells · 2^refine cells; NOT_FOLLOWED in those that are not known yet."""
+        """The labels of cells · 2^refine cells; NOT_FOLLOWED where they are not known yet."""
         labels = self._labels
         while labels.shape[0] < self._shapes[-1][0] * 2**self._refine:
             labels = _split(labels)
@@ -116,7 +114,7 @@ class BasinGrid:
         Cells that put an attractor into another basin are too wide to tell what lies around them either. So few cells
         are all followed anew, and of many cells none near a lost attractor classifies others.
         """
-        while (lost := self._lost()) and 2 * max(self._labels.shape) <= _FINEST and self._sections <= _MOST_FIRST:
+        while (lost := self._lost()) and 2 * max(self._labels.shape) <= FINEST and self._sections <= _MOST_FIRST:
             self._refined = True
             with stage("basins of lost attractors", unit=CELLS, total=4 * self._labels.size):
                 if self._labels.size <= _COARSEST:
@@ -171,8 +169,9 @@ class BasinGrid:
         self._sections = 0
         places = np.flatnonzero(labels == NOT_FOLLOWED)
         advance(labels.size - len(places))
-        for start in range(0, len(places), _CHUNK):
-            part = places[start : start + _CHUNK]
+        chunk = 2**15  # cells that are followed together: more need more memory, and are no faster
+        for start in range(0, len(places), chunk):
+            part = places[start : start + chunk]
             found = np.full(len(part), NOT_FOLLOWED, dtype=np.int64)
             try:
                 states = centres(classifier.osc, classifier.region, labels.shape, part)

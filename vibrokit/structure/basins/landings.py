@@ -1,22 +1,23 @@
-"""Which attractor motion has come to, where states a turn along x apart have the same motion."""
+"""Motion until it arrives at an attractor, and which one that is, where states a turn apart have the same motion."""
 
 from __future__ import annotations
 
+import concurrent.futures
+import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels.ensemble import Stop
+from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.stopping import COMPLETED, REACHED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import AT_COPY, UNSETTLED, Basins
 from vibrokit.results.region import Region
 from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
-
-_BORDER = 0.05  # of a turn, beyond it on both sides: where samples of attractors are kept
-_SAME = 1e-6  # of the region's widths: distance of two attractors that are copies of each other
-_AT_ONCE = 2**20  # distances of states from points
+from vibrokit.symbolic.flow_kind import Flow
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -44,7 +45,7 @@ class Landings:
         here = self._wrapped(self.attractors[label].points)
         for other in range(label if turn_of(self.osc) else 0):
             there = self._wrapped(self.attractors[other].points)
-            if here.shape == there.shape and self.region.apart(here, there).max() < _SAME:
+            if here.shape == there.shape and self.region.apart(here, there).max() < 1e-6:
                 return other
         return label
 
@@ -53,7 +54,7 @@ class Landings:
 
         The labels go on from those of the attractors where x repeats.
         """
-        turn, half = turn_of(self.osc), (0.5 + _BORDER) * turn_of(self.osc)
+        turn, half = turn_of(self.osc), 0.55 * turn_of(self.osc)  # a little beyond the turn
         if not turn:
             yield from enumerate(points)
             return
@@ -98,7 +99,7 @@ def landed(stop: Stop, states: Array) -> Whole:
     if stop.labels.size:
         found = Basins(Region.of(stop.area), stop.labels).at(states[:, :2]).astype(np.int64)
         found[found < 0] = UNSETTLED
-    chunk = max(1, _AT_ONCE // max(1, len(stop.points)))
+    chunk = max(1, 2**20 // max(1, len(stop.points)))
     for first in range(0, len(states) if len(stop.points) else 0, chunk):
         part = slice(first, first + chunk)
         offsets = states[part, None, :2] - stop.points
@@ -107,3 +108,30 @@ def landed(stop: Stop, states: Array) -> Whole:
         reached = apart.min(axis=1) <= 1.0
         found[part][reached] = stop.point_labels[nearest[reached]]
     return found
+
+
+def followed(
+    osc: Oscillator,
+    stepper: Stepper,
+    states: Array,
+    sections: int | Whole,
+    stop: Stop,
+    *,
+    middle: float = 0.0,
+    visits: int = 0,
+    executor: concurrent.futures.Executor | None = None,
+) -> tuple[Ensemble, Whole]:
+    """Integrate states (count, n) until they arrive, or over some sections; return also how many turns they moved by.
+
+    Where x repeats, that is over one section, and motion is moved back to the turn around a place.
+    """
+    if not (turn := turn_of(osc)):
+        ended = run_ensemble(osc, Flow.STATE, stepper, states, sections, stop=stop, visits=visits, executor=executor)
+        return ended, np.zeros(len(states), dtype=np.int64)
+    ended = run_ensemble(osc, Flow.STATE, stepper, states, visits=1, executor=executor)
+    turns = turns_to(osc, ended.states, middle)
+    here, visited = shifted(ended.states, -turn * turns), shifted(ended.visits, -turn * turns[:, None])
+    label = np.where(ended.status == COMPLETED, landed(stop, here), UNSETTLED)
+    status = np.where(label >= 0, REACHED, ended.status)
+    ended = dataclasses.replace(ended, states=here, visits=visited, label=label, status=status)
+    return ended, turns.astype(np.int64)

@@ -1,9 +1,10 @@
-"""Cells that classify trajectories: those of a finished grid, and those around an extended attractor."""
+"""Cells that classify trajectories: of a finished grid, around an extended attractor, and in a potential well."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,18 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.autonomous import equilibria
 from vibrokit.structure.basins.landings import Landings
 from vibrokit.structure.circle import wrapped
+from vibrokit.structure.rest import SteadyForce
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 MARGIN = 2
 """Cells on every side that must lead to the same attractor for a cell to classify trajectories, by default."""
-_AHEAD = 2  # sections over which a classifying cell must be mapped to classifying cells
-_FINEST = 2048  # cells along one side of the grid
-_COVERED = 0.97  # fraction of one half of a sample that the other half, widened, must contain
-_WIDEST = 32  # largest number of cells by which a sample is widened
+FINEST = 2048
+"""Cells along one side of a grid, at most."""
+_BELOW = 1e-3  # of the depth of a well: motion so far below its barriers stays, whatever errors its integration makes
 _SQUARE = np.ones((3, 3), dtype=bool)
 
 Whole = NDArray[np.int64]
@@ -58,7 +60,7 @@ def core_of(
     reached, inside = basins.region.cells_at(ends, shape)
     targets = np.ravel_multi_index(tuple(reached.T), shape)
     held = inside & (ended.status == COMPLETED) & (labels[targets] == labels[cells])
-    for _ in range(_AHEAD):
+    for _ in range(2):
         lost = np.zeros_like(certain)
         lost.flat[cells[~(held & certain.flat[targets])]] = True
         certain &= ~ndimage.binary_dilation(lost, _SQUARE)
@@ -102,7 +104,7 @@ def mask_of(landings: Landings, region: Region, spacing: Array) -> AttractorMask
     if not samples:
         return None
     frame = Region.around(np.concatenate([region.bounds.T, *samples.values()]), margin=0.01)
-    nx, nv = np.clip(np.ceil(np.ptp(frame.bounds, axis=1) / spacing), 1, _FINEST).astype(int)
+    nx, nv = np.clip(np.ceil(np.ptp(frame.bounds, axis=1) / spacing), 1, FINEST).astype(int)
     cells = (int(nx), int(nv))
     entered, near = [], []
     for place, sample in samples.items():
@@ -132,11 +134,58 @@ def _cells_with(points: Array, frame: Region, cells: tuple[int, int]) -> Mask:
 
 
 def _gaps(sample: Array, frame: Region, cells: tuple[int, int]) -> int:
-    """Number of cells by which one half of a sample must be widened to contain the other."""
+    """Number of cells, up to 32, by which one half of a sample must be widened to contain 97 % of the other."""
     early = _cells_with(sample[: len(sample) // 2], frame, cells)
     late = _cells_with(sample[len(sample) // 2 :], frame, cells)
-    for width in range(1, _WIDEST):
+    for width in range(1, 32):
         early = ndimage.binary_dilation(early, _SQUARE)
-        if early[late].mean() >= _COVERED:
+        if early[late].mean() >= 0.97:
             return width
-    return _WIDEST
+    return 32
+
+
+def wells(
+    osc: Oscillator, attractors: Sequence[Attractor], region: Region, cells: tuple[int, int] = (512, 512)
+) -> Basins | None:
+    """Return the cells of a grid from which motion comes to rest in the well that it is in; UNSETTLED for others.
+
+    All states of such a cell have less energy V + ½v² than both barriers around the only minimum of V between them.
+    None for scenes in which motion may gain energy.
+    """
+    if not osc.model.relaxes:
+        return None
+    low, high = region.x
+    edges, speeds = np.linspace(low, high, cells[0] + 1), np.linspace(*region.v, num=cells[1] + 1, dtype=np.float64)
+    rests = equilibria(osc, low, high)
+    bounds = [low, *sorted([*osc.model.domain.borders(low, high), *(float(rest.point[0]) for rest in rests)]), high]
+    stops = [barrier.position for barrier in osc.barriers if low < barrier.position < high]
+    places = np.unique([*edges, *stops, *bounds])
+    steady = SteadyForce(osc)
+    inside, work = steady.work(places)
+    halved = steady.work(np.sort([*places, *(0.5 * (places[:-1] + places[1:]))]))[1].reshape(-1, 2).sum(axis=1)
+    potential = np.concatenate([[0.0], -np.cumsum(work)])
+    highest = np.maximum.reduceat(potential, np.searchsorted(places, edges[:-1]))  # V in each column of cells
+    highest = np.maximum(highest, potential[np.searchsorted(places, edges[1:])])
+    kinetic, labels = 0.5 * np.maximum(speeds[:-1] ** 2, speeds[1:] ** 2), np.full(cells, UNSETTLED, dtype=np.int16)
+    for left, x, right in zip(bounds, bounds[1:], bounds[2:], strict=False):
+        label = _label(attractors, x, 1e-6 * (high - low))
+        first, middle, last = np.searchsorted(places, [left, x, right])
+        before, bottom, after = potential[[first, middle, last]]
+        falls = bool(np.all(inside[first:middle] > 0) and np.all(inside[middle:last] < 0))
+        with np.errstate(invalid="ignore"):  # beyond a pole nothing is known
+            depth = min(before, after) - bottom
+            error = float(np.abs(halved - work)[first:last].sum())  # large where a force is singular
+        if label is None or not falls or not error <= 0.1 * _BELOW * depth:
+            continue
+        limit = bottom + (1 - _BELOW) * depth
+        between = (edges[:-1] >= left) & (edges[1:] <= right)
+        labels[between[:, None] & (highest[:, None] + kinetic < limit)] = label
+    return Basins(region, labels)
+
+
+def _label(attractors: Sequence[Attractor], x: float, distance: float) -> int | None:
+    """Which of the attractors the equilibrium at a place is."""
+    for label, attractor in enumerate(attractors):
+        if attractor.kind == "equilibrium" and abs(float(attractor.points[0, 0]) - x) <= distance:
+            return label
+    return None

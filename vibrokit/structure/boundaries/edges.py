@@ -11,30 +11,23 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Container, Mapping
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins, exits_of
+from vibrokit.results.basins import NOT_FOLLOWED, UNSETTLED, Basins, exits_of
+from vibrokit.structure.autonomous import PARTS_OF_A_TURN
 from vibrokit.structure.basins.classifier import BasinClassifier
+from vibrokit.structure.boundaries.meetings import Pair, grouped, meeting_cells, settled, spread
 from vibrokit.structure.circle import shifted, turn_of, turns_to
 from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
-_PARTS_OF_A_TURN = 16  # times for each 2π/ω_n in an autonomous scene, where any time step is a section
-_MOST_PARTS = 128  # of a section interval
-_FASTEST = 14.0  # logarithm of the most that ends 1e-10 widths apart may separate by between two times
 _WIDTH = 1e-10  # of the region's widths: target distance of two ends
 _SEPARATED, _TOGETHER = 60.0, 2.0  # times that: distances at which ends are brought together, and count as together
-_FEWEST_PIECES, _MOST_PIECES = 3, 63  # of a line between two ends, all corners classified at once
-_AT_ONCE = 512  # states to classify, about: fewer take as long
-_MOST_CUTS = 60
-_FIRST, _LAST = 0, 1  # which change of label on the line is kept, from the lower label; the third choice is random
 
 Array = NDArray[np.float64]
-Whole = TypeVar("Whole", bound=np.integer)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,7 +40,7 @@ class EdgeTrack:
     grows from each point to the next.
     """
 
-    labels: tuple[int, int]
+    labels: Pair
     nodes: Array
     stretches: Array
     parts: int = 1
@@ -68,7 +61,7 @@ class Strip:
     A motion next to a weakly unstable orbit leaves it later than the budget allows.
     """
 
-    labels: tuple[int, int]
+    labels: Pair
     state: Array
 
 
@@ -89,13 +82,13 @@ class Straddles:
         basins: Basins,
         trackers: int,
         rng: np.random.Generator,
-        only: Container[tuple[int, int]] | None = None,
+        only: Container[Pair] | None = None,
         parts: int = 1,
         budget: float = math.inf,
         groups: Mapping[int, int] | None = None,
     ) -> None:
         self.classifier, self.rng, self.budget, self.groups = classifier, rng, budget, groups or {}
-        self.parts = _PARTS_OF_A_TURN if classifier.osc.autonomous else parts
+        self.parts = PARTS_OF_A_TURN if classifier.osc.autonomous else parts
         centres = basins.region.cell_centres(basins.labels.shape)
         lines, origins = [np.empty((0, 2, 2))], [np.empty((0, 2), dtype=np.int64)]
         for pair, cells in meeting_cells(basins, self.groups).items():
@@ -135,7 +128,7 @@ class Straddles:
     def too_fast(self) -> bool:
         """Whether ends have separated so far between two times that the boundary was lost, and more may help."""
         fastest = max((float(np.max(each, initial=0.0)) for each in self._stretches), default=0.0)
-        return fastest > _FASTEST and not self.classifier.osc.autonomous and self.parts < _MOST_PARTS
+        return fastest > 14.0 and not self.classifier.osc.autonomous and self.parts < 128  # e¹⁴ · 1e-10 = 1e-4 widths
 
     def advance(self) -> None:
         """Integrate all ends over an interval, and bring those together again that have separated."""
@@ -166,7 +159,6 @@ class Straddles:
         self._stretches = [stretches[kept] for stretches in self._stretches]
 
     def tracks(self) -> list[EdgeTrack]:
-        """The motions so far."""
         return [self.track(index) for index in range(len(self))]
 
     def track(self, index: int) -> EdgeTrack:
@@ -181,7 +173,7 @@ class Straddles:
     def _bring_together(self, wide: NDArray[np.intp]) -> None:
         """Bring the ends of some pairs together, drop pairs that lost the boundary, and record all points."""
         straddling = np.ones(len(self), dtype=bool)
-        for _ in range(_MOST_CUTS):
+        for _ in range(60):
             if not wide.size or self.spent:
                 break
             cuts = 0.0 if self.sections else self._cuts(wide)
@@ -210,7 +202,7 @@ class Straddles:
             changes = np.flatnonzero(np.diff(labels[row, known]))
             if not changes.size:
                 continue
-            picked = {_FIRST: 0, _LAST: -1}.get(int(self.numbers[index] % 3), int(self.rng.integers(changes.size)))
+            picked = (0, -1, int(self.rng.integers(changes.size)))[self.numbers[index] % 3]
             piece = known[changes[picked] : changes[picked] + 2]
             self.ends[index], self.end_labels[index] = corners[row, piece], labels[row, piece]
             shrunk[row] = piece[1] - piece[0] < pieces
@@ -229,56 +221,5 @@ class Straddles:
 
 
 def _pieces(lines: int) -> int:
-    """Pieces of each of so many lines between two ends."""
-    return int(np.clip(_AT_ONCE // lines - 1, _FEWEST_PIECES, _MOST_PIECES))
-
-
-def grouped(labels: NDArray[Whole], groups: Mapping[int, int]) -> NDArray[Whole]:
-    """Replace labels by those of their groups."""
-    found = labels.copy()
-    for label, group in groups.items():
-        found[labels == label] = group
-    return found
-
-
-def settled(labels: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Whether labels are those of states that lead to an attractor, or escape."""
-    return (labels >= 0) | (labels == ESCAPED)
-
-
-def meeting_cells(basins: Basins, groups: Mapping[int, int] | None = None) -> dict[tuple[int, int], NDArray[np.intp]]:
-    """Return, for each pair of labels that meet, the flat indices of the cells on both sides, shape (count, 2).
-
-    The lower label is first. Labels that `groups` has are replaced. Cells that did not settle are skipped; only the
-    nearest meetings of a pair are returned.
-    """
-    numbers = np.arange(basins.labels.size).reshape(basins.labels.shape)
-    meetings: dict[tuple[int, int], list[tuple[int, int, int]]] = {}
-    every = grouped(basins.exits, groups or {})
-    for labels, cells in ((every, numbers), (every.T, numbers.T)):
-        for row, cell in zip(labels, cells, strict=True):
-            known = np.flatnonzero(settled(row))
-            for change in np.flatnonzero(np.diff(row[known])):
-                here, there = known[change], known[change + 1]
-                away = there - here
-                if row[here] > row[there]:
-                    here, there = there, here
-                pair = int(row[here]), int(row[there])
-                meetings.setdefault(pair, []).append((away, cell[here], cell[there]))
-    nearest = {}
-    for pair, rows in sorted(meetings.items()):
-        found = np.array(rows)
-        nearest[pair] = found[found[:, 0] == found[:, 0].min(), 1:]
-    return nearest
-
-
-def spread(lines: Array, most: int, rng: np.random.Generator) -> Array:
-    """Pick at most so many lines (count, 2, 2): a random first one, then each as far from those picked as possible."""
-    middles = lines.mean(axis=1)
-    middles = middles / np.maximum(np.ptp(middles, axis=0), np.finfo(float).tiny)
-    picked = [int(rng.integers(len(lines)))]
-    distance = np.full(len(lines), np.inf)
-    while len(picked) < min(most, len(lines)):
-        distance = np.minimum(distance, np.linalg.norm(middles - middles[picked[-1]], axis=1))
-        picked.append(int(np.argmax(distance)))
-    return lines[picked]
+    """Pieces of each of so many lines between two ends: about 512 states are classified at once."""
+    return int(np.clip(512 // lines - 1, 3, 63))

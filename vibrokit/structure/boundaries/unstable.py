@@ -15,19 +15,13 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.boundaries.edges import settled
-from vibrokit.structure.orbits import Orbit, least_period, nodes_from, refine_orbit, states_along, visited
+from vibrokit.structure.boundaries.meetings import settled
+from vibrokit.structure.orbits import SAMPLES, Orbit, least_period, nodes_from, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
-_RESIDUAL = 1e-10
-_DEPARTURE = 1e-5  # of the region's widths: distance from a saddle at which its branches are followed
-_CLEAR = 100.0  # times the error of the stepper at the saddle, if that is larger
-_LARGEST_DEPARTURE = 1e-2
-_ON_A_BRANCH = 16
-_ROUND = 32  # directions from a repeller
-_TIGHTENED = 2  # times, for the error
-_FINER = 4
-_SAMPLES = 1024  # along one section interval
+RESIDUAL = 1e-10
+"""Largest residual of an unstable orbit that is accepted without a finding."""
+_DEPARTURE, _FARTHEST = 1e-5, 1e-2  # of the region's widths: distance from a saddle at which its branches are followed
 
 Array = NDArray[np.float64]
 
@@ -43,10 +37,10 @@ def refine_unstable(osc: Oscillator, guess: Array, period: int, stepper: Stepper
         return refine_equilibrium(osc, guess)
     orbit = refine_orbit(osc, guess, period, stepper)
     if len(orbit.nodes) > 1:
-        pieces = _FINER * len(orbit.nodes) // period
+        pieces = 4 * len(orbit.nodes) // period
         orbit = refine_orbit(osc, states_along(osc, orbit.nodes, period, stepper, pieces), period, stepper)
     growth = float(np.abs(orbit.multipliers).max()) ** (1.0 / len(orbit.nodes))  # of a residual, from node to node
-    if orbit.residual > _RESIDUAL * max(1.0, growth):
+    if orbit.residual > RESIDUAL * max(1.0, growth):
         finer = refine_orbit(osc, orbit.nodes, period, stepper.refined().refined())
         orbit = min(orbit, finer, key=lambda found: found.residual)
     return least_period(osc, orbit, stepper)
@@ -77,7 +71,7 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         exponents=exponents,
         leads_to=leads_to,
         residual=orbit.residual,
-        error=orbit.moved_by_tightening(osc, stepper, _TIGHTENED),
+        error=orbit.moved_by_tightening(osc, stepper, 2),
         orbit=_along(osc, orbit, stepper),
     )
 
@@ -86,7 +80,7 @@ def _along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     """(x, v) along an orbit at equal times, its start repeated at the end; each piece starts at a node."""
     if orbit.kind == "equilibrium":
         return orbit.nodes[:, :2]
-    pieces = -(-_SAMPLES * max(1, round(orbit.duration / osc.section_interval)) // len(orbit.nodes))
+    pieces = -(-SAMPLES * max(1, round(orbit.duration / osc.section_interval)) // len(orbit.nodes))
     span = orbit.duration / len(orbit.nodes)
     each = [
         record(osc, Flow.STATE, stepper, node, at * span, span / pieces, pieces)[:pieces]
@@ -116,24 +110,24 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     branch winds between basins, its label is the most frequent one, or the next if both branches have the same one; the
     other attractors that are reached follow. A repeller has the labels of all directions.
     """
-    # Nearer than that, coarse steps across contacts may have orbits of their own.
-    away = min(_LARGEST_DEPARTURE, max(_DEPARTURE, _CLEAR * _mismatch(classifier, orbit)))
+    # Nearer than a hundred errors of the stepper, coarse steps across contacts may have orbits of their own.
+    away = min(_FARTHEST, max(_DEPARTURE, 100 * _mismatch(classifier, orbit)))
     with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
         orbit = orbit.refined(classifier.osc, classifier.stepper)
     widths = classifier.region.widths
     if np.sum(np.abs(orbit.multipliers) > 1) > 1:
-        angles = 2 * np.pi * np.arange(_ROUND) / _ROUND
-        ring = np.zeros((_ROUND, len(orbit.point)))
+        angles = 2 * np.pi * np.arange(32) / 32
+        ring = np.zeros((32, len(orbit.point)))
         ring[:, 0], ring[:, 1] = widths[0] * np.cos(angles), widths[1] * np.sin(angles)
         return tuple(int(label) for label in np.unique(classifier.labels(orbit.point + away * ring)))
     direction = orbit.unstable_direction
     direction = direction / np.linalg.norm(direction[:2] / widths)
     direction *= np.copysign(1.0, direction[np.flatnonzero(direction)[0]])
-    growth = np.clip(np.abs(orbit.multipliers).max(), 2.0, _LARGEST_DEPARTURE / away)
-    distances = away * growth ** ((np.arange(_ON_A_BRANCH) + 0.5) / _ON_A_BRANCH)
+    growth = np.clip(np.abs(orbit.multipliers).max(), 2.0, _FARTHEST / away)
+    distances = away * growth ** ((np.arange(16) + 0.5) / 16)
     along = np.concatenate([-distances, distances])
     labels = classifier.labels(orbit.point + along[:, None] * direction)  # together, which takes as long as one side
-    first, second = _label_of_each(labels[:_ON_A_BRANCH], labels[_ON_A_BRANCH:])
+    first, second = _label_of_each(labels[:16], labels[16:])
     reached = np.unique(labels)
     others = [int(label) for label in reached[settled(reached)] if label not in (first, second)]
     return (first, second, *others)

@@ -18,12 +18,7 @@ from vibrokit.structure.tracing.turns import NEXT_TO, Surface, surfaces_of, turn
 FOLD, CROSSING = "fold", "pitchfork or transcritical"
 DOUBLING, TORUS, HOPF, GRAZING = "period doubling", "Neimark–Sacker", "Hopf", "grazing"
 
-_TOUCHES = 1e-6  # distance, relative to the extent of the motion, within which it must touch at a supposed grazing
-_BACK = 1e-3  # in units of the span: how far back an extrapolation begins
-_JUST_AHEAD = 1e-3  # the same: how far ahead it may end
-_CLOSER = 0.9  # fraction of the distance to grazing that one step takes
-_APPROACHES = 8
-_SLOPE = 1e-4  # fraction of a step over which a test's slope is taken, for the error
+_JUST_AHEAD = 1e-3  # in units of the span: how far ahead a grazing may lie, and how far back an extrapolation begins
 _SHARP = 1e-13  # fraction of a step that roots are found to
 
 Array = NDArray[np.float64]
@@ -155,16 +150,16 @@ def _extrapolated(
 
     distance, now, remaining = 0.0, here.member, math.inf
     try:
-        before, last, deep = -_BACK, depth(family, member(-_BACK)), depth(family, now)
-        for _ in range(_APPROACHES):
+        before, last, deep = -_JUST_AHEAD, depth(family, member(-_JUST_AHEAD)), depth(family, now)
+        for _ in range(8):
             remaining = -deep * (distance - before) / (deep - last) if deep > last else math.inf
             if not 0 <= remaining <= _JUST_AHEAD:
                 return None
-            nearer = member(distance + _CLOSER * remaining)
+            nearer = member(distance + 0.9 * remaining)
             new = depth(family, nearer)
             if not deep < new <= 0:
                 break
-            before, last, distance, deep, now = distance, deep, distance + _CLOSER * remaining, new, nearer
+            before, last, distance, deep, now = distance, deep, distance + 0.9 * remaining, new, nearer
     except VibrokitError:
         pass  # no nearer member exists
     if not math.isfinite(remaining):
@@ -244,7 +239,7 @@ class _Interval:
         """Return how far a root moves when the integration is tightened, in the parameter."""
         family = dataclasses.replace(self.family, stepper=self.family.stepper.refined())
         finer = dataclasses.replace(self, family=family)
-        low, high = max(fraction - _SLOPE, 0.0), min(fraction + _SLOPE, 1.0)
+        low, high = max(fraction - 1e-4, 0.0), min(fraction + 1e-4, 1.0)
         steepness = (test(self.family, self.member(high)) - test(self.family, self.member(low))) / (high - low)
         moved = -test(family, finer.member(fraction)) / steepness
         tight = finer.member(min(max(fraction + moved, 0.0), 1.0))
@@ -256,4 +251,4 @@ def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family,
     """Whether a test vanishes for another reason: two real rates of opposite sign, or a turn that came or went."""
     if kind in (TORUS, HOPF):
         return not (np.abs(_rates(family, member).imag) > 1e-9).any()
-    return kind == GRAZING and not abs(test(family, member)) < _TOUCHES
+    return kind == GRAZING and not abs(test(family, member)) < 1e-6

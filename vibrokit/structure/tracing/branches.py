@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.attractors.names import names_of
 from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
-from vibrokit.structure.orbits import Orbit, refine_orbit, visited
+from vibrokit.structure.orbits import SAMPLES, Orbit, refine_orbit, visited
 from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.tracing.bifurcations import DOUBLING, GRAZING, Located
 from vibrokit.structure.tracing.families import Member
@@ -31,16 +32,10 @@ from vibrokit.structure.tracing.following import follow
 
 _SAME = 1e-5  # fraction of the region's size within which two points are one
 _NEAR = 0.1  # the same, within which two sets of points may belong to one branch
-_CERTAIN = -1.0  # cost of a pair that one family joins
-_ORBIT_SAMPLES = 1024
-_SAME_POINT = 1e-3  # fraction of the region's size within which the points of two bifurcations are the same
-_SAME_VALUE = 1e-7  # fraction of the span of the values within which their values are
 
 Array = NDArray[np.float64]
 Place = tuple[int, int]
 """A value, by its index, and an attractor there, by its index."""
-Numbered = list[list[int]]
-"""The branch of every attractor, value by value."""
 
 
 @dataclasses.dataclass(eq=False)
@@ -88,8 +83,9 @@ class Tracing:
         for pair in range(len(self.links)):
             self._pair_off(pair)
 
+    @cached_property
     def numbered(self) -> list[list[int]]:
-        """Return the branch of every attractor, numbered as they appear."""
+        """The branch of every attractor, value by value, once all are joined; they are numbered as they appear."""
         branches: list[list[int]] = []
         count = 0
         for at, attractors in enumerate(self.found):
@@ -166,7 +162,7 @@ class Tracing:
                 away = min(_apart(here, after.points, self.size), _apart(before.points, there, self.size))
                 costs[row, column] = min(away, 2 * _NEAR)
         for row, column in self.links[pair].items():
-            costs[row, column] = _CERTAIN
+            costs[row, column] = -1.0  # one family joins them
         for row, column in zip(*linear_sum_assignment(costs), strict=True):
             if costs[row, column] < _NEAR:
                 self.links[pair].setdefault(int(row), int(column))
@@ -192,6 +188,64 @@ class Tracing:
             self.located += [(many, found) for found in passed if found.kind == DOUBLING]
             period //= 2
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the branches, from the first attractor of each."""
+        first: dict[int, Attractor] = {}
+        for attractors, branches in zip(self.found, self.numbered, strict=True):
+            for attractor, branch in zip(attractors, branches, strict=True):
+                first.setdefault(branch, attractor)
+        return names_of([first[branch] for branch in sorted(first)], has_stops=bool(self.osc.barriers))
+
+    @cached_property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """Each bifurcation once, the most accurate if it was located from both sides."""
+        kept: list[tuple[Place, Located]] = []
+        for place, found in sorted(self.located, key=lambda one: one[1].error):
+            if not any(self._same(found, known) for _, known in kept):
+                kept.append((place, found))
+        kept.sort(key=lambda one: (one[1].value, one[1].kind))
+        return tuple(
+            Bifurcation(one.kind, one.value, one.error, self.numbered[at][index], one.period, one.point, one.side)
+            for (at, index), one in kept
+        )
+
+    def _same(self, one: Located, other: Located) -> bool:
+        if (one.kind, one.period, one.side) != (other.kind, other.period, other.side):
+            return False
+        span = abs(self.values[-1] - self.values[0])
+        if abs(one.value - other.value) > 1e-7 * span + one.error + other.error:
+            return False
+        points = other.point[None]
+        if other.period > 1:  # they may have different points of the orbit
+            osc = self.at(other.value)
+            try:
+                points = visited(osc, refine_orbit(osc, other.point, other.period, self.stepper), self.stepper)
+            except StructureError:
+                return True
+        away = np.abs(points[:, :2] - one.point[:2]) / self.size
+        return bool(away.max(axis=1).min() < 1e-3) or one.bracketed or other.bracketed
+
+    def findings(self, values: int) -> tuple[Finding, ...]:
+        """Return findings about the branches at some number of values."""
+        count = len({branch for branches in self.numbered for branch in branches})
+        found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=self.line.path)]
+        found += [
+            Finding.of(Code.BIFURCATION, one.branch, kind=one.kind, side=one.side, value=one.value, error=one.error)
+            for one in self.bifurcations
+        ]
+        for pair, (low, high) in enumerate(itertools.pairwise(self.values)):
+            before, after = set(self.numbered[pair]), set(self.numbered[pair + 1])
+            for branch in sorted(before ^ after):
+                kinds = {one.kind for one in self.bifurcations if low <= one.value <= high and one.branch == branch}
+                if not kinds - {GRAZING}:
+                    change = "ends" if branch in before else "begins"
+                    located = "only grazing" if kinds else "no bifurcation"
+                    found.append(
+                        Finding.of(Code.BRANCH_ENDS, branch, change=change, low=low, high=high, located=located)
+                    )
+        return (*found, *([Finding.of(Code.FOUND_BY_NEIGHBOUR, count=self.added)] if self.added else []))
+
 
 def without_fraction(attractor: Attractor) -> Attractor:
     """Return an attractor whose basin fraction is unknown."""
@@ -215,75 +269,8 @@ def _apart(first: Array, second: Array, size: Array) -> float:
 
 def thinned(attractor: Attractor) -> Attractor:
     """Return an attractor with fewer samples along its orbit, which keeps its ends; a continuation has many."""
-    every = math.ceil((len(attractor.orbit) - 1) / _ORBIT_SAMPLES)
+    every = math.ceil((len(attractor.orbit) - 1) / SAMPLES)
     if every < 2:
         return attractor
     kept = np.append(np.arange(0, len(attractor.orbit) - 1, every), len(attractor.orbit) - 1)
     return dataclasses.replace(attractor, orbit=attractor.orbit[kept])
-
-
-def branch_names(tracing: Tracing, numbered: Numbered) -> tuple[str, ...]:
-    """Return the names of the branches, from the first attractor of each."""
-    first: dict[int, Attractor] = {}
-    for attractors, branches in zip(tracing.found, numbered, strict=True):
-        for attractor, branch in zip(attractors, branches, strict=True):
-            first.setdefault(branch, attractor)
-    return names_of([first[branch] for branch in sorted(first)], has_stops=bool(tracing.osc.barriers))
-
-
-def bifurcations_of(tracing: Tracing, numbered: Numbered) -> tuple[Bifurcation, ...]:
-    """Return each bifurcation once, the most accurate if it was located from both sides."""
-    kept: list[tuple[Place, Located]] = []
-    for place, found in sorted(tracing.located, key=lambda one: one[1].error):
-        if not any(_same(tracing, found, known) for _, known in kept):
-            kept.append((place, found))
-    kept.sort(key=lambda one: (one[1].value, one[1].kind))
-    return tuple(
-        Bifurcation(found.kind, found.value, found.error, numbered[at][index], found.period, found.point, found.side)
-        for (at, index), found in kept
-    )
-
-
-def _same(tracing: Tracing, one: Located, other: Located) -> bool:
-    if (one.kind, one.period, one.side) != (other.kind, other.period, other.side):
-        return False
-    span = abs(tracing.values[-1] - tracing.values[0])
-    if abs(one.value - other.value) > _SAME_VALUE * span + one.error + other.error:
-        return False
-    points = other.point[None]
-    if other.period > 1:  # they may have different points of the orbit
-        osc = tracing.at(other.value)
-        try:
-            points = visited(osc, refine_orbit(osc, other.point, other.period, tracing.stepper), tracing.stepper)
-        except StructureError:
-            return True
-    away = np.abs(points[:, :2] - one.point[:2]) / tracing.size
-    return bool(away.max(axis=1).min() < _SAME_POINT) or one.bracketed or other.bracketed
-
-
-def branch_findings(
-    tracing: Tracing, numbered: Numbered, bifurcations: Sequence[Bifurcation], values: int
-) -> tuple[Finding, ...]:
-    """Return findings about the branches at some number of values."""
-    count = len({branch for branches in numbered for branch in branches})
-    found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=tracing.line.path)]
-    found += [
-        Finding.of(Code.BIFURCATION, one.branch, kind=one.kind, side=one.side, value=one.value, error=one.error)
-        for one in bifurcations
-    ]
-    found += _ends(tracing, numbered, bifurcations)
-    if tracing.added:
-        found.append(Finding.of(Code.FOUND_BY_NEIGHBOUR, count=tracing.added))
-    return tuple(found)
-
-
-def _ends(tracing: Tracing, numbered: Numbered, bifurcations: Sequence[Bifurcation]) -> Iterator[Finding]:
-    """Findings about branches that begin or end between two values without a located bifurcation."""
-    for pair, (low, high) in enumerate(zip(tracing.values, tracing.values[1:], strict=False)):
-        before, after = set(numbered[pair]), set(numbered[pair + 1])
-        for branch in sorted(before ^ after):
-            kinds = {one.kind for one in bifurcations if low <= one.value <= high and one.branch == branch}
-            if not kinds - {GRAZING}:
-                change = "ends" if branch in before else "begins"
-                located = "only grazing" if kinds else "no bifurcation"
-                yield Finding.of(Code.BRANCH_ENDS, branch, change=change, low=low, high=high, located=located)

@@ -14,17 +14,13 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.autonomous import cycle_equations, equilibrium_equations, turning_point
+from vibrokit.structure.autonomous import cycle_equations, equilibrium_equations
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import section_equations
 from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.scales import units_of
 
-_ITERATIONS = 12
 _CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
-_NUDGE = 1e-4  # fraction of the span over which the difference for a derivative in the parameter is taken
-_ONE_ORBIT = 1e-5  # relative distance of an orbit from its image after a part of its period, if it repeats then
-_RESTING = 1e-2  # motion within the duration, relative to the sizes, below which there is no cycle
 
 Array = NDArray[np.float64]
 
@@ -96,7 +92,7 @@ class Family(ABC):
             jacobian = np.vstack([np.column_stack([member.jacobian, slope]), normal])
             return Evaluation(residual[None], jacobian[None], np.array([member]))
 
-        _, (residual,), members = newton(evaluate, guess[None], iterations=_ITERATIONS)
+        _, (residual,), members = newton(evaluate, guess[None], iterations=12)
         if not residual <= _CLOSED * float(np.linalg.norm(self.sizes)):
             value = float(guess[-1] * self.span)
             raise StructureError(f"Newton's method found no {self.kind} motion near {self.line.path} = {value:g}.")
@@ -108,7 +104,7 @@ class Family(ABC):
 
         A StructureError is raised if the motion diverges at the neighbouring value.
         """
-        step = np.copysign(_NUDGE, self.middle - member.value)
+        step = np.copysign(1e-4, self.middle - member.value)
         nudged = self.equations(self.at(member.value + step * self.span))(member.place[None, :-1] * self.sizes)
         slope = np.asarray((nudged.residuals[0] - member.defect) / step)
         if not np.isfinite(slope).all():
@@ -143,7 +139,7 @@ class PeriodicFamily(Family):
         osc = self.at(member.value)
         for period in (period for period in range(1, self.period) if self.period % period == 0):
             moved = section_equations(osc, period, self.stepper)(member.point[None]).residuals[0]
-            if np.linalg.norm(moved / self.sizes) < _ONE_ORBIT:
+            if np.linalg.norm(moved / self.sizes) < 1e-5:
                 return True
         return False
 
@@ -173,12 +169,12 @@ class CycleFamily(Family):
 
     def parted(self, osc: Oscillator, unknowns: Array) -> tuple[Array, float]:
         """Return the turning point and the duration."""
-        return turning_point(unknowns), float(unknowns[1])
+        return unknowns * (np.arange(len(unknowns)) != 1), float(unknowns[1])
 
     def member(self, place: Array) -> Member:
         """Evaluate the defect and its derivatives; a StructureError is raised at an equilibrium."""
         member = super().member(place)
-        if np.abs(member.jacobian[:, 1] / self.sizes).max() < _RESTING:  # the rate of change times the duration
+        if np.abs(member.jacobian[:, 1] / self.sizes).max() < 1e-2:  # motion within the duration
             raise StructureError("Newton's method for a limit cycle converged to an equilibrium.")
         return member
 

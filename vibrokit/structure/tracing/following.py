@@ -16,13 +16,8 @@ from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
 from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
-_MOST_STEPS = 800
 _LONGEST = 0.01  # fraction of the region's size that a motion may move in one step
 _SHORTEST = 1e-6  # the same, below which a family counts as lost
-_ASTRAY = 0.3  # fraction of a step that Newton's method may correct
-_FAR = 0.01  # fraction of the region's size that it may correct, whatever the step
-_NARROW = 1e-3  # length of a step in which a bifurcation may stay bracketed
-_STRAIGHT = 0.9  # least cosine of the angle between one tangent and the next
 
 Array = NDArray[np.float64]
 
@@ -65,12 +60,12 @@ def follow(
         return Followed(None, False, ())
     found: list[Located] = []
     length = 1.0
-    for _ in range(_MOST_STEPS):
+    for _ in range(800):
         guess, normal, arriving = _predicted(here, length, target / family.span, across)
         length = float(np.linalg.norm(guess - here.member.place))
         there = _step(family, here, guess, normal)
         passed = bifurcations_between(family, here, there) if there else []
-        if there is None or (length > _NARROW and any(one.bracketed for one in passed)):
+        if there is None or (length > 1e-3 and any(one.bracketed for one in passed)):
             length /= 2
             if length < _SHORTEST:
                 found += grazing_ahead(family, here)
@@ -105,7 +100,7 @@ def _step(family: Family, here: Stage, guess: Array, normal: Array) -> Stage | N
     except VibrokitError:
         return None
     astray = float(np.linalg.norm(there.member.place - guess))
-    straight = there.tangent @ here.tangent >= _STRAIGHT
-    if astray > min(_ASTRAY * length, _FAR) or not straight or family.closes_early(there.member):
+    straight = there.tangent @ here.tangent >= 0.9
+    if astray > min(0.3 * length, _LONGEST) or not straight or family.closes_early(there.member):
         return None
     return there

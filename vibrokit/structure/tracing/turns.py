@@ -17,8 +17,6 @@ from vibrokit.symbolic.numeric import contact_force_of
 
 NEXT_TO = 1e-2
 """Distance from a surface, relative to the extent of the motion, within which a turn counts as next to it."""
-_SAMPLES = 256  # in a forcing period or 2π/ω_n, whichever is shorter
-_FINER = 64  # samples of the stretch around a turn next to a surface, which is integrated again
 
 Array = NDArray[np.float64]
 
@@ -68,7 +66,7 @@ def turns_at(family: Family, member: Member, scene: Oscillator, surfaces: Sequen
         place = member.point[None]
         return {one: one.reach(scene, place, 0.0)[0] / family.sizes[0] for one in surfaces if not one.leaving}
     unit = min(osc.section_interval, 2 * math.pi / osc.natural_frequency)
-    count = _SAMPLES * math.ceil(member.duration / unit - 1e-9)
+    count = 256 * math.ceil(member.duration / unit - 1e-9)
     spacing = member.duration / count
     # A sample more, for a turn at the section itself.
     path = record(osc, Flow.STATE, family.stepper, member.point, 0.0, spacing, count + 1)
@@ -81,8 +79,8 @@ def turns_at(family: Family, member: Member, scene: Oscillator, surfaces: Sequen
             if index == count and reaches and _turns(reach[:2], rate[:2], spacing):
                 continue
             if abs(farthest) < NEXT_TO * extent:
-                finer = spacing / _FINER
-                closer = record(osc, Flow.STATE, family.stepper, path[index], index * spacing, finer, _FINER)
+                finer = spacing / 64
+                closer = record(osc, Flow.STATE, family.stepper, path[index], index * spacing, finer, 64)
                 again = _turns(*surface.reach(scene, closer, finer), finer)
                 farthest = max((each for _, each in again), default=farthest)
             reaches.append(farthest / extent)
