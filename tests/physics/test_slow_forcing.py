@@ -13,7 +13,7 @@ from scipy.sparse.linalg import spsolve
 import vibrokit as vk
 from vibrokit.analyzers.paths import slow_relaxation
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.leg import pieces_of
+from vibrokit.analyzers.polishing.ends import pieces_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.energy import Bound
 from vibrokit.symbolic.flow_kind import Flow

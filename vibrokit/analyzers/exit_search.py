@@ -17,7 +17,8 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, mirror, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.leg import pieces_of
+from vibrokit.analyzers.polishing.ends import pieces_of
+from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import Search
@@ -114,7 +115,7 @@ class ExitSearch:
         self._least = detailed_balance.with_paths(self.problem, self._least, found)
         if found:
             exact = bool(self._least) and all(each.bound is Bound.EXACT for each in self._least)
-            self._polish(found, quick=exact)
+            self._polish(found, effort=Effort.JOIN if exact else Effort.FROM_ORBIT)
         if slow:
             self._polish(slow, quick=self._shots_follow)
         self._reversed = True
@@ -222,11 +223,13 @@ class ExitSearch:
                 self._failed("polishing", error)
         return found
 
-    def _polish(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
+    def _polish(
+        self, candidates: Sequence[Candidate], *, quick: bool = False, effort: Effort = Effort.FROM_ORBIT
+    ) -> None:
         if self._polishings is None:
             self._polishings = self._begun()
         for polishing in self._polishings:
-            polishing.add(candidates, quick=quick)
+            polishing.add(candidates, Effort.SHOOT if quick else effort)
             if self.stopped:
                 break
 

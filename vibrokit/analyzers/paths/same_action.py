@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 POLISHED = 1e-6
-"""Relative difference of the actions of one path that was solved for twice."""
+"""Relative difference of the actions, and of the places, of one path or orbit that was solved for twice."""
 
 
 def same_action(one: float, other: float, within: float = POLISHED) -> bool:

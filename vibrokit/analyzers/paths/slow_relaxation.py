@@ -6,6 +6,7 @@ the saddle to the attractor, run backwards, under the forces at that time. It en
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterable, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import minimum_filter1d
 
 from vibrokit.analyzers.path_ends import AtSaddle
 from vibrokit.analyzers.paths.candidate import Candidate
@@ -22,11 +24,10 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.progress import TRAJECTORIES, advance, current
-from vibrokit.results.saddle import Saddle
 from vibrokit.structure.orbits import states_along
 from vibrokit.structure.scales import doublings_of
 
-_PHASES = 16  # in a section interval, at which paths end at first
+_APART = 16  # of the section interval: nearer to each other, only the cheapest path is kept
 _DECAY = math.log(1e3)  # logarithm of the factor by which a deviation from the attractor has fallen
 _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from the saddle a path ends
 _ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
@@ -50,111 +51,64 @@ def slow_relaxations(problem: ExitProblem, propagator: SegmentPropagator) -> lis
     osc, attractor = problem.scene, problem.attractor
     if osc.autonomous or not doublings_of(osc) or not attractor.is_fixed or propagator.size != 2:
         return []
-    found: list[Candidate] = []
-    for end in problem.path_ends:
-        if isinstance(end, AtSaddle) and problem.structure.saddles[end.number].kind == "saddle":
-            found += _cheapest(problem, propagator, end)
-    return found
+    ends = [end for end in problem.path_ends if isinstance(end, AtSaddle)]
+    saddles = [end for end in ends if problem.structure.saddles[end.number].kind == "saddle"]
+    return [path for end in saddles for path in _Relaxations(problem, propagator, end).cheapest()]
 
 
-def _cheapest(problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> list[Candidate]:
-    """The paths to a saddle whose ends, to a piece, are local minima of the action, the cheapest first.
+class _Relaxations:
+    """Motion from beside a saddle to the attractor, run backwards, to ends at all times: all followed at once."""
 
-    Newton's method cannot shift a path in time by more than a fraction of 1/ω_n.
-    """
-    saddle, step = problem.structure.saddles[end.number], propagator.pieces // _PHASES
-    relaxations, pieces = _Relaxations(problem, propagator, end), saddle.period * propagator.pieces
-    known: dict[int, Candidate | None] = {}
-
-    def cost(phase: int) -> float:
-        path = known[phase % pieces]
-        return math.inf if path is None else path.action
-
-    def find(phases: Iterable[int]) -> None:
-        new = sorted({phase % pieces for phase in phases} - known.keys())
-        known.update(zip(new, relaxations.ending(new), strict=True))
-
-    find(range(0, pieces, step))
-    costs = [cost(phase) for phase in range(0, pieces, step)]
-    minima = [at for at, here in enumerate(costs) if here <= costs[at - 1] and here < costs[(at + 1) % len(costs)]]
-    best, change = [at * step for at in sorted(minima, key=costs.__getitem__)[:_MOST]], step
-    while best and (change := change // 2) >= 1:
-        near = [(phase, phase - change, phase + change) for phase in best]
-        find(phase for three in near for phase in three)
-        best = [min(three, key=cost) for three in near]
-    found = [known[phase % pieces] for phase in best]
-    return [path for path in found if path is not None]
-
-
-class _Between:
-    """The attractor's and a saddle's orbit, and the slow motion between them."""
-
-    def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, saddle: Saddle) -> None:
+    def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> None:
         osc, attractor, pieces = problem.scene, problem.attractor, propagator.pieces
+        saddle = problem.structure.saddles[end.number]
+        self._problem, self._propagator, self._end = problem, propagator, end
+        self._field, self._around, self._phases = VectorField(osc), followed_within(problem), saddle.period * pieces
         own = states_along(osc, attractor.points, attractor.period, propagator.stepper, pieces)
         other = states_along(osc, saddle.at_equal_times, saddle.period, propagator.stepper, pieces)
-        self.field = VectorField(osc)
         both = math.lcm(len(own), len(other))
         states = np.hstack([np.tile(states, (both // len(states), 1)) for states in (own, other)])
-        sides = np.sign(states[:, 2] - states[:, 0])
-        self.beside = bool(np.all(sides == sides[0]))
+        self._aside = len(set(np.sign(states[:, 2] - states[:, 0]))) == 1  # one orbit is always beside the other
         times = propagator.piece * np.arange(both + 1)
-        self.orbits = CubicSpline(times, np.vstack([states, states[:1]]), bc_type="periodic")
+        self._orbits = CubicSpline(times, np.vstack([states, states[:1]]), bc_type="periodic")
 
-    def attractor(self, time: float) -> Array:
-        """Return the state (2,) of the attractor at a time (s)."""
-        state: Array = self.orbits(time)[:2]
-        return state
+    def cheapest(self) -> list[Candidate]:
+        """Return the paths whose ends, to a piece, are local minima of the action, the cheapest first.
 
-    def saddle(self, time: float) -> Array:
-        """Return the state (2,) of the saddle's orbit at a time (s)."""
-        state: Array = self.orbits(time)[2:]
-        return state
+        Newton's method cannot shift a path in time by more than a fraction of 1/ω_n.
+        """
+        found = self._ending()
+        costs = np.array([found[phase].action if phase in found else math.inf for phase in range(self._phases)])
+        least = minimum_filter1d(costs, 2 * (self._propagator.pieces // _APART) + 1, mode="wrap")
+        minima = np.flatnonzero((costs == least) & np.isfinite(costs))
+        return [found[at] for at in sorted(minima.tolist(), key=costs.__getitem__)[:_MOST]]
 
-    def flipped(self, times: Array, states: Array) -> Array:
-        """Return states (count, 2) with their velocities against the slow one reversed.
+    def _ending(self) -> dict[int, Candidate]:
+        """The cheaper of both motions by the phase of its end (pieces), where one arrives."""
+        beside = {phase: self._beside(phase) for phase in range(self._phases)}
+        starts = [(phase, side * one[0], one[1]) for phase, one in beside.items() if one for side in (1, -1)]
+        found: dict[int, Candidate] = {}
+        for (phase, _, count), path in zip(starts, self._carried(starts), strict=True):
+            candidate = self._candidate(phase, path[: count + 1][::-1])
+            if candidate is not None and (phase not in found or candidate.action < found[phase].action):
+                found[phase] = candidate
+        return found
+
+    def _flipped(self, times: Array, states: Array) -> Array:
+        """States (count, 2) with their velocities against the slow one reversed.
 
         On either orbit the slow velocity is that of the orbit, which is then left as it is; between them it depends
         linearly on x. Where the saddle's orbit crosses that of the attractor, it is that of the attractor.
         """
-        (x, v), (own_x, own_v, other_x, other_v) = states.T, self.orbits(times).T
-        share = (x - own_x) / (other_x - own_x) if self.beside else 0.0
+        (x, v), (own_x, own_v, other_x, other_v) = states.T, self._orbits(times).T
+        share = (x - own_x) / (other_x - own_x) if self._aside else 0.0
         return np.column_stack([x, 2 * (own_v + share * (other_v - own_v)) - v])
-
-    def rate(self, times: Array, states: Array) -> Array:
-        """Return the rates of motion whose damping is reversed."""
-        return np.column_stack([states[:, 1], self.field.rate(self.flipped(times, states), times)[:, 1]])
-
-
-class _Relaxations:
-    """Motion from beside a saddle to the attractor, run backwards, to ends at various times: all followed at once."""
-
-    def __init__(self, problem: ExitProblem, propagator: SegmentPropagator, end: AtSaddle) -> None:
-        self._problem, self._propagator, self._end = problem, propagator, end
-        self._between = _Between(problem, propagator, problem.structure.saddles[end.number])
-        self._around = followed_within(problem)
-
-    def ending(self, phases: Sequence[int]) -> list[Candidate | None]:
-        """Return the cheaper of both motions for each phase of its end (pieces); None where neither arrives."""
-        starts, longest = list[tuple[int, Array, int]](), 0
-        for phase in phases:
-            beside = self._beside(phase)
-            if beside is not None:
-                offset, count = beside
-                longest = max(longest, count)
-                starts += [(phase, offset, count), (phase, -offset, count)]
-        found: dict[int, Candidate] = {}
-        for (phase, _, count), path in zip(starts, self._carried(starts, longest), strict=True):
-            candidate = self._candidate(phase, path[: count + 1][::-1])
-            if candidate is not None and (phase not in found or candidate.action < found[phase].action):
-                found[phase] = candidate
-        return [found.get(phase) for phase in phases]
 
     def _beside(self, phase: int) -> tuple[Array, int] | None:
         """Where the motion ends, from the saddle, and how many pieces it takes from a section on; None if it cannot."""
         propagator, time = self._propagator, phase * self._propagator.piece
-        there = self._between.saddle(time)
-        values, vectors = np.linalg.eig(self._between.field.jacobian(there, time))
+        there = self._orbits(time)[2:]
+        values, vectors = np.linalg.eig(self._field.jacobian(there, time))
         if np.iscomplexobj(values) or values.max() <= 0:
             return None
         decay = -float(self._problem.attractor.exponents.real.max())
@@ -165,51 +119,50 @@ class _Relaxations:
 
     def _distance(self, time: float) -> float:
         """The distance from the saddle to the attractor."""
-        between = self._between
-        return float(np.linalg.norm((between.attractor(time) - between.saddle(time)) / self._propagator.units))
+        own, other = np.split(self._orbits(time), 2)
+        return float(np.linalg.norm((own - other) / self._propagator.units))
 
-    def _carried(self, starts: Sequence[tuple[int, Array, int]], count: int) -> list[Array]:
-        """States (count + 1, 2) of each motion, from its end on backwards; NaN where that takes too many steps.
+    def _carried(self, starts: Sequence[tuple[int, Array, int]]) -> Iterable[Array]:
+        """States (count, 2) of each motion, from its end on backwards; NaN where that takes too many steps.
 
         A motion that has gone far from the region is not followed, since it may diverge.
         """
         if not starts:
-            return []
-        between, units, piece = self._between, self._propagator.units, self._propagator.piece
+            return ()
+        count = max(count for _, _, count in starts)
+        units, piece = self._propagator.units, self._propagator.piece
         ends = piece * np.array([phase for phase, _, _ in starts], dtype=np.float64)
-        first = np.array([between.saddle(time) + offset for time, (_, offset, _) in zip(ends, starts, strict=True)])
+        first = self._orbits(ends)[:, 2:] + np.array([offset for _, offset, _ in starts])
         evaluations, work = itertools.count(1), current()
 
         def backwards(elapsed: float, flat: Array) -> Array:
             work.check()
             if next(evaluations) > _MOST_EVALUATIONS:
                 raise _TooManyError
-            states = flat.reshape(-1, 2)
-            rates = np.where(self._around.contains(states)[:, None], between.rate(ends - elapsed, states), 0.0)
-            return -rates.ravel()
+            states, times = flat.reshape(-1, 2), ends - elapsed
+            forces = self._field.rate(self._flipped(times, states), times)[:, 1]
+            rates = np.column_stack([states[:, 1], forces])
+            return -np.where(self._around.contains(states)[:, None], rates, 0.0).ravel()
 
-        nothing = np.full((len(starts), count + 1, 2), np.nan)
+        times = piece * np.arange(count + 1, dtype=np.float64)
         goes = {"rtol": _PRECISION, "atol": _LEAST * np.tile(units, len(starts))}
-        try:
-            with np.errstate(all="ignore"):
-                solved = solve_ivp(
-                    backwards, (0.0, piece * count), first.ravel(), method="DOP853",
-                    t_eval=piece * np.arange(count + 1, dtype=np.float64), **goes,
-                )  # fmt: skip
-        except _TooManyError:
-            return list(nothing)
-        advance(len(starts), unit=TRAJECTORIES)
-        return list(solved.y.T.reshape(count + 1, -1, 2).transpose(1, 0, 2) if solved.success else nothing)
+        with np.errstate(all="ignore"), contextlib.suppress(_TooManyError):
+            solved = solve_ivp(backwards, times[[0, -1]], first.ravel(), method="DOP853", t_eval=times, **goes)
+            if solved.success:
+                advance(len(starts), unit=TRAJECTORIES)
+                states: Array = solved.y.T.reshape(count + 1, -1, 2).transpose(1, 0, 2)
+                return states
+        return np.full((len(starts), count + 1, 2), np.nan)
 
     def _candidate(self, phase: int, path: Array) -> Candidate | None:
         """A path as a candidate; None if it does not begin near the attractor, or is out before its end."""
-        problem, between, piece = self._problem, self._between, self._propagator.piece
+        problem, piece = self._problem, self._propagator.piece
         times = piece * np.arange(phase + 1 - len(path), phase + 1, dtype=np.float64)
         if not self._around.contains(path).all() or problem.is_out(path[:-1]).any():
             return None
-        away = np.linalg.norm((path[0] - between.attractor(times[0])) / self._propagator.units)
+        away = np.linalg.norm((path[0] - self._orbits(times[0])[:2]) / self._propagator.units)
         if away > _ARRIVED * self._distance(phase * piece):
             return None
-        momenta, rates = momenta_of(between.field, path, between.flipped(times, path), times)
+        momenta, rates = momenta_of(self._field, path, self._flipped(times, path), times)
         action = float(np.trapezoid(rates, times)) if np.isfinite(momenta).all() else math.inf
         return Candidate(problem.source, self._end.targets[0], times - times[0], path, action, FINDER, momenta)

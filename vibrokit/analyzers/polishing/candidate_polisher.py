@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
@@ -11,22 +10,21 @@ import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes
+from vibrokit.analyzers.polishing.ends import Nodes
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver
 from vibrokit.analyzers.polishing.passing import PassingSearch
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.structure.orbits import Orbit
 
-WORTH = 1.25
-"""Times the least action known: costlier candidates are skipped. Searches price a path to a few percent."""
 _NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
 _INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
 _MOST_FAILURES = 6  # candidates that lead to no path to an end, after which only cheaper ones are tried
-_TRIES = 2  # candidates for an end that the cheaper ones do not lead to
 
 
 class CandidatePolisher:
@@ -35,16 +33,16 @@ class CandidatePolisher:
     Raises StructureError if the orbit is not hyperbolic, or if the attractor is none and no other is given.
     """
 
-    def __init__(self, problem: ExitProblem, ends: Sequence[PathEnd], orbit: Orbit | None = None) -> None:
-        self.problem, self.ends = problem, ends
-        self.nodes = Nodes(problem)
+    def __init__(self, nodes: Nodes, ends: Sequence[PathEnd], orbit: Orbit | None = None) -> None:
+        self.problem, self.ends, self.nodes = nodes.problem, ends, nodes
         self.solved: list[SolvedPath] = []
         self.skipped = 0  # candidates that cost too much
         self.findings: list[Finding] = []
-        self._solver = LegSolver(self.nodes, _left(problem, orbit))
+        self._solver = LegSolver(self.nodes, _left(nodes.problem, orbit))
         self._passing = PassingSearch(self.nodes)
-        self._failures: defaultdict[PathEnd, list[float]] = defaultdict(list)  # actions of candidates that led nowhere
+        self._near: dict[Candidate, list[PathEnd]] = {}  # the ends that each comes near
         self._unsolved: dict[Candidate, Effort] = {}  # the effort with which each led nowhere
+        self._failed: defaultdict[PathEnd, list[Candidate]] = defaultdict(list)  # with all effort
 
     def polish(self, candidate: Candidate, effort: Effort = Effort.FROM_ORBIT) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
@@ -55,33 +53,43 @@ class CandidatePolisher:
         """
         effort = effort if candidate.momenta is not None else max(effort, Effort.DESCEND)
         self._unsolved.pop(candidate, None)
-        if candidate.action > WORTH * self._known(candidate):
-            self.skipped += 1
-            return
-        failures, solved = list[str](), False
         try:
-            for end in self._near(candidate):
-                in_legs = self._solve_in_legs(end, candidate)
-                if (in_legs and self._failures[end]) or not self._is_wanted(end, candidate):
-                    solved = True  # no failure of this candidate
-                    continue
-                failure = self._solve(end, candidate, effort)
-                failures += [failure] if failure else []
-                solved |= in_legs or not failure
-            for end in self._farther(candidate):
-                if self._solve_in_legs(end, candidate):
-                    break
+            if candidate not in self._near:
+                self._near[candidate] = self._ends_near(candidate)
+            if candidate.action > TOLERANCES.worth * self._known(candidate):
+                self.skipped += 1
+                return
+            failure = self._failure(candidate, effort)
         except StructureError as error:
-            failures.append(str(error))
-        if not solved and effort < Effort.FROM_ORBIT:
+            effort, failure = Effort.FROM_ORBIT, str(error)  # nothing can be done for it
+        if failure and effort < Effort.FROM_ORBIT:
             self._unsolved[candidate] = effort
-        elif not solved:
+        elif failure:
             self.findings.append(
                 Finding.of(
                     Code.CANDIDATE_FAILED, self.problem.source, candidate.target,
-                    action=candidate.action, finder=candidate.finder, reason=(*failures, "it comes near no end.")[0],
+                    action=candidate.action, finder=candidate.finder, reason=failure,
                 )
             )  # fmt: skip
+
+    def _failure(self, candidate: Candidate, effort: Effort) -> str:
+        """Why a candidate leads to no path; an empty text if it leads to one, or none is wanted."""
+        failures, solved = list[str](), False
+        for end in self._near[candidate]:
+            in_legs = self._solve_in_legs(end, candidate)
+            if (in_legs and self._failed[end]) or not self._is_wanted(end, candidate):
+                solved = True
+                continue
+            failure = self._solve(end, candidate, effort)
+            failures += [failure] if failure else []
+            solved |= in_legs or not failure
+        leading = self._leading(candidate)
+        if np.isinf(self._least(leading)):
+            with contextlib.suppress(StructureError):  # one of them is not hyperbolic
+                for end in sorted(leading, key=lambda end: self.nodes.distance(end, candidate)):
+                    if self._solve_in_legs(end, candidate):
+                        break
+        return "" if solved else (*failures, "it comes near no end.")[0]
 
     def polish_the_rest(self, effort: Effort) -> None:
         """Polish what led nowhere with less effort.
@@ -89,29 +97,29 @@ class CandidatePolisher:
         A shot costs more than the path near it, a candidate of a grid may cost less: of these, only those that cost
         less than a known path.
         """
-        unsolved = sorted(self._unsolved, key=lambda each: each.action)
-        for candidate in unsolved:
+        for candidate in sorted(self._unsolved, key=lambda each: each.action):
             shot = candidate.momenta is not None
             if self._unsolved[candidate] < effort and (shot or candidate.action < self._known(candidate)):
                 self.polish(candidate, effort)
 
-    def reach(self, end: PathEnd, ranked: Sequence[Candidate], effort: Effort) -> None:
-        """Polish candidates to an end that none led to: those that come near it, then the cheapest one."""
+    def reach(self, end: PathEnd, effort: Effort) -> None:
+        """Polish candidates to an end that none led to: the cheapest one that comes near it, then the cheapest one."""
         if any(one.end is end or (end.one_of_many and set(one.end.targets) & set(end.targets)) for one in self.solved):
             return
-        near = list(itertools.islice((each for each in ranked if self._comes_near(end, each)), _TRIES))
-        for candidate in (*near, *(each for each in ranked[:1] if each not in near)):
-            if not self._is_wanted(end, candidate) or not self._solve(end, candidate, effort):
+        ranked = sorted(self._near, key=lambda each: each.action)
+        near = [each for each in ranked if end in self._near[each]]
+        for candidate in dict.fromkeys((*near[:1], *ranked[:1])):
+            if self._is_wanted(end, candidate) and not self._solve(end, candidate, effort):
                 return
 
     def _solve(self, end: PathEnd, candidate: Candidate, effort: Effort) -> str:
         """Polish a candidate to an end; return why it leads to no path, or an empty text."""
         others = [other for other in self.ends if other is not end]
         try:
-            leg = self._solver.solve(end, candidate, others=others, least=self._least((end,)), effort=effort)
+            leg = self._solver.solve(end, candidate, effort, others, self._least((end,)))
             self._add(SolvedPath.of(self.problem, (leg,)))
         except StructureError as error:
-            self._failures[end] += [candidate.action] if effort is Effort.FROM_ORBIT else []
+            self._failed[end] += [candidate] if effort is Effort.FROM_ORBIT else []
             return str(error)
         return ""
 
@@ -120,26 +128,18 @@ class CandidatePolisher:
             self.solved.append(one)
 
     def _known(self, candidate: Candidate) -> float:
-        """The least action of a known path to the candidate's target, or, if less, to any end that it comes near.
+        """The least action of a known path to the candidate's target, or, if less, to all ends that it comes near.
 
         It is infinite for a candidate that must pass those ends, since none of them leads to its target.
         """
-        try:
-            near = self._near(candidate)
-        except StructureError:
-            near = []
-        to_target = self._least(end for end in self._every if candidate.target in end.targets)
-        if np.isinf(to_target) and self._passes(candidate, near):
+        near, leading = self._near[candidate], self._leading(candidate)
+        to_target = self._least({*leading, *(end for end in self.ends if candidate.target in end.targets)})
+        if np.isinf(to_target) and leading and not set(leading) & set(near):
             return np.inf
         return min(to_target, max((self._least((end,)) for end in near), default=np.inf))
 
-    def _passes(self, candidate: Candidate, near: Iterable[PathEnd]) -> bool:
-        """Whether only ends that are not near a candidate lead to its target."""
-        leading = self._leading(candidate)
-        return bool(leading) and not any(end in leading for end in near)
-
     def _leading(self, candidate: Candidate) -> list[PathEnd]:
-        """The ends, of paths through other orbits too, that lead to the target of a candidate."""
+        """The saddles, of paths through other orbits too, that lead to the target of a candidate."""
         return [end for end in self._passing.ends if candidate.target in end.targets]
 
     def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
@@ -147,9 +147,10 @@ class CandidatePolisher:
 
         A candidate that is cheaper than all that failed, as of a finer graph, is tried all the same.
         """
-        failed = self._failures[end]
+        failed = self._failed[end]
         known = any(one.end is end for one in self.solved)
-        if len(failed) >= _MOST_FAILURES and not known and candidate.action >= min(failed):
+        cheapest = min((each.action for each in failed), default=np.inf)
+        if candidate in failed or (len(failed) >= _MOST_FAILURES and not known and candidate.action >= cheapest):
             return False
         others = (other for other in self.ends if set(other.targets) & set(end.targets))
         return not end.one_of_many or candidate.action < self._least(others)
@@ -159,30 +160,13 @@ class CandidatePolisher:
         among = tuple(ends)
         return min((one.action for one in self.solved if one.end in among), default=np.inf)
 
-    @property
-    def _every(self) -> list[PathEnd]:
-        """The ends, and those that only paths through other orbits lead to."""
-        return [*self.ends, *(end for end in self._passing.ends if end not in self.ends)]
-
-    def _near(self, candidate: Candidate) -> list[PathEnd]:
+    def _ends_near(self, candidate: Candidate) -> list[PathEnd]:
         """The ends that a candidate comes near, the nearest first."""
         distances = [self.nodes.distance(end, candidate) for end in self.ends]
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
         near = [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
         inside = [end for end in near if end.one_of_many]
         return [end for end in near if end not in inside[_INSIDE:]]
-
-    def _farther(self, candidate: Candidate) -> list[PathEnd]:
-        """The ends that lead to the target of a candidate, the nearest first, if no path to the target is known."""
-        ends = self._leading(candidate)
-        if np.isfinite(self._least(ends)):
-            return []
-        return sorted(ends, key=lambda end: self.nodes.distance(end, candidate))
-
-    def _comes_near(self, end: PathEnd, candidate: Candidate) -> bool:
-        with contextlib.suppress(StructureError):
-            return end in self._near(candidate)
-        return False
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:
         """Whether a path to an end through an orbit that a candidate passes is known, or found and added."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.path_solver import LONG_ENOUGH
 from vibrokit.analyzers.polishing.sensitivity import sensitivities
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.codes import Code
@@ -72,7 +72,7 @@ def energies(
     Without a certificate, the error is the change by which the path was accepted as long enough.
     """
     action = solved.action
-    error = LONG_ENOUGH * action if error is None else error
+    error = TOLERANCES.lasting * action if error is None else error
     known = {"residual": max(max(leg.found.residual, leg.found.slack) for leg in solved.legs)} | evidence
     return [
         ActivationEnergy(

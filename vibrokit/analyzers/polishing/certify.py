@@ -64,7 +64,7 @@ def transversality(propagator: SegmentPropagator, found: ExtremalPath) -> float:
     """
     scale, n = found.scale, propagator.size
     slopes = found.slopes * scale / scale[:, None]
-    leaving = [_orthonormal(found.source.unstable_at(found.first) / scale[:, None])]
+    leaving = [_orthonormal(found.source.space_at(found.first, leaving=True) / scale[:, None])]
     for slope in slopes:
         leaving.append(_orthonormal(slope @ leaving[-1]))
     reaching = [_orthonormal(_tangents(propagator, found))]

@@ -5,19 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.newton import extremal_path
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 
-RADIUS = 1e-4
-"""Of a path's extent: within this distance of its ends the linearized equations replace the path."""
-FEW_EVALUATIONS = 24
-"""Evaluations of the misfits for a path that is known except near its ends, or in a scene that differs little."""
 MORE_PERIODS = 2
 """Periods of its orbits by which a certified path must allow to be extended."""
-FEWEST_NODES = 2
-"""Nodes of a path."""
-_CLOSER, _UNCHANGED = 4, 1e-8  # the radius is divided by 10 until the action changes by no more (relative), 4 times
+_CLOSER = 4  # times that the radius is divided by 10
 _MOST_FAILURES = 6  # of steps that bring a path within a radius; generic paths have none
 
 
@@ -26,7 +21,7 @@ def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPat
 
     Raises StructureError if it cannot be joined to them by the linearized equations.
     """
-    radius = RADIUS * found.extent
+    radius = TOLERANCES.radius * found.extent
     try:
         found = within(propagator, found, radius)
     except StructureError:
@@ -37,7 +32,7 @@ def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPat
     for _ in range(_CLOSER):
         radius /= 10
         closer = within(propagator, found, radius)
-        if abs(closer.action - found.action) <= _UNCHANGED * abs(found.action):
+        if abs(closer.action - found.action) <= TOLERANCES.unchanged * abs(found.action):
             break
         found = closer
     return found
@@ -66,14 +61,14 @@ def within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) ->
 
 
 def solved_again(
-    propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int, accepted: float = ACCEPTED
+    propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int, accepted: float = TOLERANCES.accepted
 ) -> ExtremalPath:
     """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
 
     Raises StructureError if it does not converge, or if hardly anything of the path would be left.
     """
     points, first = found.points, found.first
-    if len(points) + min(before, 0) + min(after, 0) < FEWEST_NODES:
+    if len(points) + min(before, 0) + min(after, 0) < 2:
         raise StructureError(
             f"a path of {len(points)} nodes cannot be made {-min(before, 0) - min(after, 0)} nodes shorter."
         )
@@ -82,5 +77,5 @@ def solved_again(
     points, ending = found.ending.extended(points, after)
     return extremal_path(
         propagator, found.source, first - before, ending, points, found.last,
-        evaluations=FEW_EVALUATIONS, accepted=accepted,
+        evaluations=TOLERANCES.evaluations // 8, accepted=accepted,
     )  # fmt: skip

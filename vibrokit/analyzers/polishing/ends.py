@@ -1,253 +1,95 @@
-"""Ends: faces and saddles that paths are polished to, with their conditions, and which of them can be used."""
+"""Ends of paths: their conditions at the nodes of paths, and which of them can be used."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from typing import Self
-
-import numpy as np
-from numpy.typing import NDArray
+import functools
+from collections.abc import Callable
+from functools import cached_property
 
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, PathEnd
-from vibrokit.analyzers.paths.action_descent import Closing
+from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
+from vibrokit.analyzers.polishing.ending import Ending, ResampledCandidate, resampled
+from vibrokit.analyzers.polishing.endings import FaceEnding, SaddleEnding
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.errors import StructureError
+from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ExitPath
 from vibrokit.results.finding import Finding
+from vibrokit.structure.scales import doublings_of
+from vibrokit.symbolic.flow_kind import Flow
 
-_ROUNDING = 1e-9  # of a path's extent: samples this far beyond the face still count as inside
-_SHORT = 1e-4  # of a piece: time over which ∂H/∂t is taken
-_SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
-_MOST_ADDED = 40  # section intervals
+_PIECES = (8, 16)  # in a section interval, more in a long one: the finer ones where the coarser ones do not converge
 _CHAOTIC = "chaotic"
 
-Array = NDArray[np.float64]
 
+class Nodes:
+    """Candidates at the nodes of paths, and the conditions of ends there, each made once.
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FaceEnding(Ending):
-    """The last point lies on a face, with no momentum along it: the least action to be anywhere on the face.
-
-    With forcing, the time at which the face is reached is free, so that H = 0 there. Without forcing H = 0 along every
-    path that leaves an equilibrium; it is not a condition. On a bound of x, H = p₁v, and v = 0 takes its place: the
-    path turns around on the face.
+    Both may raise StructureError: a candidate as `ending.resampled` does, an end if it is a saddle that is not
+    hyperbolic.
     """
 
-    face: AtFace
+    def __init__(self, problem: ExitProblem, *, fine: bool = False) -> None:
+        self.problem, pieces = problem, pieces_of(problem.scene)[fine]
+        stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
+        self.propagator = SegmentPropagator(problem.scene, stepper, pieces)
+        self.resampled: Callable[[Candidate], ResampledCandidate] = functools.cache(
+            lambda candidate: resampled(self.propagator, candidate)
+        )
+        self.ending: Callable[[PathEnd], Ending] = functools.cache(lambda end: ending_at(end, problem, self.propagator))
 
-    def distance(self, candidate: ResampledCandidate) -> float:
-        return max(0.0, float(self._gaps(candidate.candidate.states).min()))
+    def distance(self, end: PathEnd, candidate: Candidate) -> float:
+        """Return how near a candidate comes to an end."""
+        return self.ending(end).distance(self.resampled(candidate))
 
-    def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """End on the face, at the time of the first state beyond it or of the nearest one, and up to half a period off.
+    @cached_property
+    def finer(self) -> Nodes:
+        """Nodes half as far apart."""
+        return Nodes(self.problem, fine=True)
 
-        With forcing the time matters, and a candidate that comes too fast may have the wrong one.
+    def usable(self) -> tuple[list[PathEnd], list[Finding]]:
+        """Return the ends that paths are polished to: the usable ones on the own basin boundary.
+
+        Where there are none, or all of them lie inside chaotic sets, saddles between other basins are added.
         """
-        given, piece = candidate.candidate, self.propagator.piece
-        times, gaps = given.times - given.times[0], self._gaps(given.states)
-        beyond = bool(np.any(gaps <= 0))
-        first = int(np.argmax(gaps <= 0) if beyond else np.argmin(gaps))
-        before = max(first - 1, 0)
-        share = gaps[before] / (gaps[before] - gaps[first]) if first and beyond else 1.0
-        reached = max(times[before] + share * (times[first] - times[before]), 0.5 * piece)
-        count = max(1, round(reached / piece))
-        if not self.free_time:
-            return [self._cut(candidate, count, 0, piece)]
-        last, half = reached - (count - 1) * piece, self.propagator.pieces // 2
-        shifts = sorted(range(max(-half, 1 - count), half), key=abs)
-        return [self._cut(candidate, count, shift, last) for shift in shifts]
+        problem, obstacles, usable = self.problem, dict[int, str](), list[PathEnd]()
+        for end in problem.path_ends:
+            if not end.last_resort:
+                found = obstacle(end, problem) or self._not_linear(end)
+                usable += [] if found else [end]
+                obstacles |= {end.saddle: found} if found and end.saddle >= 0 else {}
+        inside = [end.saddle for end in usable if end.one_of_many]
+        findings = [
+            Finding.of(Code.SADDLE_NOT_USABLE, problem.source, saddle=saddle, kind=kind)
+            for saddle, kind in obstacles.items()
+            if not (kind == _CHAOTIC and inside)
+        ]
+        if inside:
+            findings.append(Finding.of(Code.CHAOTIC_BOUNDARY, problem.source, saddles=inside))
+        if all(end.one_of_many for end in usable):
+            ends = [end for end in problem.path_ends if end.last_resort and not end.one_of_many]
+            others = [end for end in ends if not (obstacle(end, problem) or self._not_linear(end))]
+            findings += [Finding.of(Code.SADDLES_OF_OTHERS, problem.source)] if others else []
+            usable += others
+        return usable, findings
 
-    def misfit(self, point: Array, time: float, scale: Array) -> Array:
-        goal = np.zeros_like(point)
-        goal[self.face.axis] = self.face.level
-        misfits = ((point - goal) / scale)[self._coordinates]
-        if self._asks_hamiltonian:
-            misfits = np.append(misfits, self._hamiltonian(point, time) / self._energy(scale))
-        return misfits
-
-    def derivatives(self, point: Array, time: float, scale: Array) -> tuple[Array, Array]:
-        in_point, n = np.eye(len(point))[self._coordinates], self.propagator.size
-        in_time = np.zeros((len(in_point), int(self.free_time)))
-        if self._asks_hamiltonian:
-            rate, short = self.propagator.rate(point, time), _SHORT * self.propagator.piece
-            gradient = np.concatenate([-rate[n:], rate[:n]]) * scale / self._energy(scale)
-            change = self._hamiltonian(point, time + short) - self._hamiltonian(point, time - short)
-            in_point = np.vstack([in_point, gradient])
-            in_time = np.vstack([in_time, [[change / (2 * short) / self._energy(scale)]]])
-        return in_point, in_time
-
-    def carried_by(self, propagator: SegmentPropagator) -> Self:
-        return dataclasses.replace(self, propagator=propagator)
-
-    def moved_to(self, end: PathEnd) -> Self:
-        assert isinstance(end, AtFace)
-        return dataclasses.replace(self, face=end)
-
-    def displaced(self, point: Array, end: PathEnd) -> float:
-        return float(point[self.propagator.size + self.face.axis]) * (self.moved_to(end).face.level - self.face.level)
-
-    @property
-    def free_time(self) -> bool:
-        return not self.propagator.osc.autonomous
-
-    @property
-    def free(self) -> NDArray[np.bool_]:
-        return np.arange(self.propagator.size) > 1 if self.face.axis == 0 else np.arange(self.propagator.size) != 1
-
-    def crossing(self, path: ExitPath) -> int | None:
-        outside = np.flatnonzero(self._gaps(path.q[:-1]) < -_ROUNDING * float(np.ptp(path.q[:, self.face.axis])))
-        return int(outside[0]) if outside.size else None
-
-    @property
-    def _coordinates(self) -> list[int]:
-        """Which of (q, p) are given."""
-        n, axis = self.propagator.size, self.face.axis
-        turns = [1] if self.free_time and axis == 0 else []
-        return [axis, *turns, *(n + number for number in range(n) if number != axis)]
-
-    @property
-    def _asks_hamiltonian(self) -> bool:
-        return self.free_time and self.face.axis != 0
-
-    def _hamiltonian(self, point: Array, time: float) -> float:
-        """H = ½ p·(q′ + b): q′ = b + a p is linear in p, and is b at p = 0."""
-        n = self.propagator.size
-        rest = np.concatenate([point[:n], np.zeros(n)])
-        rates = self.propagator.rate(point, time)[:n] + self.propagator.rate(rest, time)[:n]
-        return 0.5 * float(point[n:] @ rates)
-
-    def _energy(self, scale: Array) -> float:
-        """Size of H on a path of this size."""
-        n = self.propagator.size
-        return self.propagator.osc.natural_frequency * float(scale[:n] @ scale[n:])
-
-    def _gaps(self, states: Array) -> Array:
-        """How far states are from the face, negative beyond it."""
-        return self.face.outward * (self.face.level - states[:, self.face.axis])
-
-    def _cut(self, candidate: ResampledCandidate, count: int, shift: int, last: float) -> Cut:
-        """The first `count` nodes, less some or and more that go straight to the face."""
-        states = candidate.states[: count + min(shift, 0)]
-        end = states[-1].copy()
-        end[self.face.axis] = self.face.level
-        if self.face.axis == 0:
-            end[1] = 0.0
-        shares = (1 + np.arange(max(shift, 0)))[:, None] / (1 + max(shift, 0))
-        straight = states[-1] + shares * (end - states[-1])
-        momenta = candidate.momenta_of(len(states), len(states) + len(straight) + 1)
-        return Cut(np.concatenate([states, straight, end[None]]), self, last, momenta)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SaddleEnding(Ending):
-    """The last point lies in the stable space of an orbit."""
-
-    orbit: LinearizedOrbit
-    phase: int = 0  # of the last point, in pieces from node 0 of the orbit
-
-    def distance(self, candidate: ResampledCandidate) -> float:
-        return self._closest(candidate)[0]
-
-    def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """Cut where the candidate is closest to the orbit, and stay on the orbit from there, up to a section."""
-        _, node, place = self._closest(candidate)
-        (orbit, phase), pieces = self.orbit.starting(place), self.propagator.pieces
-        periods = math.ceil(_SETTLING / (orbit.slowest_rate * pieces))
-        added = min(max(2, periods), _MOST_ADDED) * pieces + -node % self.propagator.grain
-        states = np.concatenate([candidate.all_states[: node + 1], orbit.along(phase + 1, added)])
-        ending = dataclasses.replace(self, orbit=orbit, phase=phase + added)
-        momenta = candidate.momenta_of(node + 1, len(states))
-        return [Cut(states, ending, self.propagator.piece, momenta)]
-
-    def misfit(self, point: Array, time: float, scale: Array) -> Array:
-        return self.orbit.misfit(point, self.phase, scale, leaving=False)
-
-    def derivatives(self, point: Array, time: float, scale: Array) -> tuple[Array, Array]:
-        in_point = self.orbit.misfit_derivatives(point, self.phase, scale, leaving=False)
-        return in_point, np.zeros((len(in_point), 0))
-
-    def carried_by(self, propagator: SegmentPropagator) -> Self:
-        return dataclasses.replace(self, propagator=propagator, orbit=self.orbit.again(propagator))
-
-    def through(self, point: Array) -> Self:
-        return dataclasses.replace(self, orbit=self.orbit.through(point, self.phase, leaving=False))
-
-    @property
-    def period_nodes(self) -> int:
-        return self.orbit.period_nodes
-
-    @property
-    def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:
-        return ((self.orbit, self.phase),)
-
-    @property
-    def closing(self) -> Closing:
-        n = self.propagator.size
-        basis = self.orbit.stable_at(self.phase)
-        form = -np.linalg.solve(basis[:n].T, basis[n:].T).T
-        return self._point[:n], (form + form.T) / 2
-
-    def tail(self, point: Array) -> float:
-        """−½ p δq, of the linearized equations."""
-        offset, n = point - self._point, len(point) // 2
-        return -0.5 * float(offset[n:] @ offset[:n])
-
-    def distance_left(self, point: Array) -> float:
-        return float(np.linalg.norm((point - self._point)[:2]))
-
-    def missing(self, points: Array, radius: float) -> int:
-        return self.orbit.missing(points[::-1], self.phase, 1, radius, self.propagator.grain)
-
-    def extended(self, points: Array, count: int) -> tuple[Array, Self]:
-        more = self.orbit.continued(points[-1], self.phase, max(count, 0))
-        points = np.concatenate([points[: len(points) + min(count, 0)], more])
-        return points, dataclasses.replace(self, phase=self.phase + count)
-
-    @property
-    def _point(self) -> Array:
-        return self.orbit.point(self.phase)
-
-    def _closest(self, candidate: ResampledCandidate) -> tuple[float, int, float]:
-        """Distance, node of the candidate, and place on the orbit."""
-        return self.orbit.closest(candidate.all_states, self.propagator.grain)
-
-
-def usable_ends(problem: ExitProblem) -> tuple[list[PathEnd], list[Finding]]:
-    """Return the ends that paths are polished to: the usable ones on the own basin boundary.
-
-    Where there are none, or all of them lie inside chaotic sets, saddles between other basins are added.
-    """
-    own = [end for end in problem.path_ends if not end.last_resort]
-    usable = [end for end in own if not obstacle(end, problem)]
-    inside = [end.saddle for end in usable if end.one_of_many]
-    findings = [
-        Finding.of(Code.SADDLE_NOT_USABLE, problem.source, saddle=end.saddle, kind=kind)
-        for end in own
-        if end.saddle >= 0 and (kind := obstacle(end, problem)) and not (kind == _CHAOTIC and inside)
-    ]
-    if inside:
-        findings.append(Finding.of(Code.CHAOTIC_BOUNDARY, problem.source, saddles=inside))
-    if all(end.one_of_many for end in usable):
-        ends = [end for end in problem.path_ends if end.last_resort and not end.one_of_many]
-        others = [end for end in ends if not obstacle(end, problem)]
-        findings += [Finding.of(Code.SADDLES_OF_OTHERS, problem.source)] if others else []
-        usable += others
-    return usable, findings
+    def _not_linear(self, end: PathEnd) -> str:
+        try:
+            self.ending(end)
+        except StructureError:
+            return "an orbit along which the motion cannot be linearized"
+        return ""
 
 
 def obstacle(end: PathEnd, problem: ExitProblem) -> str:
-    """Return why no path can be polished to an end, as a word; empty if one can."""
+    """Return why no path can be polished to an end of its kind, in words; empty if one can."""
     if isinstance(end, AtFace):
         return ""
     if not isinstance(end, AtSaddle):
         return "of a kind without conditions"
-    saddle = problem.structure.saddles[end.number]
-    return _CHAOTIC if saddle.kind == _CHAOTIC else ""
+    return _CHAOTIC if problem.structure.saddles[end.number].kind == _CHAOTIC else ""
 
 
 def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator) -> Ending:
@@ -257,3 +99,9 @@ def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator)
     saddle = problem.structure.saddles[end.saddle]
     orbit = linearized_orbit(propagator, saddle.nodes, saddle.period, saddle.duration)
     return SaddleEnding(propagator, orbit)
+
+
+def pieces_of(scene: Oscillator) -> tuple[int, int]:
+    """Return the numbers of pieces of a section interval that paths are solved with, in turn."""
+    coarse, fine = (pieces * 2 ** doublings_of(scene) for pieces in _PIECES)
+    return coarse, fine

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.polishing.ending import Ending
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-
-ACCEPTED = 1e-9
-"""Misfit of a path, relative to its size: the action is stationary, so that it is wrong by the square of this."""
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 
 Array = NDArray[np.float64]
 
@@ -57,7 +55,7 @@ class ExtremalPath:
         of the second order in their distance.
         """
         left = max(float(self.distances[0]), self.ending.distance_left(self.points[-1])) / self.extent
-        return max(ACCEPTED, (farther * left) ** 2) if self.flat else ACCEPTED
+        return max(TOLERANCES.accepted, (farther * left) ** 2) if self.flat else TOLERANCES.accepted
 
     @property
     def distances(self) -> Array:

@@ -8,21 +8,21 @@ import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.same_action import same_action
+from vibrokit.analyzers.paths.same_action import POLISHED, same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.completion import FEW_EVALUATIONS, completed
+from vibrokit.analyzers.polishing.completion import completed
+from vibrokit.analyzers.polishing.ends import Nodes
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import extremal_path
 from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.energy import ActivationEnergy
-
-_SAME = 1e-6  # of a path's extent: distance of two orbits that are one
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class FollowedPath:
         ends = [
             end for end in problem.path_ends if end.saddle == energy.saddle and energy.target in end.targets
         ]  # fmt: skip
-        polisher = CandidatePolisher(problem, ends)
+        polisher = CandidatePolisher(Nodes(problem), ends)
         polisher.polish(Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method))
         if not polisher.solved:
             raise StructureError(str(polisher.findings[0].values["reason"]))
@@ -65,7 +65,7 @@ class FollowedPath:
         orbits = [(one.source, two.source)]
         orbits += [(own, its) for (own, _), (its, _) in zip(one.ending.approached, two.ending.approached, strict=False)]
         return same_action(one.action, two.action) and all(
-            own.closest(its.along(0, 1))[0] <= _SAME * one.extent for own, its in orbits
+            own.closest(its.along(0, 1))[0] <= POLISHED * one.extent for own, its in orbits
         )
 
     def at(self, osc: Oscillator) -> FollowedPath:
@@ -85,7 +85,7 @@ class FollowedPath:
         last = before.last * propagator.piece / self.propagator.piece
         found = extremal_path(
             propagator, source, before.first, ending, before.points, last,
-            evaluations=FEW_EVALUATIONS, accepted=before.accepted(),
+            evaluations=TOLERANCES.evaluations // 8, accepted=before.accepted(),
         )  # fmt: skip
         return dataclasses.replace(moved, found=found)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,10 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ending import Ending, ResampledCandidate, resampled
-from vibrokit.analyzers.polishing.ends import ending_at
+from vibrokit.analyzers.polishing.ends import Nodes
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.path_solver import Effort, PathSolver
-from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.single import record, record_each
 from vibrokit.oscillator import Oscillator
@@ -28,10 +26,8 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.scales import doublings_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_PIECES = (8, 16)  # in a section interval, more in a long one: the finer ones where the coarser ones do not converge
 _SAMPLES = 128  # in a section interval, more in a long one: enough for pictures, and for quadrature to about 1e-6
 _ROUNDS = 4  # how often a path is cut where it has already left
-_CHEAPER = 1e-3  # of the least action known: a path that much cheaper is worth the costly fallback of `PathSolver`
 
 Array = NDArray[np.float64]
 
@@ -68,40 +64,9 @@ class Leg:
     path: ExitPath
 
 
-def pieces_of(scene: Oscillator) -> tuple[int, ...]:
-    """Return the numbers of pieces of a section interval that paths are solved with, in turn."""
-    return tuple(pieces * 2 ** doublings_of(scene) for pieces in _PIECES)
-
-
 def samples_of(scene: Oscillator) -> int:
     """Return the number of samples of a path in a section interval: a multiple of each number of pieces."""
     return _SAMPLES * 2 ** doublings_of(scene)
-
-
-class Nodes:
-    """Candidates at the nodes of paths, and the conditions of ends there, each made once."""
-
-    def __init__(self, problem: ExitProblem) -> None:
-        stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
-        self.problem = problem
-        self.pieces = pieces_of(problem.scene)
-        self.propagators = {pieces: SegmentPropagator(problem.scene, stepper, pieces) for pieces in self.pieces}
-        self._resampled = functools.cache(lambda candidate, pieces: resampled(self.propagators[pieces], candidate))
-        self._ending = functools.cache(lambda end, pieces: ending_at(end, problem, self.propagators[pieces]))
-
-    def resampled(self, candidate: Candidate, pieces: int | None = None) -> ResampledCandidate:
-        """Return a candidate at the nodes; raises StructureError as `ending.resampled` does."""
-        found: ResampledCandidate = self._resampled(candidate, pieces or self.pieces[0])
-        return found
-
-    def ending(self, end: PathEnd, pieces: int | None = None) -> Ending:
-        """Return the conditions of an end; raises StructureError if it is a saddle that is not hyperbolic."""
-        found: Ending = self._ending(end, pieces or self.pieces[0])
-        return found
-
-    def distance(self, end: PathEnd, candidate: Candidate) -> float:
-        """Return how near a candidate comes to an end."""
-        return self.ending(end).distance(self.resampled(candidate))
 
 
 class LegSolver:
@@ -109,55 +74,48 @@ class LegSolver:
 
     def __init__(self, nodes: Nodes, left: Departure) -> None:
         self.nodes, self.left = nodes, left
-        self._source = functools.cache(
-            lambda pieces: linearized_orbit(nodes.propagators[pieces], left.nodes, left.period, left.duration)
+        self.orbit = linearized_orbit(nodes.propagator, left.nodes, left.period, left.duration)
+        self._solver: Callable[[PathEnd], PathSolver] = functools.cache(
+            lambda end: PathSolver(nodes.propagator, self.orbit)
         )
-        self._source(self.nodes.pieces[0])
-        self._solver = functools.cache(lambda end, pieces: PathSolver(nodes.propagators[pieces], self._source(pieces)))
 
-    @property
-    def orbit(self) -> LinearizedOrbit:
-        """The orbit that is left."""
-        found: LinearizedOrbit = self._source(self.nodes.pieces[0])
-        return found
+    @cached_property
+    def _finer(self) -> LegSolver:
+        return LegSolver(self.nodes.finer, self.left)
 
     def solve(
         self,
         end: PathEnd,
         candidate: Candidate,
-        *,
-        others: Iterable[PathEnd] = (),
-        least: float = np.inf,
-        effort: Effort = Effort.FROM_ORBIT,
+        effort: Effort,
+        others: Sequence[PathEnd] = (),  # by which the path must not leave before
+        least: float = np.inf,  # action of the known paths to the end
     ) -> Leg:
-        """Polish a candidate to an end; with all effort also in finer pieces, if it is cheaper than `least`.
+        """Polish a candidate to an end; with all effort also at finer nodes, if it is cheaper than `least`.
 
         Raises StructureError if no path to the end is found, or if it leaves by one of the others before.
         """
-        for pieces in self.nodes.pieces:
-            try:
-                return self._solve_with(pieces, end, candidate, others, (1 - _CHEAPER) * least, effort)
-            except StructureError as error:
-                failure = error
-                if effort < Effort.FROM_ORBIT or candidate.action >= least:
-                    break
-        raise failure
+        try:
+            return self._solve(end, candidate, effort, others, least)
+        except StructureError:
+            if effort < Effort.FROM_ORBIT or candidate.action >= least:
+                raise
+        return self._finer._solve(end, candidate, effort, others, least)
 
-    def _solve_with(
-        self, pieces: int, end: PathEnd, candidate: Candidate, others: Iterable[PathEnd], worth: float, effort: Effort
+    def _solve(
+        self, end: PathEnd, candidate: Candidate, effort: Effort, others: Sequence[PathEnd], least: float
     ) -> Leg:
-        solver: PathSolver = self._solver(end, pieces)
-        ending = self.nodes.ending(end, pieces)
+        nodes, ending = self.nodes, self.nodes.ending(end)
         for _ in range(_ROUNDS):
-            found = solver.solve(ending.cuts(self.nodes.resampled(candidate, pieces)), effort, worth)
+            found = self._solver(end).solve(ending.cuts(nodes.resampled(candidate)), effort, least)
             if not found.action > 0:
                 raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
-            path = _dense_path(solver.propagator, found)
-            if any(self.nodes.ending(other, pieces).crossing(path) is not None for other in others):
+            path = _dense_path(nodes.propagator, found)
+            if any(nodes.ending(other).crossing(path) is not None for other in others):
                 raise StructureError("the path leaves by another face before its end.")
             crossing = ending.crossing(path)
             if crossing is None:
-                return Leg(self.left, end, solver.propagator, found, path)
+                return Leg(self.left, end, nodes.propagator, found, path)
             inside = slice(crossing + 1)
             candidate = dataclasses.replace(
                 candidate, times=path.t[inside], states=path.q[inside], momenta=path.p[inside]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from functools import cached_property
 from typing import Self
@@ -64,25 +65,19 @@ class LinearizedAtNodes(LinearizedOrbit):
     def along(self, first: int, count: int) -> Array:
         return self.states[(first + np.arange(count)) % len(self.states)]
 
-    def unstable_at(self, phase: int) -> Array:
-        return self.unstable[self.node(phase)]
-
-    def stable_at(self, phase: int) -> Array:
-        return self.stable[self.node(phase)]
+    def space_at(self, phase: int, *, leaving: bool) -> Array:
+        return (self.unstable if leaving else self.stable)[self.node(phase)]
 
     def step(self, phase: int) -> Array:
         return extended(self.linear.derivatives[self.node(phase)], self.linear.covariances[self.node(phase)])
 
     def carried(self, phase: int, *, leaving: bool) -> Array:
-        return (self._carried_leaving if leaving else self._carried_approaching)[self.node(phase)]
+        return self._carried[self.node(phase), leaving]
 
     @cached_property
-    def _carried_leaving(self) -> list[Array]:
-        return [super(LinearizedAtNodes, self).carried(node, leaving=True) for node in range(len(self.states))]
-
-    @cached_property
-    def _carried_approaching(self) -> list[Array]:
-        return [super(LinearizedAtNodes, self).carried(node, leaving=False) for node in range(len(self.states))]
+    def _carried(self) -> dict[tuple[int, bool], Array]:
+        both = itertools.product(range(len(self.states)), (True, False))
+        return {(node, side): super(LinearizedAtNodes, self).carried(node, leaving=side) for node, side in both}
 
     def nearest(self, states: Array, phases: NDArray[np.intp]) -> tuple[Array, Array]:
         places = (phases[:, None] + np.arange(0, len(self.states), self.propagator.pieces)) % len(self.states)

@@ -67,11 +67,11 @@ class LinearizedCycle(LinearizedOrbit):
         states = [self._from_node(phase)[1].images[0] for phase in range(first, first + count)]
         return np.array(states).reshape(count, self.states.shape[1])
 
-    def unstable_at(self, phase: int) -> Array:
-        return self._carried(self.unstable, phase)
-
-    def stable_at(self, phase: int) -> Array:
-        return self._carried(self.stable, phase)
+    def space_at(self, phase: int, *, leaving: bool) -> Array:
+        """Carried to the phase from the node before."""
+        node, moved = self._from_node(phase)
+        space = (self.unstable if leaving else self.stable)[node]
+        return normalized(extended(moved.derivatives[0], moved.covariances[0]) @ space, self.scale, self.neutral)
 
     def step(self, phase: int) -> Array:
         (state,) = self.along(phase, 1)
@@ -150,12 +150,6 @@ class LinearizedCycle(LinearizedOrbit):
     def _spacing(self) -> float:
         """Time from node to node (s)."""
         return self.cycle.duration / len(self.states)
-
-    def _carried(self, spaces: Array, phase: int) -> Array:
-        """A space at a phase, carried there from the node before."""
-        node, moved = self._from_node(phase)
-        there = extended(moved.derivatives[0], moved.covariances[0]) @ spaces[node]
-        return normalized(there, self.scale, self.neutral)
 
     def _from_node(self, phase: int) -> tuple[int, GaussianMap]:
         """The node before a phase, and the map from there to the phase."""

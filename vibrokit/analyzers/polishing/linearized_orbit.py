@@ -68,12 +68,8 @@ class LinearizedOrbit(ABC):
         """Return the states (count, n) at consecutive phases."""
 
     @abstractmethod
-    def unstable_at(self, phase: int) -> Array:
-        """Return a basis (2n, n) of the unstable space of (δq, p)."""
-
-    @abstractmethod
-    def stable_at(self, phase: int) -> Array:
-        """Return a basis (2n, n) of the stable space."""
+    def space_at(self, phase: int, *, leaving: bool) -> Array:
+        """Return a basis (2n, n) of the unstable space of (δq, p), in which paths leave, or of the stable one."""
 
     @abstractmethod
     def step(self, phase: int) -> Array:
@@ -119,10 +115,6 @@ class LinearizedOrbit(ABC):
         """Return the orbit as (q, p)."""
         (state,) = self.along(phase, 1)
         return np.concatenate([state, np.zeros(len(state))])
-
-    def space_at(self, phase: int, *, leaving: bool) -> Array:
-        """Return a basis (2n, n) of the unstable space, in which paths leave, or of the stable one."""
-        return self.unstable_at(phase) if leaving else self.stable_at(phase)
 
     def conditions(self, phase: int, scale: Array, *, leaving: bool) -> Array:
         """Return what (n, 2n) is 0 of an offset over `scale` in the unstable space, or in the stable one."""

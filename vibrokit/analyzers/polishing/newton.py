@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.paths.sparse_blocks import sparse_blocks
 from vibrokit.analyzers.polishing.ending import Ending
-from vibrokit.analyzers.polishing.extremal_path import ACCEPTED, ExtremalPath
+from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.polishing.undetermined import Pin, Soft
 from vibrokit.errors import StructureError
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
 
-MOST_EVALUATIONS = 200
-"""Of the misfits; a path that converges at all needs 10 to 60."""
 _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
 _LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may grow without bound
@@ -56,8 +55,8 @@ def extremal_path(
     points: Array,  # (nodes, 2n): guess of (q, p), a piece apart
     last: float,  # duration of the last piece (s); a guess where it is free
     *,
-    evaluations: int = MOST_EVALUATIONS,  # of the misfits, at most
-    accepted: float = ACCEPTED,  # misfit
+    evaluations: int = TOLERANCES.evaluations,  # of the misfits, at most
+    accepted: float = TOLERANCES.accepted,  # misfit
     nearly: float = 0.0,  # misfit from which a path that begins nearer to its source is tried
 ) -> ExtremalPath:
     """Solve for a path: continuity, n conditions at the source, the conditions of the ending.

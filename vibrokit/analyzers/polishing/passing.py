@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import AtSaddle, PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.polishing.ends import obstacle
-from vibrokit.analyzers.polishing.leg import Departure, LegSolver, Nodes
+from vibrokit.analyzers.polishing.ends import Nodes, obstacle
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 
 _PASSED = 0.05  # of a candidate's extent: distance from an orbit that it passes; grids place it to 0.003 to 0.04
 _MOST_TRIES = 3  # candidates for a leg from one orbit to one end
-_TOO_MUCH = 1.1  # times the candidate's action, which searches price to a few percent: above, it is another path
 
 Array = NDArray[np.float64]
 
@@ -56,18 +56,14 @@ class PassingSearch:
 
     def solve(self, end: PathEnd, candidate: Candidate, known: Sequence[SolvedPath]) -> SolvedPath | None:
         """Return a path to an end of which a known path is the first part; None if none is found."""
-        try:
-            splits = self._splits(end, candidate, known)
-        except StructureError:  # one of the orbits is not hyperbolic
-            return None
-        for first, solver, rest in splits:
-            self._tries[solver, end] += 1
-            if self._tries[solver, end] > _MOST_TRIES:
-                continue
-            with contextlib.suppress(StructureError):
-                leg = solver.solve(end, rest, effort=Effort.DESCEND)
-                if first.action + leg.found.action <= _TOO_MUCH * candidate.action:
-                    return SolvedPath.of(self._problem, (*first.legs, leg))
+        with contextlib.suppress(StructureError):  # one of the orbits is not hyperbolic
+            for first, solver, rest in self._splits(end, candidate, known):
+                self._tries[solver, end] += 1
+                if self._tries[solver, end] <= _MOST_TRIES:
+                    with contextlib.suppress(StructureError):
+                        leg = solver.solve(end, rest, Effort.DESCEND)
+                        if first.action + leg.found.action <= TOLERANCES.worth * candidate.action:
+                            return SolvedPath.of(self._problem, (*first.legs, leg))
         return None
 
     def _splits(
@@ -77,7 +73,8 @@ class PassingSearch:
 
         That begins at the saddle, or at an attractor that the saddle leads to; the nearest of all these comes first.
         """
-        firsts = [one for one in _cheapest(known) if one.end.saddle >= 0 and one.end is not end]
+        cheapest = {one.end: one for one in sorted(known, key=lambda one: -one.action)}
+        firsts = [one for one in cheapest.values() if one.end.saddle >= 0 and one.end is not end]
         if end.saddle < 0 or not firsts:
             return []
         states = self._nodes.resampled(candidate).states
@@ -86,20 +83,12 @@ class PassingSearch:
         for first in firsts if len(nodes) > 1 else ():
             saddle = _Passage.of(self._from_saddle(first.end.saddle), nodes)
             if saddle.distance <= _PASSED and not first.end.one_of_many:
-                attractors = self._attractors(first.end, candidate)
                 passed.append((saddle, first))
-                passed += [(_Passage.of(solver, nodes, saddle.node), first) for solver in attractors]
+                others = {label for label in first.end.targets if label >= 0} - {candidate.target}
+                orbits = sorted(label for label in others if self._problem.structure.attractors[label].repeats)
+                passed += [(_Passage.of(self._from_attractor(each), nodes, saddle.node), first) for each in orbits]
         near = sorted((each for each in passed if each[0].distance <= _PASSED), key=lambda each: each[0].distance)
         return [(first, passage.solver, passage.rest(candidate, states)) for passage, first in near]
-
-    def _attractors(self, end: PathEnd, candidate: Candidate) -> list[LegSolver]:
-        """Those that an end leads to and a candidate may pass."""
-        attractors = [self._problem.structure.attractors[label] for label in end.targets if label >= 0]
-        return [
-            self._from_attractor(attractor.label)
-            for attractor in attractors
-            if attractor.repeats and attractor.label != candidate.target
-        ]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -125,9 +114,3 @@ class _Passage:
         states = np.concatenate([orbit.along(phase - before, before + 1), nodes[self.node + 1 :]])
         times = propagator.piece * np.arange(len(states), dtype=float)
         return dataclasses.replace(candidate, times=times, states=states)
-
-
-def _cheapest(known: Sequence[SolvedPath]) -> list[SolvedPath]:
-    """The cheapest path to each end."""
-    least = {one.end: one for one in sorted(known, key=lambda one: -one.action)}
-    return list(least.values())

@@ -14,32 +14,19 @@ from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.completion import (
-    FEWEST_NODES,
-    MORE_PERIODS,
-    RADIUS,
-    completed,
-    solved_again,
-    within,
-)
+from vibrokit.analyzers.polishing.completion import MORE_PERIODS, completed, solved_again, within
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.newton import MOST_EVALUATIONS, NotConverged, extremal_path
+from vibrokit.analyzers.polishing.newton import NotConverged, extremal_path
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 
 _NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
-LONG_ENOUGH = 1e-6
-"""Relative change of the action by which a path is accepted that starts on its orbit, when it is made twice as long."""
-_FROM_NEAR = 60  # evaluations for a candidate with momenta, or a longer path; those that converge need no more
 _ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
 _FAILURES = 3  # of these in turn, after which no longer one is tried
-_HOPEFUL = 0.02  # misfit up to which a path is solved for from the orbit; those that were found had up to 0.012
-_ROUGHLY_ACCEPTED = 1e-6  # misfit of a path that starts farther from its source than the final one
-_NEARLY = 1e-4  # misfit of a path that may converge if it begins nearer to its source
-_ONE_PATH = 1e-9  # relative difference of the actions of one path, of equal nodes
-_FITTED, _SAME = 5e-3, 0.05  # of the action, and of a path's extent: accuracy of the Gauss–Newton method
-_COMPARED = 512  # nodes of a path, at most, that are compared with another one
+_FROM_NEAR = TOLERANCES.evaluations // 3  # for a candidate with momenta, or a longer path
+_FITTED = 5e-3  # of the action: accuracy of the Gauss–Newton method, by which a path is of a known family
 _MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
@@ -48,9 +35,10 @@ Array = NDArray[np.float64]
 class Effort(enum.IntEnum):
     """Rungs of a ladder: a candidate that leads to no path with one effort is tried with the next one later."""
 
-    SHOOT = 0  # multiple shooting from the candidate's momenta
-    DESCEND = 1  # Gauss–Newton method, descent of the action, and multiple shooting
-    FROM_ORBIT = 2  # the same, in finer pieces too, and then for a path that starts on the orbit itself
+    JOIN = 0  # multiple shooting for a candidate that is a path but for its ends, which needs 3 to 6 evaluations
+    SHOOT = 1  # multiple shooting from the candidate's momenta
+    DESCEND = 2  # Gauss–Newton method, descent of the action, and multiple shooting
+    FROM_ORBIT = 3  # the same, in finer pieces too, and then for a path that starts on the orbit itself
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,18 +59,20 @@ class PathSolver:
         self.propagator, self.source = propagator, source
         self._known: list[tuple[ExtremalPath, ExtremalPath | StructureError]] = []
 
-    def solve(self, cuts: Sequence[Cut], effort: Effort = Effort.FROM_ORBIT, worth: float = math.inf) -> ExtremalPath:
+    def solve(self, cuts: Sequence[Cut], effort: Effort = Effort.FROM_ORBIT, least: float = math.inf) -> ExtremalPath:
         """Return the extremal path near a candidate; raises StructureError if there is none.
 
         Multiple shooting from the candidate's momenta stays at the candidate, while descent may end at a cheaper path.
         Of several ways to cut the candidate, the cheapest after the Gauss–Newton method descends. A path that cannot be
-        joined to its source by the linearized equations starts on the orbit itself, if its action is below `worth`.
+        joined to its source by the linearized equations starts on the orbit itself, if it costs less than `least`,
+        the least action known.
         """
-        if effort is Effort.SHOOT:
-            return self._once(self._shot(self._as_given(cuts[0]), _FROM_NEAR))
+        if effort <= Effort.SHOOT:
+            evaluations = TOLERANCES.evaluations // 16 if effort is Effort.JOIN else _FROM_NEAR
+            return self._once(self._shot(self._as_given(cuts[0]), evaluations))
         guess = min((self._fitted(cut) for cut in cuts), key=lambda each: each.action)
         for _, known in self._known:
-            if isinstance(known, ExtremalPath) and _in_family(known, guess.first, guess.points, guess.action):
+            if isinstance(known, ExtremalPath) and known.flat and same_action(known.action, guess.action, _FITTED):
                 return known
         action = guess.action
         try:
@@ -90,8 +80,8 @@ class PathSolver:
             action = found.action
             return self._once(found)
         except StructureError as failure:
-            hopeless = isinstance(failure, NotConverged) and failure.misfit > _HOPEFUL
-            if effort < Effort.FROM_ORBIT or hopeless or not action < worth:
+            hopeless = isinstance(failure, NotConverged) and failure.misfit > TOLERANCES.hopeful
+            if effort < Effort.FROM_ORBIT or hopeless or not action < (1 - _FITTED) * least:
                 raise
             return self._from_orbit(guess, failure)
 
@@ -110,7 +100,7 @@ class PathSolver:
         points, action = gauss_newton(self.propagator, first, states, cut.last, cut.ending.free)
         return points, cut, action
 
-    def _descended(self, guess: _Guess, evaluations: int = MOST_EVALUATIONS) -> ExtremalPath:
+    def _descended(self, guess: _Guess, evaluations: int = TOLERANCES.evaluations) -> ExtremalPath:
         cut = guess.cut
         points, _ = descend_action(
             self.propagator, guess.first, guess.points,
@@ -121,7 +111,7 @@ class PathSolver:
     def _shot(self, guess: _Guess, evaluations: int) -> ExtremalPath:
         return extremal_path(
             self.propagator, guess.source, guess.first, guess.cut.ending, guess.points, guess.cut.last,
-            evaluations=evaluations, accepted=_ROUGHLY_ACCEPTED, nearly=_NEARLY,
+            evaluations=evaluations, accepted=TOLERANCES.rough, nearly=TOLERANCES.radius,
         )  # fmt: skip
 
     def _once(self, found: ExtremalPath) -> ExtremalPath:
@@ -152,15 +142,15 @@ class PathSolver:
             states = np.concatenate([source.along(first, added), guess.points[:, : propagator.size]])
             try:
                 longer = _Guess(source, first, *self._minimized(first, states, cut))
-                found = self._descended(longer, MOST_EVALUATIONS if best is None else _FROM_NEAR)
-                found = within(propagator, found, RADIUS * found.extent)
+                found = self._descended(longer, TOLERANCES.evaluations if best is None else _FROM_NEAR)
+                found = within(propagator, found, TOLERANCES.radius * found.extent)
                 solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)
             except StructureError:
                 failures += 1
                 if best is not None or failures == _FAILURES:
                     break
                 continue
-            if best is not None and abs(found.action - best.action) <= LONG_ENOUGH * best.action:
+            if best is not None and abs(found.action - best.action) <= TOLERANCES.lasting * best.action:
                 break
             best = found
         if best is None:
@@ -169,35 +159,10 @@ class PathSolver:
 
 
 def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
-    """Return whether two paths, each polished once, are one, or of one family."""
-    if one.flat and other.flat:
-        alike = _in_family(one, other.first, other.points, other.action)
-        return alike and same_action(one.action, other.action)
+    """Return whether two paths that were not completed are one, or of one family."""
+    of_family = one.flat and other.flat
     alike = one.source.node(one.first) == other.source.node(other.first) and len(one.points) == len(other.points)
-    return alike and same_action(one.action, other.action, _ONE_PATH)
-
-
-def _in_family(known: ExtremalPath, first: int, points: Array, action: float) -> bool:
-    """Return whether a path of a given action, as exact as of the Gauss–Newton method, is of the family of a known one.
-
-    On the section, the states of all members lie on one line.
-    """
-    if not known.flat or not same_action(known.action, action, _FITTED):
-        return False
-    pieces = known.ending.propagator.grain
-    line, own = (
-        nodes[-number % pieces :: pieces, : len(known.scale) // 2] / known.scale[: len(known.scale) // 2]
-        for nodes, number in ((known.points, known.first), (points, first))
-    )
-    if not len(own) or len(line) < FEWEST_NODES:
-        return False
-    starts, ways = line[:-1], np.diff(line, axis=0)
-    lengths = np.maximum((ways**2).sum(axis=1), 1e-300)
-    for state in own[np.linspace(0, len(own) - 1, min(len(own), _COMPARED)).astype(np.int64)]:
-        along = np.clip(((state - starts) * ways).sum(axis=1) / lengths, 0, 1)
-        if np.linalg.norm(state - starts - along[:, None] * ways, axis=1).min() >= _SAME:
-            return False
-    return True
+    return (of_family or alike) and same_action(one.action, other.action)
 
 
 def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[LinearizedOrbit, int, Array]:

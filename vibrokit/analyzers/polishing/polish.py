@@ -9,10 +9,11 @@ from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.polishing import certified
-from vibrokit.analyzers.polishing.candidate_polisher import WORTH, CandidatePolisher
-from vibrokit.analyzers.polishing.ends import usable_ends
+from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
+from vibrokit.analyzers.polishing.ends import Nodes
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.solved_path import SolvedPath
+from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.progress import advance, stage
 from vibrokit.results.codes import Code
@@ -91,54 +92,51 @@ class Polishing:
     def __init__(self, problem: ExitProblem, orbit: Orbit | None = None, shared: Shared | None = None) -> None:
         self._problem, self._shared = problem, shared or Shared()
         with stage("ends of exit paths", subject=problem.attractor.name):
-            self._ends, self._findings = usable_ends(problem)
-            self._polisher = CandidatePolisher(problem, self._ends, orbit)
+            nodes = Nodes(problem)
+            self._ends, self._findings = nodes.usable()
+            self._polisher = CandidatePolisher(nodes, self._ends, orbit)
         self._number = self._shared.orbits
         self._shared.orbits += 1
         self._branches: list[ActivationEnergy] = []
         self._seen = set[Candidate]()
-        self._waiting: list[Candidate] = []  # for a call that is not quick, which tries to reach all ends
         self._certified = 0  # of the polisher's paths
         self.complete = True
 
-    def add(self, candidates: Sequence[Candidate], *, quick: bool = False) -> None:
-        """Polish candidates with little effort, the cheapest first, and certify the paths that they lead to.
+    def add(self, candidates: Sequence[Candidate], effort: Effort = Effort.FROM_ORBIT) -> None:
+        """Polish candidates, the cheapest first, and certify the paths that they lead to.
 
-        Then more is done for those that led to no path and for ends that no candidate led to, or left for the next call
-        if this one is quick.
+        All are tried with little effort first. Then more is done, up to `effort`, for those that led to no path and for
+        ends that no candidate led to. A later call with more effort tries them again.
         """
         new = (each for each in dict.fromkeys(candidates) if each not in self._seen)
         ranked = sorted(new, key=lambda each: each.action)
         self._seen |= set(ranked)
         with Stoppable("polishing", self._problem.source) as work:
-            self._polish(ranked)
-            self._waiting = sorted((*self._waiting, *ranked), key=lambda each: each.action)
-            if not quick:
-                self._polish_the_rest()
+            self._polish(ranked, min(effort, Effort.SHOOT))
+            for rung in range(Effort.DESCEND, effort + 1):
+                self._polish_the_rest(Effort(rung))
         self._findings += work.findings
         self.complete &= not work.stopped
         self._certify()
 
-    def _polish(self, ranked: Sequence[Candidate]) -> None:
+    def _polish(self, ranked: Sequence[Candidate], effort: Effort) -> None:
         with stage("polishing", unit="candidates", total=len(ranked)):
             for candidate in ranked:
                 if candidate not in self._shared.fruitless:
                     before = len(self._polisher.solved)
-                    self._polisher.polish(candidate, Effort.SHOOT)
+                    self._polisher.polish(candidate, effort)
                     self._shared.note(candidate, self._polisher.solved[before:], self._number)
                 advance()
 
-    def _polish_the_rest(self) -> None:
+    def _polish_the_rest(self, effort: Effort) -> None:
         """Look for paths to ends without one first, so that candidates that cost more are skipped.
 
         Those to ends inside a set are looked for with all effort only.
         """
-        for effort in (Effort.DESCEND, Effort.FROM_ORBIT):
-            for end in self._ends:
-                if self._shared.wants(end, self._number) and (effort is Effort.FROM_ORBIT or not end.one_of_many):
-                    self._polisher.reach(end, self._waiting, effort)
-            self._polisher.polish_the_rest(effort)
-        self._waiting = []
+        for end in self._ends:
+            if self._shared.wants(end, self._number) and (effort is Effort.FROM_ORBIT or not end.one_of_many):
+                self._polisher.reach(end, effort)
+        self._polisher.polish_the_rest(effort)
 
     def _certify(self) -> None:
         """Certify the paths that were solved for since the last call; those after a stop are kept without."""
@@ -171,7 +169,7 @@ class Polishing:
         """Return what all candidates led to."""
         findings, skipped = [*self._findings, *self._polisher.findings], self._polisher.skipped
         if skipped:
-            values = {"skipped": skipped, "total": len(self._seen), "factor": WORTH}
+            values = {"skipped": skipped, "total": len(self._seen), "factor": TOLERANCES.worth}
             findings.append(Finding(Code.CANDIDATES_SKIPPED, self._problem.source, values=values))
         branches = sorted(self._branches, key=lambda branch: branch.value)
         return Polished(tuple(branches), (*findings, *certified.valleys(branches)))
