@@ -68,14 +68,14 @@ def size_of(unit: str, base: str | None) -> float:
 
 def familiar(value: float, base: str | None) -> str:
     """Return a number in SI base units in the largest other unit in which it is 1 at least, such as ``"40 Hz"``."""
-    name = _largest_unit(abs(value), base)
+    name = _largest_unit(value, base)
     size = _SIZES[base or ""][name] if name else 1.0
     return "" if size == 1.0 else f"{value / size:.6g} {name}"
 
 
 def _largest_unit(value: float, base: str | None) -> str:
     """The largest unit that is not above a number in SI base units; empty if there is none."""
-    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if value >= size}
+    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if abs(value) >= size}
     return max(fitting, key=fitting.__getitem__, default="")
 
 

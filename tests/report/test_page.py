@@ -19,6 +19,7 @@ from vibrokit.errors import ArgumentError, FileError, StructureError, VibrokitEr
 from vibrokit.report.material import gathered
 from vibrokit.results.finding import Finding
 from vibrokit.results.section import Section
+from vibrokit.scene_file import scene_data
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 _VOID = {"meta", "br", "img", "link"}
@@ -124,16 +125,48 @@ def test_what_cannot_be_reported(assessment):  # noqa: F811
             vk.Report.of(*wrong)
 
 
-def test_names_with_markup_are_escaped(assessment):  # noqa: F811
-    name = "<img src=x onerror=alert(1)>&amp;--><b>"
+@pytest.mark.parametrize(
+    "name",
+    [
+        "<img src=x onerror=alert(1)>&amp;--><b>",
+        "\"'><script>alert('&lt;')</script>",
+        r"$x_1$ & ${x}$",
+        r"5 $ of \frac{1",
+        r"$\frac{1$ --> ]]>",
+    ],
+)
+def test_names_with_markup_are_escaped(assessment, name):  # noqa: F811
+    """In tables, pictures and settings."""
     renamed = dataclasses.replace(STRUCTURE.attractors[0], name=name)
     structure = dataclasses.replace(STRUCTURE, attractors=(renamed, STRUCTURE.attractors[1]), scene=SCENE)
     page = Page(dataclasses.replace(assessment, structure=structure, settings={name: name}).report(title=name).html)
     assert not page.open
-    assert "img" not in page.tags
+    assert not page.tags & {"img", "script", "b"}
     assert all(link.startswith(("#", "data:")) for link in page.links)
     assert name in page.words  # the title
     assert name in page.cells
+
+
+def test_a_scene_file_with_markup_in_its_names(tmp_path, monkeypatch, capsys):
+    """Names of parameters and parts are words, and others are refused; the name of the file may have any signs."""
+    monkeypatch.chdir(tmp_path)
+    text = "natural_frequency = 1.0\ndamping_ratio = 0.1\n[spring]\nname = {0}\nformula = {1}\n{2} = 2.0\n"
+    good = ('"custom"', '"b_1*x + script*x**3"', "b_1 = 1.0\nscript")
+    wrong = ("'<script>'", '"b_1*x & <b>"', "'$b_1$'", "'<b>'")
+    for place, bad in ((0, wrong[0]), (1, wrong[1]), (2, wrong[2]), (2, wrong[3])):
+        words = [*good[:place], bad, *good[place + 1 :]]
+        (tmp_path / "scene.toml").write_text(text.format(*words), encoding="utf-8")
+        with pytest.raises(VibrokitError):
+            vk.load_scene("scene.toml")
+    (tmp_path / "scene.toml").write_text(text.format(*good), encoding="utf-8")
+    scene = scene_data(vk.load_scene("scene.toml"))
+    name = """<script>alert("1")<!-- & '$x_1$' ]]>"""
+    dataclasses.replace(full_structure(), scene=scene).save(f"{name}.nc")
+    main(["report", f"{name}.nc", "-o", "page.html"])
+    page = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
+    assert not page.open
+    assert name in page.words
+    assert {"spring.b_1", "spring.script"} <= set(page.cells)
 
 
 def test_a_file_without_accuracies_opens(assessment, tmp_path):  # noqa: F811

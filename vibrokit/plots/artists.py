@@ -8,6 +8,8 @@ from typing import cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
+from matplotlib.text import Text
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,6 +28,17 @@ class Artists:
     def figure(self) -> Figure:
         """The figure that the picture is in."""
         return cast(Figure, self.ax.get_figure(root=True))
+
+    @property
+    def printable(self) -> Figure:
+        """The figure; names with dollar signs that stand for no formula are shown as they are."""
+        parser = MathTextParser("path")
+        for text in cast(list[Text], self.figure.findobj(Text)):
+            try:
+                parser.parse(text.get_text())
+            except ValueError:
+                text.set_parse_math(False)
+        return self.figure
 
 
 def attractor_name(label: int, names: Sequence[str]) -> str:

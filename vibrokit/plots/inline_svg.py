@@ -27,7 +27,7 @@ def inline_svg(artists: Artists, name: str) -> str:
     content = io.StringIO()
     with matplotlib.rc_context(_STYLE):
         metadata = {"Date": None, "Creator": None}
-        artists.figure.savefig(content, format="svg", metadata=metadata, bbox_inches="tight")
+        artists.printable.savefig(content, format="svg", metadata=metadata, bbox_inches="tight")
     svg = content.getvalue()
     svg = svg[svg.index("<svg") :]
     for mark in ('id="', 'xlink:href="#', "url(#"):

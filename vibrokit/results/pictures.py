@@ -30,5 +30,5 @@ def save_figure(artists: Artists, path: str | os.PathLike[str]) -> None:
     """Save the figure of a picture; the file's ending chooses the format. Raises VibrokitError for other endings."""
     target = checked_picture(path)
     content = io.BytesIO()
-    artists.figure.savefig(content, format=target.suffix[1:], dpi=_DPI)
+    artists.printable.savefig(content, format=target.suffix[1:], dpi=_DPI)
     write_atomically(target, content.getvalue())
