@@ -19,8 +19,7 @@ from tests.scenes import Coloured, double_well, scene
 from vibrokit.analyzers.mfet import splitting
 from vibrokit.analyzers.mfet.direct import Exits
 from vibrokit.analyzers.mfet.estimates import exponential_p_value, mean_tests, rate_of
-from vibrokit.analyzers.mfet.excursions import NOT_OUT
-from vibrokit.analyzers.mfet.splitting import Estimates
+from vibrokit.analyzers.mfet.splitting import NOT_OUT, Estimates
 from vibrokit.errors import CheckpointError, FileError, SceneError, StructureError
 from vibrokit.results.arrhenius import ArrheniusFit
 from vibrokit.results.codes import Code
@@ -160,6 +159,18 @@ def test_escapes_end_in_the_other_core(result):
     assert (np.abs(ends - other) <= 1.1 * deviations).all()
     starts = found.values[:, 0]
     assert np.isfinite(starts).any()
+
+
+def test_the_way_to_a_bound_is_a_motion():
+    """Tests of the exit are closer than the states that are kept: x changes by the mean of the velocities."""
+    osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=0.05))
+    alone = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(10, 10), manifolds=False)
+    given = {"target_error": 0.2, "escapes": 3, "splitting": False, "intensities": (0.05,)}
+    data = vk.MFET(exit=vk.LeaveBounds(x=(-0.4, 0.4)), **given).run(osc, alone).data.isel(source=0, intensity_index=0)
+    x, v, times = (data[f"escape_{name}"].values for name in ("x", "v", "time"))
+    steps = np.diff(x) - 0.5 * np.diff(times) * (v[:, 1:] + v[:, :-1])
+    assert np.nanmax(np.abs(steps)) < 0.05 * np.nanmax(np.abs(x))
+    assert (np.abs(x[:, -1]) > 0.4).all()
 
 
 def test_a_saved_result_is_the_same(result, tmp_path):

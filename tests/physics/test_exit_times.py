@@ -15,7 +15,6 @@ from vibrokit.analyzers.mfet.estimates import rate_around
 from vibrokit.analyzers.mfet.importance import from_distances
 from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
-from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
 
@@ -85,8 +84,7 @@ def test_intervals_of_splitting_cover_the_truth():
     osc = well(0.2)
     structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
     problem = ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
-    covariances = {a.label: covariances_of(problem, a) for a in structure.attractors}
-    walks = [Walk(problem, 0.2 / 5.0, seed, vk.RK4(64), covariances) for seed in range(count)]
+    walks = [Walk(problem, 0.2 / 5.0, seed, vk.RK4(64)) for seed in range(count)]
     importance, estimates = dataclasses.replace(from_distances(walks[0]), depth=5.0), []
     for walk in walks:
         run = SplittingRun(walk, importance, 1e-3, 16, Checkpoint(None, {}).slot("one"))

@@ -115,14 +115,10 @@ class Slot:
         """Return the place of a part of this part."""
         return Slot(self.checkpoint, f"{self.name}/{name}")
 
-    def read(
-        self, names: Sequence[str], shapes: Mapping[str, tuple[int, ...]] | None = None
-    ) -> dict[str, NDArray[Any]] | None:
-        """Return the arrays that were kept; None if there are none with these names and shapes."""
+    def read(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
+        """Return the arrays that were kept; None if there are none with these names."""
         found = self.checkpoint.get(self.name)
-        if set(found) != set(names) or (shapes and any(found[name].shape != shapes[name] for name in names)):
-            return None
-        return found
+        return found if set(found) == set(names) else None
 
     def write(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Keep arrays in place of those before."""

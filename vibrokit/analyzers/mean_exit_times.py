@@ -8,14 +8,18 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.analyzer import Analysis
+from vibrokit.analyzers.checkpoint import Slot
 from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.mfet.dataset import dataset_of
-from vibrokit.analyzers.mfet.importance import Importance
-from vibrokit.analyzers.mfet.measurement import AtIntensity, Measurement
+from vibrokit.analyzers.mfet.direct import DirectRun
+from vibrokit.analyzers.mfet.importance import Importance, from_distances
+from vibrokit.analyzers.mfet.measurement import AtIntensity, from_direct, from_splitting
+from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.rate_analyzer import RateAnalyzer
 from vibrokit.analyzers.sgcm.stages import committor_stages
 from vibrokit.arguments import whole
 from vibrokit.errors import SceneError, StructureError, shown
@@ -29,18 +33,18 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable
-from vibrokit.structure.validation import intensities, share
+from vibrokit.structure.validation import share
 from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "Arrhenius fit"
-_INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's, as SGCM has them
-_SMALLEST_ERROR, _LARGEST_ERROR = 1e-3, 0.25  # a million and 16 exits
-_REPLICAS = 32  # of splitting at a relative error of 0.1: its default of 128 reaches 0.05
+# Direct simulation costs e^Λ relaxations for each exit, splitting about 2 Λ² (Λ is ln of the mean exit time in
+# relaxations), times what its importance function and its density cost: they break even near Λ = 7.
+_DIRECT = math.exp(7.0)
+_SMALLEST_ERROR = 1e-3  # a million exits
 _FEWEST_REPLICAS, _MOST_REPLICAS = 16, 1_000_000
-_MOST_STAGES = 64  # of an importance function in a section interval: a tenth of a radian, where it may be interpolated
 
 
-class MFET(Analyzer):
+class MFET(RateAnalyzer):
     """Mean first exit times by simulation, and activation energies from their dependence on D.
 
     Walkers start in the core of an attractor and go on until they leave. A core is an ellipse on the section with the
@@ -88,9 +92,7 @@ class MFET(Analyzer):
 
     result: ClassVar[type[Result]] = MFETResult
     keeps_checkpoints: ClassVar[bool] = True
-    takes_intensities: ClassVar[bool] = True
 
-    intensities: tuple[float, ...] | None = None
     target_error: float = 0.05
     seed: int = 0
     splitting: bool | None = None
@@ -107,75 +109,91 @@ class MFET(Analyzer):
             raise StructureError(f"MFET: from_orbit must be True or False, got {shown(self.from_orbit)}.")
         if not isinstance(self.splitting, bool | None):
             raise StructureError(f"MFET: splitting must be True, False or None, got {shown(self.splitting)}.")
-        if self.intensities is not None:
-            object.__setattr__(self, "intensities", intensities("MFET", self.intensities))
+        super().__post_init__()
 
     def for_accuracy(self, accuracy: float) -> Self:
         """Return it with a standard error of half the accuracy; splitting gets as many replicas as that needs."""
-        error = min(max(accuracy / 2, _SMALLEST_ERROR), _LARGEST_ERROR)
-        replicas = max(_FEWEST_REPLICAS, math.ceil(_REPLICAS * (0.1 / error) ** 2))
+        error = min(max(accuracy / 2, _SMALLEST_ERROR), 0.25)  # 16 exits at least
+        replicas = max(_FEWEST_REPLICAS, math.ceil(32 * (0.1 / error) ** 2))  # 128 reach 0.05
         return dataclasses.replace(self, target_error=error, replicas=min(replicas, _MOST_REPLICAS))
-
-    def least_intensity(self, osc: Oscillator) -> float:
-        """The least of the intensities."""
-        return min(self.intensities) if self.intensities else super().least_intensity(osc)
 
     def check(self, osc: Oscillator) -> None:
         """Refuse also noise of intensity 0, and a stepper that takes no noise."""
         super().check(osc)
-        self._intensities(osc)
+        self.wanted_intensities(osc)
         if self.stepper is not None:
             self.stepper.check(osc, Flow.NOISY)
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""
         problem.check_turns("MFET")
-        wanted = self._intensities(problem.osc)
-        bystanders = problem.has_bystanders
-        if self.splitting and bystanders:
+        if self.splitting and problem.has_bystanders:
             raise StructureError(
                 "MFET: splitting=True follows excursions from one attractor, and the exit leaves others standing by; "
                 "use splitting=None, or an exit that counts each of them (exit=LeaveBasin())."
             )
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
-        attractors = problem.structure.attractors
-        measured: list[AtIntensity] = []
-        wanted, limits = with_states(problem, wanted)
-        findings = list(limits)
+        wanted, limits = with_states(problem, self.wanted_intensities(problem.osc))
+        findings, measured = list(limits), list[AtIntensity]()
         work = Stoppable("simulation of exit times", problem.source)
-        covariances = {a.label: covariances_of(problem, a) for a in attractors}
+        covariances_of(problem, problem.attractor)  # refuses noise that does not spread the motion
         stepper = problem.ensemble_stepper(Flow.NOISY)
         for number, intensity in enumerate(wanted):
-            measurement = Measurement(
-                problem, intensity, self, stepper, covariances, _importance,
-                problem.checkpoint.slot(problem.source, number),
-            )  # fmt: skip
+            walk, slot = Walk(problem, intensity, self.seed, stepper), problem.checkpoint.slot(problem.source, number)
             try:
-                with work, stage("exit times", subject=f"{problem.attractor.name}, D = {intensity:g}"):
-                    measured.append(measurement.run())
+                with stage("exit times", subject=f"{problem.attractor.name}, D = {intensity:g}"):
+                    measured += self._measured(walk, slot, work)
             except StructureError as error:
                 findings.append(
                     Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=intensity, reason=str(error))
                 )
             if work.stopped:
-                with put_off():
-                    so_far = measurement.so_far()
-                measured += [] if so_far is None else [so_far]
                 break
-        findings += work.findings
+        findings += (*work.findings, *(finding for one in measured for finding in one.findings))
         if not measured:
             return Analysis(findings=tuple(findings), complete=not work.stopped)
-        for one in measured:
-            findings += one.findings
         energies, more = _energies(problem, measured)
         return Analysis(energies, dataset_of(problem, measured), (*findings, *more), complete=not work.stopped)
 
-    def _intensities(self, osc: Oscillator) -> tuple[float, ...]:
-        assert osc.noise is not None  # every analyzer checks that
-        if self.intensities is None and not osc.noise.intensity > 0:
-            raise StructureError("the noise has the intensity 0, so nothing leaves; give intensities=(…,).")
-        return self.intensities or tuple(factor * osc.noise.intensity for factor in _INTENSITIES)
+    def _measured(self, walk: Walk, slot: Slot, work: Stoppable) -> list[AtIntensity]:
+        """Simulate exits; split if that is wanted, or if it would take too long. Empty if it was stopped at once.
+
+        Exits that decide this do not count in the rate: if early exits choose a method and count, rates are too large.
+        """
+        wanted, run, coarser = math.ceil(self.target_error**-2), None, None
+        splits, split = self.splitting is True, None
+        with work:
+            if self.splitting is None and not walk.problem.has_bystanders:
+                pilots = 10
+                run = DirectRun(walk, pilots, self.from_orbit, slot.inner("pilot"), 14)
+                splits = not run.run(pilots * _DIRECT * walk.relaxation)
+            if splits:
+                importance = _importance(walk) or from_distances(walk)
+                split = SplittingRun(walk, importance, self.target_error, self.replicas, slot.inner("splitting"))
+                split.run()
+            else:
+                run = DirectRun(walk, wanted, self.from_orbit, slot.inner("direct"), 10)
+                run.run()
+                coarser = self._coarser(walk, max(25, wanted // 4), slot)
+        with put_off():
+            if split is not None and split.batches:
+                return [from_splitting(split)]
+            return [from_direct(run, coarser, self.escapes)] if run is not None and run.at_risk > 0 else []
+
+    def _coarser(self, walk: Walk, wanted: int, slot: Slot) -> DirectRun | None:
+        """A part of the exits with half the steps; None if there are no fewer steps."""
+        stepper = walk.stepper.coarsened()
+        if stepper == walk.stepper:
+            return None
+        try:
+            run = DirectRun(
+                dataclasses.replace(walk, stepper=stepper), wanted, self.from_orbit, slot.inner("coarser"), 11
+            )
+        except StructureError:
+            return None
+        run.run()
+        return run
 
 
 def _importance(walk: Walk) -> Importance | None:
@@ -188,7 +206,7 @@ def _importance(walk: Walk) -> Importance | None:
     points = found.grid.places(problem.on_turn(problem.attractor.points[:, :2]))
     (i, j) = np.clip(np.rint(points), 0, np.array(found.grid.shape) - 1).astype(int).T
     depth = max(1.0, -float(found.log_values[0, i, j].min()) * found.intensity / walk.intensity)
-    count = min(walk.looks(depth), _MOST_STAGES)
+    count = min(walk.looks(depth), 64)  # a tenth of a radian, where it may be interpolated
     return Importance(np.arange(count) / count, found.grid.x, found.grid.v, found.at(count), depth)
 
 

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
@@ -128,3 +129,11 @@ def nearest(states: Array, centres: Array, roots: Array, turn: float = 0.0) -> A
         return distances**2
     each = (np.sum(((states - c) @ root.T) ** 2, axis=-1) for c, root in zip(centres, roots, strict=True))
     return functools.reduce(np.minimum, each)
+
+
+def noise_strength(scene: Oscillator, states: Array) -> Array:
+    """Return a_vv at some states, from q′ = b + a p at the momentum (0, 1): velocities spread by √(a_vv D t)."""
+    kick, field = np.zeros_like(states), VectorField(scene)
+    still = field.hamiltonian_rate(states, kick)[..., 1]
+    kick[..., 1] = 1.0
+    return np.maximum(field.hamiltonian_rate(states, kick)[..., 1] - still, 0.0)

@@ -10,9 +10,10 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.analyzer import Analysis, Analyzer
+from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.rate_analyzer import RateAnalyzer, rate_variables
 from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
 from vibrokit.analyzers.sgcm.density_flow import check_steps
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
@@ -27,15 +28,14 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.result import Result
 from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.stoppable import Stoppable
-from vibrokit.structure.validation import gibibytes, intensities, share
+from vibrokit.structure.validation import gibibytes, share
 
 METHOD = "SGCM-WKB"
-_INTENSITIES = (1.5, 1.2, 1.0)  # times the scene's: three, so that the limit D → 0 has an error estimate
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 _EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
 
 
-class SGCM(Analyzer):
+class SGCM(RateAnalyzer):
     """Quasi-stationary densities and exit rates at finite noise, and activation energies as D → 0.
 
     The density p on the section is carried from section to section as φ = ln p: along the exact flow, and by diffusion
@@ -90,9 +90,7 @@ class SGCM(Analyzer):
     """
 
     result: ClassVar[type[Result]] = SGCMResult
-    takes_intensities: ClassVar[bool] = True
 
-    intensities: tuple[float, ...] | None = None
     nodes: tuple[int, int] | None = None
     steps: int | None = None
     max_memory_gib: float = 2.0
@@ -105,16 +103,11 @@ class SGCM(Analyzer):
             check_steps("SGCM", self.steps)
         share("SGCM: accuracy", self.accuracy)
         gibibytes("SGCM: max_memory_gib", self.max_memory_gib)
-        if self.intensities is not None:
-            object.__setattr__(self, "intensities", intensities("SGCM", self.intensities))
+        super().__post_init__()
 
     def for_accuracy(self, accuracy: float) -> Self:
         """Return it with this accuracy."""
         return dataclasses.replace(self, accuracy=accuracy)
-
-    def least_intensity(self, osc: Oscillator) -> float:
-        """The least of the intensities."""
-        return min(self.intensities) if self.intensities else super().least_intensity(osc)
 
     def check(self, osc: Oscillator) -> None:
         """Refuse also noise of intensity 0, and noise with states of its own."""
@@ -124,11 +117,9 @@ class SGCM(Analyzer):
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Solve at each intensity; if the work is stopped, those that are solved are kept, marked incomplete."""
         problem.check_turns("SGCM")
-        noise = checked_noise(problem.osc, needs_intensity=self.intensities is None)
         if problem.at_exit:
             return Analysis(findings=(Finding.of(Code.AT_EXIT, problem.source),))
-        wanted = self.intensities or tuple(factor * noise.intensity for factor in _INTENSITIES)
-        wanted, limits = with_states(problem, wanted)
+        wanted, limits = with_states(problem, self.wanted_intensities(problem.osc))
         if not wanted:
             return Analysis(findings=limits)
         solver = DensitySolver(problem, self.nodes, self.steps, self.max_memory_gib, self.accuracy)
@@ -188,24 +179,31 @@ def _energies(
 
 def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]) -> xarray.Dataset:
     targets = sorted({target for one in solved for target in one.errors})
-    interval = problem.osc.section_interval
-    logs = np.array([[one.log_rates.get(target, np.nan) for target in targets] for one in solved])
-    errors = np.array([[one.errors.get(target, np.nan) for target in targets] for one in solved])
     last = solved[-1]
     uniform = DensityGrid(np.linspace(*last.grid.region.x, last.grid.shape[0]), last.grid.v)
     shown = uniform.resampled(last.log_density, last.grid)
     potential = -last.intensity * (shown - np.nanmax(shown))
-    return xarray.Dataset(
+    shift, dims = math.log(problem.osc.section_interval), ("density_node_x", "density_node_v")
+    logs = np.array([[one.log_rates.get(target, np.nan) for target in targets] for one in solved])
+    errors = np.array([[one.errors.get(target, np.nan) for target in targets] for one in solved])
+    committors = np.array([[_committor(one, target) for target in targets] for one in solved])
+    rates = rate_variables(
+        problem, [one.intensity for one in solved], ["SGCM"] * len(solved), targets,
         {
+            "log_rate": (logs - shift, "logarithm of the exit rate (s-1)"),
+            "log_rate_error": (errors, "error of log_rate"),
+        },
+    )  # fmt: skip
+    return xarray.Dataset(
+        rates
+        | {
             "log_density": (
-                ("intensity_index", "density_node_x", "density_node_v"), np.array([one.log_density for one in solved]),
+                ("intensity_index", *dims), np.array([one.log_density for one in solved]),
                 {"long_name": "logarithm of the quasi-stationary density (s m-2)", "units": "1"},
             ),
             "log_committor": (
-                ("intensity_index", "exit_index", "density_node_x", "density_node_v"),
-                np.array([[_committor(one, target) for target in targets] for one in solved]).reshape(
-                    len(solved), len(targets), *last.grid.shape
-                ),
+                ("intensity_index", "exit_index", *dims),
+                committors.reshape(len(solved), len(targets), *last.grid.shape),
                 {"long_name": "logarithm of the probability to reach an exit before the own core", "units": "1"},
             ),
             "mass_drift": (
@@ -213,25 +211,7 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
                 {"long_name": "relative change of probability in a section interval by truncation", "units": "1"},
             ),
             "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln p", "units": "m2 s-3"}),
-            "log_rate": (
-                ("intensity_index", "exit_index"), logs - math.log(interval),
-                {"long_name": "logarithm of the exit rate (s-1)", "units": "1"},
-            ),
-            "log_rate_error": (
-                ("intensity_index", "exit_index"), errors, {"long_name": "error of log_rate", "units": "1"},
-            ),
-            "rate_target": (
-                ("exit_index",), np.array(targets), {"long_name": "label of the attractor that is reached"},
-            ),
-            "rate_event": ((), problem.exit.event, {"long_name": "what counts as an exit"}),
-            "rate_method": (
-                ("intensity_index",), np.array(["SGCM"] * len(solved)), {"long_name": "how the rate was found"},
-            ),
             "rate_steps": ((), solver.steps, {"long_name": "how often noise acts in a section interval"}),
-            "rate_intensity": (
-                ("intensity_index",), np.array([one.intensity for one in solved]),
-                {"long_name": "noise intensity", "units": "m2 s-3"},
-            ),
         },
         {
             "density_x": ("density_node_x", last.grid.x, {"long_name": "displacement", "units": "m"}),

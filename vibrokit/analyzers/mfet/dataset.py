@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from vibrokit.analyzers.mfet.estimates import CONFIDENCE
 from vibrokit.analyzers.mfet.measurement import AtIntensity
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.rate_analyzer import Variable, rate_variables
 
-_RATES = {
-    "log_rate": ("log_value", "logarithm of the exit rate (s-1)"),
-    "log_rate_error": ("log_error", "standard error of log_rate"),
-    "log_rate_lower": ("log_lower", f"lower end of the {CONFIDENCE:.0%} interval of log_rate"),
-    "log_rate_upper": ("log_upper", f"upper end of the {CONFIDENCE:.0%} interval of log_rate"),
-}
+Array = NDArray[np.float64]
 
 
 def dataset_of(problem: ExitProblem, measured: Sequence[AtIntensity]) -> xarray.Dataset:
@@ -29,55 +27,46 @@ def dataset_of(problem: ExitProblem, measured: Sequence[AtIntensity]) -> xarray.
         if seen is not None:
             times[number, : len(seen)] = seen.tests * one.interval
             goals[number, : len(seen)] = seen.targets
-    over, along = ("intensity_index",), ("intensity_index", "exit_index")
-    variables = {
-        name: (
-            along, np.array([[getattr(one.rates.get(t), field, np.nan) for t in targets] for one in measured]).reshape(
-                len(measured), len(targets)
-            ),
-            {"long_name": text, "units": "1"},
-        )
-        for name, (field, text) in _RATES.items()
-    } | {
-        "rate_target": (("exit_index",), np.array(targets, dtype=np.int64), {"long_name": "label of the target"}),
-        "rate_event": ((), problem.exit.event, {"long_name": "what counts as an exit"}),
-        "rate_intensity": (
-            over, np.array([one.intensity for one in measured]), {"long_name": "noise intensity", "units": "m2 s-3"},
+
+    def of_rates(field: str) -> Array:
+        values = [[getattr(one.rates.get(target), field, np.nan) for target in targets] for one in measured]
+        return np.array(values).reshape(len(measured), len(targets))
+
+    def of_each(values: list[Any], text: str, units: str = "") -> Variable:
+        return ("intensity_index",), np.array(values), {"long_name": text} | ({"units": units} if units else {})
+
+    at_risk = [
+        np.nan if seen is None else seen.at_risk * one.interval for one, seen in zip(measured, exits, strict=True)
+    ]
+    left_over = [0 if seen is None else seen.censored for seen in exits]
+    of = ("intensity_index", "exit_number")
+    rates = rate_variables(
+        problem,
+        [one.intensity for one in measured],
+        [one.method for one in measured],
+        targets,
+        {
+            "log_rate": (of_rates("log_value"), "logarithm of the exit rate (s-1)"),
+            "log_rate_error": (of_rates("log_error"), "standard error of log_rate"),
+            "log_rate_lower": (of_rates("log_lower"), f"lower end of the {CONFIDENCE:.0%} interval of log_rate"),
+            "log_rate_upper": (of_rates("log_upper"), f"upper end of the {CONFIDENCE:.0%} interval of log_rate"),
+        },
+    )
+    others = {
+        "exit_time": (of, times, {"long_name": "time of each exit, in order", "units": "s"}),
+        "exit_target": (of, goals, {"long_name": "label that each exit leads to"}),
+        "walkers_left_over": of_each(left_over, "walkers that had not left"),
+        "time_at_risk": of_each(at_risk, "time of all walkers together", "s"),
+        "exponential_p_value": of_each(
+            [one.p_value for one in measured], "probability of a larger deviation from an exponential law", "1"
         ),
-        "rate_method": (over, np.array([one.method for one in measured]), {"long_name": "how the rate was found"}),
-        "exit_time": (
-            ("intensity_index", "exit_number"), times, {"long_name": "time of each exit, in order", "units": "s"},
-        ),
-        "exit_target": (("intensity_index", "exit_number"), goals, {"long_name": "label that each exit leads to"}),
-        "walkers_left_over": (
-            over, np.array([0 if seen is None else seen.censored for seen in exits]),
-            {"long_name": "walkers that had not left"},
-        ),
-        "time_at_risk": (
-            over,
-            np.array([
-                np.nan if seen is None else seen.at_risk * one.interval
-                for one, seen in zip(measured, exits, strict=True)
-            ]),
-            {"long_name": "time of all walkers together", "units": "s"},
-        ),
-        "exponential_p_value": (
-            over, np.array([one.p_value for one in measured]),
-            {"long_name": "probability of a larger deviation from an exponential law", "units": "1"},
-        ),
-        "step_change": (
-            over, np.array([one.step_change for one in measured]),
-            {"long_name": "change of log_rate with half the steps", "units": "1"},
-        ),
-        "step_change_error": (
-            over, np.array([one.step_change_error for one in measured]),
-            {"long_name": "standard error of step_change", "units": "1"},
-        ),
-    }  # fmt: skip
-    return xarray.Dataset(variables | _escapes(measured))
+        "step_change": of_each([one.step_change for one in measured], "change of log_rate with half the steps", "1"),
+        "step_change_error": of_each([one.step_change_error for one in measured], "standard error of step_change", "1"),
+    }
+    return xarray.Dataset(rates | others | _escapes(measured))
 
 
-def _escapes(measured: Sequence[AtIntensity]) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+def _escapes(measured: Sequence[AtIntensity]) -> dict[str, Variable]:
     """The last parts of realizations; empty if none was kept."""
     known = [one.escapes for one in measured]
     if all(one is None for one in known):

@@ -14,12 +14,6 @@ from vibrokit.kernels.ensemble import Stop
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 from vibrokit.progress import report, stage
 
-_MORE = 1.25  # walkers for each exit that is wanted: the last of them would take long, and they are not waited for
-_PART = 8  # a round lasts as long as that part of all rounds before it
-_SHORTEST = 5.0  # relaxations of a round: what leads out within one or two rounds can be repeated
-_KEPT, _KEPT_AT_LEAST, _KEPT_AT_MOST = 5.0, 16, 128  # relaxations and section intervals before an exit
-_SAMPLES = 16  # states in a section interval on the way out
-
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
@@ -69,7 +63,7 @@ class Escapes:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _State:
-    """All walkers. `earlier_…` are those at the beginning of the round before the last, and of the last."""
+    """All walkers, and what they were at the beginning of the round before the last and of the last."""
 
     states: Array
     streams: NDArray[np.uint64]
@@ -93,14 +87,18 @@ class DirectRun:
     walk : Walk
     wanted : int
         Exits.
-    begun : Walkers
+    from_orbit : bool
+        Whether walkers start on the orbit, in place of the density in the core.
     slot : Slot
         Where the state is kept.
+    key : int
+        Chooses the random streams.
     """
 
-    def __init__(self, walk: Walk, wanted: int, begun: Walkers, slot: Slot) -> None:
+    def __init__(self, walk: Walk, wanted: int, from_orbit: bool, slot: Slot, key: int) -> None:
         self.walk, self.wanted, self.slot = walk, wanted, slot
-        count = len(begun)
+        count = math.ceil(1.25 * wanted)  # the last of the exits would take long, and they are not waited for
+        begun = walk.from_orbit(count, key) if from_orbit else walk.from_core(count, key)
         none = np.zeros(count, dtype=np.int64)
         self.state = _State(
             begun.states, begun.streams, none, np.full(count, COMPLETED, dtype=np.int64), none - 1,
@@ -109,11 +107,6 @@ class DirectRun:
         known = slot.read([field.name for field in dataclasses.fields(_State)])
         if known is not None:
             self.state = _State(**known)
-
-    @staticmethod
-    def walkers_for(wanted: int) -> int:
-        """Return how many walkers begin."""
-        return math.ceil(_MORE * wanted)
 
     @property
     def left(self) -> int:
@@ -143,12 +136,14 @@ class DirectRun:
         return True
 
     def _later(self) -> _State:
-        """The state one round later, all in new arrays, so that an interrupt leaves that of the round before."""
+        """The state one round later, all in new arrays, so that an interrupt leaves that of the round before.
+
+        A round lasts an eighth of all rounds before it, and so long that the last two can be repeated.
+        """
         now, checks = self.state, self.walk.checks
         alive = np.flatnonzero(now.status == COMPLETED)
         passed = int(now.tests[alive].max()) // checks
-        shortest = math.ceil(_SHORTEST * self.walk.relaxation)
-        sections = min(max(shortest, passed // _PART), self.walk.sections_at_once(len(alive)))
+        sections = min(max(self.walk.memory, passed // 8), self.walk.sections_at_once(len(alive)))
         ended = self.walk.advance(Walkers(now.states[alive], now.streams[alive]), sections)
         later = _State(*(value.copy() for value in vars(now).values()))
         for earlier, current in (
@@ -167,11 +162,12 @@ class DirectRun:
         return Exits(tests[gone], self.state.targets[gone], int(tests.sum()), len(tests) - len(gone))
 
     def escapes(self, most: int) -> Escapes:
-        """Repeat the last part of some walkers that have left, early and late, with states between sections."""
+        """Repeat the last part of some walkers that have left, early and late, with 16 states in a section interval."""
         walk, state, gone = self.walk, self.state, self._in_order()
         gone = gone[np.linspace(0, len(gone) - 1, min(most, len(gone))).astype(int)]
-        sections = min(math.ceil(_KEPT * walk.relaxation) + _KEPT_AT_LEAST, _KEPT_AT_MOST)
-        pieces = walk.pieces(_SAMPLES)
+        sections = min(walk.memory + 16, 128)
+        steps = walk.stepper.steps_in(walk.scene, walk.interval)
+        pieces = max(n for n in range(1, max(1, 16 // walk.checks) + 1) if steps % n == 0)
         left = state.tests[gone] - state.earlier_tests[0, gone]
         ahead = np.maximum(left - sections * walk.checks, 0)
         ahead -= ahead % walk.checks
@@ -179,12 +175,13 @@ class DirectRun:
         begun = walk.advance(start, ahead // walk.checks, stop=Stop())
         count = (sections + 1) * walk.checks * pieces
         tests = np.minimum((left - ahead) * pieces, count)
-        ended = walk.tested(Walkers(begun.states, begun.streams), tests, Stop(), visits=count, pieces=pieces)
+        spacing = walk.interval / pieces
+        ended = walk.moved(Walkers(begun.states, begun.streams), tests, Stop(), spacing, visits=count)
         paths = np.full((len(gone), count + 1, 2), np.nan)
         for number, (length, first) in enumerate(zip(tests, begun.states, strict=True)):
             paths[number, count - length] = first[:2]
             paths[number, count + 1 - length :] = ended.visits[number, :length, :2]
-        spacing, first = walk.interval / pieces, count - int(tests.max())
+        first = count - int(tests.max())
         return Escapes(spacing * np.arange(first - count, 1.0), paths[:, first:], state.targets[gone])
 
     def _in_order(self) -> Whole:

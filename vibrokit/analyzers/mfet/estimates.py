@@ -13,7 +13,6 @@ from vibrokit.analyzers.mfet.direct import Exits
 CONFIDENCE = 0.95
 """Of all intervals."""
 
-_EARLY = 10  # a part of the exits, which may be delayed
 _FEWEST = 20  # exits for which the law is tested
 
 
@@ -84,5 +83,5 @@ def exponential_p_value(exits: Exits, seed: int) -> float:
         return math.nan
     times = np.sort(exits.tests - np.random.default_rng(seed).random(count))
     remaining = count + exits.censored - np.arange(count)
-    on_test = np.cumsum((np.diff(times, prepend=0.0) * remaining)[count // _EARLY :])
+    on_test = np.cumsum((np.diff(times, prepend=0.0) * remaining)[count // 10 :])
     return float(stats.kstest(on_test[:-1] / on_test[-1], "uniform").pvalue)

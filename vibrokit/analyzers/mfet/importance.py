@@ -15,9 +15,6 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 
-_NODES = 160  # of the score from distances, along each side
-_BEYOND = 0.25  # of the region's widths, on each side of it
-_DEPTH = 20.0  # where it is not known
 _TIMES = 16  # in a section interval
 
 Array = NDArray[np.float64]
@@ -69,12 +66,12 @@ def from_distances(walk: Walk) -> Importance:
 
     That is another attractor, or a bound beyond which motion has left. Distances are in standard deviations of the
     densities around the attractors, which move with the forcing. This is a score where no density is at hand; the more
-    the motion turns on its way out, the less good.
+    the motion turns on its way out, the less good. The depth is not known; 20 is a guess.
     """
     problem, region = walk.problem, walk.problem.structure.basins.region
     bounds = np.stack([region.bounds, np.where(np.isfinite(problem.faces), problem.faces, region.bounds)])
     x, v = (
-        np.linspace(low - _BEYOND * (high - low), high + _BEYOND * (high - low), _NODES)
+        np.linspace(low - 0.25 * (high - low), high + 0.25 * (high - low), 160)
         for low, high in zip(bounds[:, :, 0].min(axis=0), bounds[:, :, 1].max(axis=0), strict=True)
     )
     nodes = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1)
@@ -84,7 +81,7 @@ def from_distances(walk: Walk) -> Importance:
     others += [np.broadcast_to(each, own.shape) for each in _distances_from_faces(walk, nodes)]
     to_others = np.min(others, axis=0) if others else np.full_like(own, own.max())
     values = own / (own + to_others)
-    return Importance(times, x, v, values, _DEPTH)
+    return Importance(times, x, v, values, 20.0)
 
 
 def _distances_from_faces(walk: Walk, nodes: Array) -> list[Array]:

@@ -4,51 +4,38 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import core_of, nearest, relaxation_of
+from vibrokit.analyzers.neighbourhoods import core_of, nearest, noise_strength, relaxation_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION
 from vibrokit.kernels.streams import streams_of
-from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.symbolic.flow_kind import Flow
 
-_FORGETS = 5.0  # relaxations after which the start on the orbit is forgotten to e⁻⁵ of the deviations
-_ATTEMPTS = 20  # to get so far without leaving: 0.95 of the walks succeed if the mean exit time is one relaxation
-# Looks at an excursion in a relaxation, in units of the depth. On a double well of damping 0.2 and ΔU/D = 25, ln of the
-# estimates of replicas spreads by 1.8 with 0.5, 1.0 with 1, 0.8 with 2 and 0.8 with 4; each takes half as long again.
-_LOOKS = 2.0
 # √(D h) that a Brownian motion seen at steps of h has passed a bound by on average, −ζ(½)/√(2π) (Broadie, Glasserman &
 # Kou, Math. Finance 7, 325, 1997).
 _LATE = 0.5826
-_POWERS = tuple(2**n for n in range(9))
-_SHORTEST = 0.05  # section intervals of a relaxation that is followed
-_MOST_STEPS = 2e8  # of all walks between two reports: a second or two
 
 Array = NDArray[np.float64]
 Words = NDArray[np.uint64]
+Whole = NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Walkers:
-    """States on the section, and the random streams that go on from there.
-
-    Attributes
-    ----------
-    states : array (count, n)
-    streams : uint64 array (count, 4)
-    """
+    """States on the section (count, n), and the random streams (count, 4) that go on from there."""
 
     states: Array
     streams: Words
@@ -56,30 +43,15 @@ class Walkers:
     def __len__(self) -> int:
         return len(self.states)
 
-    def __getitem__(self, which: NDArray[np.int64] | slice) -> Walkers:
-        return Walkers(self.states[which], self.streams[which])
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Walk:
-    """The motion with noise around one attractor, at one intensity.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    intensity : float
-        D (m² s⁻³).
-    seed : int
-    stepper : Stepper
-    covariances : mapping of int to array (count, 2, 2)
-        By label: the stationary covariances per unit D at the points of each attractor.
-    """
+    """The motion with noise around one attractor, at one intensity D (m² s⁻³)."""
 
     problem: ExitProblem
     intensity: float
     seed: int
     stepper: Stepper
-    covariances: Mapping[int, Array]
 
     @cached_property
     def scene(self) -> Oscillator:
@@ -102,6 +74,11 @@ class Walk:
     def relaxation(self) -> float:
         """Section intervals in which deviations from the attractor fall by a factor e."""
         return relaxation_of(self.problem.attractor, self.scene.section_interval)
+
+    @property
+    def memory(self) -> int:
+        """Section intervals after which a start is forgotten to e⁻⁵ of the deviations."""
+        return math.ceil(5.0 * self.relaxation)
 
     @cached_property
     def stop(self) -> Stop:
@@ -133,10 +110,7 @@ class Walk:
             return shift
         states = np.repeat(self.problem.attractor.points[:1], len(faces), axis=0)
         states[:, 1] = bounds[1, faces]
-        kick, field = np.zeros_like(states), VectorField(scene)
-        still = field.hamiltonian_rate(states, kick)[:, 1]
-        kick[:, 1] = 1.0
-        strength = self.intensity * np.maximum(field.hamiltonian_rate(states, kick)[:, 1] - still, 0.0)
+        strength = self.intensity * noise_strength(scene, states)
         step = self.interval / max(1, self.stepper.steps_in(scene, self.interval))
         shift[1, faces] = _LATE * np.sqrt(strength * step) * np.where(faces == 0, 1.0, -1.0)
         return shift
@@ -169,17 +143,17 @@ class Walk:
         inside: NDArray[np.bool_] = distances <= 1
         return inside
 
-    def from_orbit(self, attractor: Attractor, count: int, *key: int) -> Walkers:
-        """Return walkers on the points of an attractor; the key chooses their random streams."""
-        places = np.arange(count) % len(attractor.points)
-        return Walkers(attractor.points[places], streams_of(self.key(*key), np.arange(count)))
+    def from_orbit(self, count: int, *key: int) -> Walkers:
+        """Return walkers on the points of the attractor; the key chooses their random streams."""
+        points = self.problem.attractor.points
+        return Walkers(points[np.arange(count) % len(points)], streams_of(self.key(*key), np.arange(count)))
 
     def from_core(self, count: int, *key: int) -> Walkers:
         """Return walkers in the core, with the normal density around the orbit there.
 
         States of the noise are those that go with x and v on average; they are soon forgotten.
         """
-        begun = self.from_orbit(self.problem.attractor, count, *key)
+        begun = self.from_orbit(count, *key)
         own, rng = self.own, np.random.default_rng(self.key(*key, 1))
         radius = np.sqrt(-2.0 * np.log1p(-rng.random(count) * -math.expm1(-0.5)))  # of a normal law, up to 1
         angle = 2.0 * math.pi * rng.random(count)
@@ -197,7 +171,8 @@ class Walk:
     def settled(self, count: int, *key: int) -> Walkers:
         """Return walkers of the quasi-stationary state: on the section, having forgotten where they began.
 
-        A walker that leaves meanwhile begins again.
+        A walker that leaves meanwhile begins again, 20 times at most: 0.95 of the walks succeed at once if the mean
+        exit time is a relaxation.
 
         Raises
         ------
@@ -207,9 +182,8 @@ class Walk:
         begun = self.from_core(count, *key)
         states, streams = begun.states.copy(), begun.streams.copy()
         waiting = np.arange(count)
-        sections = math.ceil(_FORGETS * self.relaxation)
-        for _ in range(_ATTEMPTS):
-            ended = self.advance(Walkers(begun.states[waiting], streams[waiting]), sections)
+        for _ in range(20):
+            ended = self.advance(Walkers(begun.states[waiting], streams[waiting]), self.memory)
             streams[waiting] = ended.streams
             good = ended.status == COMPLETED
             states[waiting[good]] = ended.states[good]
@@ -221,88 +195,49 @@ class Walk:
             "metastable state to leave; lower the noise intensity."
         )
 
-    def advance(
-        self, walkers: Walkers, sections: int | NDArray[np.int64], stop: Stop | None = None, visits: int = 0
-    ) -> Ensemble:
+    def advance(self, walkers: Walkers, sections: int | Whole, stop: Stop | None = None, visits: int = 0) -> Ensemble:
         """Advance walkers over some section intervals, or until a test ends them; by default that for the exit."""
-        return self.tested(walkers, sections * self.checks, self.stop if stop is None else stop, visits)
+        tests, checked = sections * self.checks, self.stop if stop is None else stop
+        return self.moved(walkers, tests, checked, self.interval, visits=visits, keep=self.checks)
 
-    def tested(
-        self, walkers: Walkers, tests: int | NDArray[np.int64], stop: Stop, visits: int = 0, pieces: int = 1
-    ) -> Ensemble:
-        """Advance walkers over some intervals between tests, each made of several pieces.
+    def moved(self, walkers: Walkers, count: int | Whole, stop: Stop, interval: float, **kept: Any) -> Ensemble:
+        """Advance walkers over some intervals of time, or until a test ends them; `kept` is as in `run_ensemble`.
 
-        `visits` then holds states after each piece; without pieces, after each section interval.
+        Labels are those of targets, also where motion left by position, escaped or diverged.
         """
         ended = run_ensemble(
-            self.scene, Flow.NOISY, self.stepper, walkers.states, tests,
-            stop=stop, interval=self.interval / pieces, streams=walkers.streams, visits=visits,
-            keep=1 if pieces > 1 else self.checks, executor=self.problem.executor,
+            self.scene, Flow.NOISY, self.stepper, walkers.states, count, stop=stop, interval=interval,
+            streams=walkers.streams, executor=self.problem.executor, **kept,
         )  # fmt: skip
-        return self._labelled(ended)
-
-    def _labelled(self, ended: Ensemble) -> Ensemble:
-        """The same with the label of the target where motion left by position, escaped or diverged."""
         away = np.isin(ended.status, (LEFT_REGION, DIVERGED)) | (ended.label == self._escape_label)
         outlet = ESCAPED if self.problem.outlet is None else self.problem.outlet
         return dataclasses.replace(ended, label=np.where(away, outlet, ended.label))
 
-    def pieced(
-        self, walkers: Walkers, count: int, pieces: int, phases: NDArray[np.int64], visits: int, keep: int
-    ) -> Ensemble:
-        """Advance walkers that are between sections until they leave or are in the core, or over `count` pieces.
-
-        Parameters
-        ----------
-        walkers : Walkers
-        count : int
-        pieces : int
-            In a section interval.
-        phases : int64 array
-            Pieces from a section to the start of each walker.
-        visits, keep : int
-            How many states are kept, one every `keep` pieces.
-        """
-        ended = run_ensemble(
-            self.scene, Flow.NOISY, self.stepper, walkers.states, count,
-            stop=dataclasses.replace(self.stop_or_return, every=pieces),
-            interval=self.scene.section_interval / pieces, streams=walkers.streams, phases=phases,
-            visits=visits, keep=keep, executor=self.problem.executor,
-        )  # fmt: skip
-        return self._labelled(ended)
-
     def looks(self, depth: float) -> int:
         """Return how often an excursion that climbs so far is looked at in a section interval: a power of two.
 
-        On its way out, ln of the probability to leave grows by less than one between two looks. Exit tests and time
-        steps are multiples of these intervals.
+        On its way out, ln of the probability to leave grows by less than one between two looks, at twice the depth in a
+        relaxation. Exit tests and time steps are multiples of these intervals.
         """
+        # On a double well of damping 0.2 and ΔU/D = 25, ln of the estimates of replicas spreads by 1.8 with 0.5 times
+        # the depth, 1.0 with 1, 0.8 with 2 and 0.8 with 4; each takes half as long again.
         steps = self.stepper.steps_in(self.scene, self.scene.section_interval)
-        wanted = _LOOKS * depth / relaxation_of(self.problem.attractor, self.scene.section_interval, _SHORTEST)
+        wanted = 2.0 * depth / relaxation_of(self.problem.attractor, self.scene.section_interval, 0.05)
         most = self.checks if self.problem.exit.by_position else steps
-        allowed = [n for n in _POWERS if most % n == 0 and steps % n == 0]
+        allowed = [n for n in (2**k for k in range(9)) if most % n == 0 and steps % n == 0]
         return min((n for n in allowed if n >= wanted), default=max(allowed))
 
-    def pieces(self, most: int) -> int:
-        """Return into how many pieces the interval between tests can be divided without a change of the steps."""
-        steps = self.stepper.steps_in(self.scene, self.interval)
-        return max(n for n in range(1, max(1, most // self.checks) + 1) if steps % n == 0)
-
     def sections_at_once(self, count: int) -> int:
-        """Return the section intervals that some walkers may be advanced between two reports."""
+        """Return the section intervals that some walkers may be advanced between two reports: a second or two."""
         steps = max(1, self.stepper.steps_in(self.scene, self.scene.section_interval))
-        return max(1, int(_MOST_STEPS / (steps * max(count, 1))))
+        return max(1, int(2e8 / (steps * max(count, 1))))
 
     def around(self, attractors: Sequence[Attractor]) -> Stop:
         """Return the test for being in the core of one of some attractors, on the section."""
-        points, metrics = [np.empty((0, 2))], [np.empty((0, 2, 2))]
-        labels = [np.empty(0, dtype=np.int64)]
-        for attractor in attractors:
-            centres, roots = core_of(self.problem, attractor, self.intensity)
-            points.append(centres)
-            metrics.append(roots)
-            labels.append(np.full(len(centres), attractor.label, dtype=np.int64))
+        if not attractors:
+            return Stop(turn=self.problem.turn)
+        points, metrics = zip(*(core_of(self.problem, one, self.intensity) for one in attractors), strict=True)
+        labels = np.repeat([one.label for one in attractors], [len(some) for some in points])
         return Stop(
-            points=np.concatenate(points), point_labels=np.concatenate(labels), metrics=np.concatenate(metrics),
-            turn=self.problem.turn,
-        )  # fmt: skip
+            points=np.concatenate(points), point_labels=labels, metrics=np.concatenate(metrics), turn=self.problem.turn
+        )

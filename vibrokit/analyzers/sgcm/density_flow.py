@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.neighbourhoods import noise_strength
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
@@ -34,7 +35,6 @@ _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 _CHECKS = 16  # exit tests in a leg: on hertz-0.570 a mass that turns back between two has gone 1e-5 further
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
-_ROUNDING = 1e-9  # relative, of a difference of rates
 _SAME = 1e-9  # of a section interval: times that differ by less are equal
 
 Array = NDArray[np.float64]
@@ -122,12 +122,9 @@ class DensityFlow:
 
     @cached_property
     def amplitude(self) -> Array:
-        """a_vv at the nodes, from q′ = b + a p at the momentum (0, 1): noise makes velocities spread by √(a_vv D t)."""
-        field, nodes = VectorField(self.scene), self.grid.nodes
-        kick = np.broadcast_to([0.0, 1.0], nodes.shape)
-        still = field.hamiltonian_rate(nodes, np.zeros_like(nodes))[..., 1]
-        amplitude = np.maximum(field.hamiltonian_rate(nodes, kick)[..., 1] - still, 0.0)
-        if np.ptp(amplitude) <= _ROUNDING * amplitude.max():  # additive noise, which takes a third of the time
+        """The strength of the noise at the nodes."""
+        amplitude = noise_strength(self.scene, self.grid.nodes)
+        if np.ptp(amplitude) <= 1e-9 * amplitude.max():  # additive noise, which takes a third of the time
             amplitude[:] = amplitude.mean()
         return amplitude
 
