@@ -47,10 +47,10 @@ def test_a_wrong_derivation_is_caught(name, law, wrong, tmp_path, monkeypatch):
     derived = model.derive_contact
     monkeypatch.setattr(model, "derive_contact", lambda *of: dataclasses.replace(derived(*of), **wrong))
     monkeypatch.setattr(store, "cache_directory", lambda: tmp_path)
-    kernel._kernel.cache_clear()
+    kernel._KERNELS.clear()
     with pytest.raises(ConformanceError, match="deriv"):
         dict(contact_law_checks(law))[name]()
-    kernel._kernel.cache_clear()
+    kernel._KERNELS.clear()
 
 
 def test_every_check_of_a_law_has_a_law_that_it_catches():

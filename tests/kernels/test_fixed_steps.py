@@ -46,7 +46,7 @@ def test_order_4_in_hamiltons_equations(extremals):
         return np.median(np.linalg.norm(found - ends, axis=1))
 
     errors = [error(steps) for steps in (128, 256, 512)]
-    assert errors[-1] < 1e-9
+    assert errors[-1] < 1e-8
     np.testing.assert_allclose(-np.diff(np.log2(errors)), 4.0, atol=0.2)
 
 

@@ -160,8 +160,8 @@ def check_cache(drawn, starts):
     """Kernels that are loaded again compile nothing, and give the same bits."""
     for stepper in (vk.RK4(32), vk.Order8(1e-6)):
         before = ends(drawn, stepper, starts[:2])
-        kernel._kernel.cache_clear()
-        kernel._addresses.cache_clear()
+        kernel._KERNELS.clear()
+        kernel._callbacks.cache_clear()
         store._LOADED.clear()
         after = ends(drawn, stepper, starts[:2])
         assert kernel_for(drawn.scene, Flow.STATE, stepper).compilations == 0

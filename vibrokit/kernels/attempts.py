@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibrokit.kernels.error_blocks import error_blocks
 from vibrokit.kernels.rows import LANES
 from vibrokit.kernels.tableau import STAGES
 from vibrokit.symbolic.flow_kind import Flow
@@ -23,12 +22,7 @@ _FARTHER = (
     "_share = sqrt(sqrt((_least + 1e-300)/(_reach*abs(_along) + _least + 1e-300)))",
     "_least = _least/(_share*sqrt(_share))",
 )
-_IMPORTS = """from numba import njit
-
-from vibrokit.kernels.options import LINKED_LANES
-from vibrokit.kernels.registers import keep_apart, promise_no_overlap, use_widest_registers
-from vibrokit.kernels.waves import cos, sin
-"""
+_IMPORTS = "from vibrokit.kernels.waves import cos, sin\n"
 
 
 class AttemptWriter:
@@ -44,7 +38,11 @@ class AttemptWriter:
         self._stops = text.barriers
         # Rows of a state, enough for every flow of a scene with as many states: they share their drivers.
         self._rows = 2 + 2 * text.states + 4 * text.states**2
+        # States before and after an attempt and at a stage; the sizes of the numbers, and estimates of their errors.
         states = ["STATE", "TRIAL", "POINT", "SIZES", "FIFTHS", "THIRDS"]
+        # Of an attempt: its length, its error by the tolerance, and by what to lengthen the next; the course, and the
+        # stop that is touched; rounding of x at a stop; the tolerance that it allows, and how uncertain derivatives are
+        # because of it. MOST has the largest estimates, and whether a number is not finite.
         scalars = ["LENGTH", "ERROR", "FACTOR", "SIGMA", "COURSE", "ROOT", "WALL", "SIDE"]
         scalars += ["GRAIN", "DEPTH", "NEAR", "ALLOWED", "HAZE"]
         blocks = [*((name, self._rows) for name in states), ("SLOPES", STAGES * self._rows)]
@@ -64,7 +62,7 @@ class AttemptWriter:
     def facts(self) -> str:
         """Constant FACTS: what attempts need to know of the flow."""
         text = self._text
-        blocks = error_blocks(text.states, text.states * text.flow.has_momenta, self._count).tolist()
+        blocks = _error_blocks(text.states, text.states * text.flow.has_momenta, self._count)
         firsts = [0, *(1 + blocks.index(block) for block in blocks)]
         hazy = 1 + self._count
         if text.curved:
@@ -74,7 +72,7 @@ class AttemptWriter:
     def slopes(self) -> list[str]:
         """Pieces of the scene: the function `slopes_lanes(node, lanes, slopes, theta)`, at POINT along each course."""
         names = enumerate(("_now", *self._text.variables), start=_CLOCK)
-        lines = ["@njit(**LINKED_LANES)", "def slopes_lanes(node, lanes, slopes, theta):"]
+        lines = ["def slopes_lanes(node, lanes, slopes, theta):"]
         lines += ["    keep_apart(), use_widest_registers(), promise_no_overlap()"]
         lines += [f"    {name} = theta[{place}]" for name, place in self._text.parameters.items()]
         lines += [f"    for lane in range({LANES}):"]
@@ -126,3 +124,26 @@ class AttemptWriter:
             lines += [f"{self._at('NEAR')} = 1.0 if _shallow and _closes else 0.0"]
             lines += [f"{self._at('POINT')} = x"]
         return [f"        {line}" for line in lines]
+
+
+def _error_blocks(states: int, momenta: int, equations: int) -> list[int]:
+    """Return the block of each component of a flow with n states, n or no momenta, and their derivatives.
+
+    Each state has its own scale. Momenta share one, the action has its own, and so does each block of derivatives:
+    final states by initial states, final states by initial momenta, and so on. Momenta may be 1e-12 where states are
+    1, and their error must be small relative to them. The same holds for each entry of a covariance, because the
+    entries grow with different powers of a short time. There are n, n + n² or n + n(n + 1)/2 equations without momenta,
+    2n + 1 or 2n + 1 + (2n)² with them.
+    """
+    state = list(range(states))
+    if momenta == 0 and equations == states + states**2:
+        return state + [states] * states**2
+    if momenta == 0:
+        return list(range(equations))
+    phase = [*state, *[states] * states]
+    matrix = [
+        states + 2 + 2 * (row >= states) + (column >= states)
+        for row in range(2 * states)
+        for column in range(2 * states)
+    ]
+    return [*phase, states + 1, *matrix][:equations]

@@ -1,7 +1,8 @@
-"""Compiles functions only as a part of those that call them, and optimises each part once.
+"""All that kernels use of what Numba and llvmlite do not publish; `options` tests the version, and can do without.
 
-Numba optimises each function together with all that it calls, and makes machine code of it, though only its callers
-use it. In a stepper of seventy small functions, each would be optimised as often as the calls above it are deep.
+Functions are compiled only as a part of those that call them, and each part is optimised once. Numba optimises each
+function together with all that it calls, and makes machine code of it, though only its callers use it. In a stepper of
+seventy small functions, each would be optimised as often as the calls above it are deep.
 
 Numba also optimises each function by itself before all that it calls is linked to it. A short loop over lanes is then
 repeated for each lane, because the calls in it look small, and becomes vector code no more.
@@ -114,3 +115,8 @@ class Compiler(_Compiler):
     """The compiler of a function that is called from Python or by address."""
 
     choice = _OptimiseOnce
+
+
+def prefer_widest_registers(function: Any) -> None:
+    """Let a function fill registers of 512 bits; llvmlite refuses such attributes, but writes what its set holds."""
+    set.add(function.attributes, '"prefer-vector-width"="512"')

@@ -26,7 +26,7 @@ class FreeFlight(LocatedStepper):
     """
 
     name: ClassVar[str] = "free_flight"
-    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "free_flight", "extrapolation", "attempts", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "free_flight", "attempts", "sections")
 
     def scene_part(self, text: SceneText) -> list[str]:
         """That of a located stepper, and the series of the flight."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vibrokit.errors import SceneError, StepperError, shown
 from vibrokit.kernels import store
 from vibrokit.kernels.fingerprint import emitter_fingerprint, environment, scene_fingerprint
-from vibrokit.kernels.links import addresses, linked
+from vibrokit.kernels.links import callbacks, linked
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.kernels.template import read_template, with_needed_imports
 from vibrokit.parts.scene import Scene
@@ -82,7 +82,8 @@ class Kernel:
         `rest` begins with the start time, the interval, the settings and the streams. Each call of the function does
         so much work as takes about a tenth of a second, so that interrupts and time limits are seen after each.
         """
-        function, given = self._advance, linked(theta, _addresses(self), _facts(self.module, theta))
+        links = _callbacks(self)  # compiled code lives as long as they do
+        function, given = self._advance, linked(theta, links, _facts(self.module, theta))
         assert self.driver is not None, "then there is no function"
         memory = self.driver.module.memory_of(states, given, rest[2], rest[3])
         place, most = memory[-1], _FIRST_WORK
@@ -98,7 +99,7 @@ class Kernel:
 
     def link(self) -> bool:
         """Compile or load what the driver calls; return whether the driver is compiled or loaded already."""
-        _addresses(self)
+        _callbacks(self)
         return bool(self._advance.overloads)
 
     @property
@@ -107,7 +108,8 @@ class Kernel:
 
         What the generated modules import from the package is compiled once for all kernels, and does not count.
         """
-        return sum(
+        linked = sum(link is not None and not link.cache_hits for link in _callbacks(self))
+        return linked + sum(
             len(value.stats.cache_misses)
             for part in self.parts
             for value in vars(part.module).values()
@@ -122,9 +124,9 @@ class Kernel:
 
 
 @functools.lru_cache(maxsize=1024)
-def _addresses(kernel: Kernel) -> NDArray[np.int64]:
+def _callbacks(kernel: Kernel) -> tuple[Any, ...]:
     with compiling():
-        return addresses(vars(kernel.module))
+        return callbacks(vars(kernel.module))
 
 
 def _facts(module: types.ModuleType, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -155,36 +157,24 @@ def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
     if not isinstance(stepper, Emitter):
         raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
     stepper.check(scene, flow)
-    fingerprint = f"{scene_fingerprint(scene)}\n{emitter_fingerprint(stepper)}"
-    return _kernel(fingerprint, flow, _Sources(scene, flow, stepper))
+    fingerprint = f"{scene_fingerprint(scene)}\n{emitter_fingerprint(stepper)}\n{flow.value}"
+    name = f"vibrokit_{flow.value}_{stepper.name}_{_digest(fingerprint)}"
+    if name not in _KERNELS:
+        kernel = _stored(name)
+        if kernel is None:
+            with compiling():
+                kernel = _written(name, scene, flow, stepper)
+            for part in kernel.parts:  # a scene that is stored has the others stored
+                store.store(part.name, part.source)
+        _KERNELS[name] = kernel
+    return _KERNELS[name]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Sources:
-    """What a kernel is derived from; never part of the key, which the fingerprint is."""
-
-    scene: Scene
-    flow: Flow
-    stepper: Emitter
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Sources)
-
-    def __hash__(self) -> int:
-        return 0
+_KERNELS: dict[str, Kernel] = {}
 
 
-@functools.lru_cache(maxsize=256)
-def _kernel(fingerprint: str, flow: Flow, sources: _Sources) -> Kernel:
-    digest = hashlib.sha256(f"{fingerprint}\n{flow.value}".encode()).hexdigest()[:24]
-    name = f"vibrokit_{flow.value}_{sources.stepper.name}_{digest}"
-    kernel = _stored(name)
-    if kernel is None:
-        with compiling():
-            kernel = _written(name, sources.scene, flow, sources.stepper)
-        for part in kernel.parts:  # a scene that is stored has the others stored
-            store.store(part.name, part.source)
-    return kernel
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
 def _stored(name: str) -> Kernel | None:
@@ -202,7 +192,7 @@ def _written(name: str, scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
     sources = write_sources(scene, flow, stepper)
     if not sources.driver:
         return Kernel(Generated(name, sources.scene))
-    digest = hashlib.sha256(f"{environment()}\n{sources.driver}".encode()).hexdigest()[:24]
+    digest = _digest(f"{environment()}\n{sources.driver}")
     driver = Generated(f"vibrokit_driver_{digest}", sources.driver)
     return Kernel(Generated(name, f'{sources.scene}\nDRIVER = "{driver.name}"\n'), driver)
 
@@ -228,10 +218,9 @@ def write_sources(scene: Scene, flow: Flow, stepper: Emitter) -> Sources:
     if stepper.called:
         source = source.replace("(**INLINED)", "(**INLINED_AND_CALLED)")
     source = with_needed_imports(source)
-    templates = "\n\n".join(read_template(name) for name in stepper.templates)
-    if not templates:
+    if not stepper.templates:
         return Sources(source)
-    driver = _pasted([_TITLE, *stepper.driver_part(text), templates])
+    driver = _pasted([_TITLE, *stepper.driver_part(text), *map(read_template, stepper.templates)])
     return Sources(source, with_needed_imports(driver))
 
 

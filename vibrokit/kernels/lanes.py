@@ -13,13 +13,12 @@ _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
 _NODES = (0.0, 0.5, 1.0)
-_REGISTERS = "from vibrokit.kernels.registers import promise_no_overlap, use_widest_registers\n"
 # `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
 # because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
 # only where a scene and a flow need them.
 _STEP = (
-    "@njit(**LINKED_LANES)", "def step_lanes(z, forces, normals, theta, h, steps):",
-    "    promise_no_overlap(), use_widest_registers()",
+    "def step_lanes(z, forces, normals, theta, h, steps):",
+    "    keep_apart(), promise_no_overlap(), use_widest_registers()",
 )  # fmt: skip
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 
@@ -27,7 +26,7 @@ _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 def pieces_of_step(text: SceneText) -> list[str]:
     """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
     pieces = [_tabulation(text), text.derivative, text.crossed, text.amplitude, text.slope]
-    lines = [_REGISTERS, "", *_STEP]
+    lines = [*_STEP]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
     lines += ["    for step in range(steps):", *[f"        _node = {len(_NODES)}*step"] * text.forced]
     return [*pieces, "\n".join([*lines, *(f"    {line}" for line in _step(text)), ""])]
@@ -88,7 +87,7 @@ def _tabulation(text: SceneText) -> str:
     """Function `tabulate(start, h, steps, theta, table)`: the forcing at the nodes of steps; empty without."""
     if not text.forced:
         return ""
-    lines = ["@njit(**LINKED_LANES)", "def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
+    lines = ["def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
     lines += [
         f"        table[{len(_NODES)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
         for place, node in enumerate(_NODES)

@@ -11,39 +11,43 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import cfunc, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from vibrokit.kernels.options import CONTRACTED, OPTIONS
 
 _F8, _I8 = types.float64, types.int64
 _NUMBERS, _SWITCHES = types.CPointer(types.float64), types.CPointer(types.uint8)
 _SIGNATURES = {
-    "rhs": types.none(_F8, _NUMBERS, _SWITCHES, _NUMBERS, _NUMBERS),
+    "rhs": types.void(_F8, _NUMBERS, _SWITCHES, _NUMBERS, _NUMBERS),
     "law": _F8(_I8, _F8, _F8, _NUMBERS),
-    "slopes_lanes": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
+    "slopes_lanes": types.void(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
     "flight_rate": _F8(_NUMBERS),
-    "taylor": types.none(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
-    "tabulate": types.none(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
-    "step_lanes": types.none(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8, _I8),
+    "taylor": types.void(_F8, _NUMBERS, _NUMBERS, _NUMBERS),
+    "tabulate": types.void(_F8, _F8, _I8, _NUMBERS, _NUMBERS),
+    "step_lanes": types.void(_NUMBERS, _NUMBERS, _NUMBERS, _NUMBERS, _F8, _I8),
 }
+_OF_LANES = ("slopes_lanes", "tabulate", "step_lanes")
 LINKS = len(_SIGNATURES)
 
 
-def addresses(functions: dict[str, Any]) -> NDArray[np.int64]:
-    """Compile those of the functions of a scene that a driver may call; return all addresses, 0 for one not there."""
-    found = np.zeros(LINKS, dtype=np.int64)
-    for place, (name, signature) in enumerate(_SIGNATURES.items()):
-        if name in functions:
-            function = functions[name]
-            function.compile(signature.args)
-            compiled = function.overloads[signature.args]
-            found[place] = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
-    return found
+def callbacks(functions: dict[str, Any]) -> tuple[Any, ...]:
+    """Compile those of the functions of a scene that a driver may call; None for each that the scene lacks."""
+    return tuple(
+        cfunc(signature, **(CONTRACTED if name in _OF_LANES else OPTIONS))(
+            getattr(functions[name], "py_func", functions[name])
+        )
+        if name in functions
+        else None
+        for name, signature in _SIGNATURES.items()
+    )
 
 
-def linked(theta: NDArray[np.float64], links: NDArray[np.int64], facts: NDArray[np.float64]) -> NDArray[np.float64]:
+def linked(theta: NDArray[np.float64], links: tuple[Any, ...], facts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Put the facts that a driver needs to know, and the addresses, before the parameters."""
-    return np.concatenate([[1.0 + len(facts) + len(links)], facts, links.view(np.float64), theta])
+    addresses = np.array([0 if link is None else link.address for link in links], dtype=np.int64)
+    return np.concatenate([[1.0 + len(facts) + len(links)], facts, addresses.view(np.float64), theta])
 
 
 def _call(name: str, parameters: int) -> tuple[Any, Any]:
@@ -51,13 +55,12 @@ def _call(name: str, parameters: int) -> tuple[Any, Any]:
     signature, place = _SIGNATURES[name], list(_SIGNATURES).index(name) - LINKS
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = context.call_conv.get_function_type(signature.return_type, signature.args)
+        returned = ir.VoidType() if signature.return_type == types.void else ir.DoubleType()
+        kind = ir.FunctionType(returned, [argument.type for argument in arguments])
         slot = builder.gep(arguments[parameters], [ir.Constant(ir.IntType(64), place)])
         function = builder.load(builder.bitcast(slot, ir.PointerType(ir.PointerType(kind))))
-        _, result = context.call_conv.call_function(
-            builder, function, signature.return_type, signature.args, arguments
-        )  # these functions raise nothing
-        return result
+        result = builder.call(function, arguments)
+        return context.get_dummy_value() if signature.return_type == types.void else result
 
     return signature, generate
 

@@ -28,8 +28,7 @@ _JUMPING: Mapping[Flow, float] = {
     Flow.HAMILTONIAN: MOMENTA,
     Flow.HAMILTONIAN_VARIATIONAL: EXTREMALS,
 }
-_CROSSINGS = ("crossing_linear", "grazing", "crossing_momenta", "crossing_extremals", "crossing")
-CONTACT = ("settling", *_CROSSINGS, "landing", "contact")
+CONTACT = ("crossing", "landing", "contact")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,4 +123,4 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "order8", "extrapolation", "attempts", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "order8", "attempts", "sections")

@@ -201,10 +201,3 @@ def normal_pair(state: _Words, lane: int) -> tuple[float, float]:
     state[2, lane] = s2
     state[3, lane] = s3
     return _normals(radius_word, angle_word)
-
-
-@njit(nogil=True, cache=True)
-def normal_pairs(state: _Words, first: NDArray[np.float64], second: NDArray[np.float64]) -> None:
-    """Draw two independent standard normals for every lane; a loop over a fixed number of lanes is faster."""
-    for lane in range(state.shape[1]):
-        first[lane], second[lane] = normal_pair(state, lane)

@@ -1,4 +1,8 @@
-"""Templates: the functions of steppers, as text that generated modules are pasted from."""
+"""Templates: the functions of steppers, as text that generated modules are pasted from.
+
+A template uses names that it does not import: those of templates pasted above it, in the order of `Stepper.templates`,
+and those of the constants above all, which `Stepper.driver_part` writes.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +12,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _TEMPLATES = Path(__file__).parent / "templates"
-_MARKER = "# --- scene above, stepper below ---\n"
 
 
 def read_template(name: str) -> str:
-    """Read a template; what it imports from the sample scene and other templates is left out, for it stands above."""
-    head, body = (_TEMPLATES / f"{name}.py").read_text(encoding="utf-8").split(_MARKER, 1)
-    imports = [node for node in ast.parse(head).body if isinstance(node, ast.Import | ast.ImportFrom)]
-    kept = [node for node in imports if ".templates" not in (getattr(node, "module", None) or "")]
-    return "\n".join([*(ast.unparse(node) for node in kept), body.strip("\n"), ""])
+    """Read a template without its docstring."""
+    text = (_TEMPLATES / f"{name}.py").read_text(encoding="utf-8")
+    return "\n".join(text.split("\n")[ast.parse(text).body[0].end_lineno :])
 
 
 def with_needed_imports(text: str) -> str:

@@ -59,7 +59,7 @@ class FlightWriter:
         for other in others:
             text = f"max({text}, {other})"
         lines = [*unpack(bounds, places), f"    return {text}", ""]
-        return "\n".join(["@njit(**LINKED)", "def flight_rate(theta):", *lines])
+        return "\n".join(["def flight_rate(theta):", *lines])
 
     def _taylor(self, places: dict[sympy.Symbol, int]) -> str:
         printer = SourcePrinter()
@@ -78,7 +78,7 @@ class FlightWriter:
             lines.append(f"        even{index}, odd{index} = {step}")
         for row, polynomial in enumerate(self.polynomials):
             lines += self._row(row, polynomial, printer)
-        return "\n".join(["@njit(**LINKED)", "def taylor(t, z, theta, series):", *lines, ""])
+        return "\n".join(["def taylor(t, z, theta, series):", *lines, ""])
 
     def _row(self, row: int, polynomial: sympy.Poly, printer: SourcePrinter) -> list[str]:
         lines, terms = [], []

@@ -33,8 +33,8 @@ from math import erf, erfc, exp, log, sin, sinh, sqrt, tan, tanh
 import numpy as np
 from numba import njit
 
-from vibrokit.kernels.options import INLINED, INLINED_AND_CALLED, INNER, LINKED, LINKED_LANES, OPTIONS
-from vibrokit.kernels.registers import keep_apart
+from vibrokit.kernels.options import INLINED, INLINED_AND_CALLED, OPTIONS
+from vibrokit.kernels.intrinsics import keep_apart, promise_no_overlap, use_widest_registers
 '''
 
 

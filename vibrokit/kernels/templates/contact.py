@@ -8,57 +8,11 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.cubic import summit
+from vibrokit.kernels.intrinsics import offset_by
 from vibrokit.kernels.jumps import EXTREMALS
 from vibrokit.kernels.links import law, rhs
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
-from vibrokit.kernels.templates.crossing import cross
-from vibrokit.kernels.templates.crossing_extremals import turn_law
-from vibrokit.kernels.templates.landing import DEPTH_GOAL, LAW_GOAL, depth_at, land
-from vibrokit.kernels.templates.scene import COURSE, ERROR, FACTOR, LANES, LENGTH, ROOT, ROW, SIGMA, STATE, TRIAL
-from vibrokit.kernels.templates.settling import push_of
-from vibrokit.kernels.templates.steps import (
-    AIM,
-    CLOCK,
-    CONTACT_STEP,
-    DEEP,
-    END,
-    EPSILON,
-    FIRST,
-    FIRST_STEP,
-    FLIPS,
-    LAST,
-    PULLED,
-    RELEASES,
-    ROOT_DEPTH,
-    ROOT_TIME,
-    SINCE,
-    SPAN,
-    STEPS,
-    TASK,
-    TIME,
-    TIMED,
-    TOUCHED,
-    UNDERWAY,
-    accept,
-    ask,
-    face,
-    is_clamped,
-    of,
-    plan,
-    power_of,
-    put,
-    root_of,
-    shortened,
-    side_of,
-    size_of,
-    stop,
-    take,
-    what_jumps,
-)
-
-# --- scene above, stepper below ---
 
 # Parts of the expected length that steps were observed to need at tolerances of 1e-4 to 1e-10, with Hertz and linear
 # stops of 50 to 1e6: the second step of a contact, and the first in the root of the depth, which begins near the turn

@@ -18,14 +18,11 @@ it was cut.
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.intrinsics import offset_by, pointer_to, use_widest_registers
 from vibrokit.kernels.links import step_lanes, tabulate
 from vibrokit.kernels.options import CONTRACTED, INNER_LANES
-from vibrokit.kernels.pointers import offset_by, pointer_to
-from vibrokit.kernels.registers import use_widest_registers
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, left_in_step, stop_status
 from vibrokit.kernels.streams import normal_pair
-
-# --- scene above, stepper below ---
 
 # Facts, before the parameters of a scene: lanes of a block, and whether the forcing depends on time.
 LANES, FORCED = 1, 2

@@ -7,31 +7,10 @@ as bounds on the second and third derivative exclude a zero.
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.intrinsics import offset_by
 from vibrokit.kernels.links import flight_rate, taylor
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.pointers import offset_by
 from vibrokit.kernels.stopping import COMPLETED, STALLED
-from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
-from vibrokit.kernels.templates.landing import landed
-from vibrokit.kernels.templates.scene import ORDER, STATE, STOPS, TERMS
-from vibrokit.kernels.templates.steps import (
-    CLOCK,
-    COUNT,
-    END,
-    EPSILON,
-    SERIES,
-    STEPS,
-    TASK,
-    UNDERWAY,
-    barriers,
-    put,
-    side_of,
-    size_of,
-    stop,
-    take,
-)
-
-# --- scene above, stepper below ---
 
 # The task of a flight that goes on after the next attempt; steps from one such pause to the next.
 FLIES, PAUSE = 5.0, 1024.0

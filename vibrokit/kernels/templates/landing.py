@@ -3,34 +3,9 @@
 from numba import njit
 
 from vibrokit.kernels.cubic import crossing
+from vibrokit.kernels.intrinsics import offset_by
 from vibrokit.kernels.links import rhs
 from vibrokit.kernels.options import INNER
-from vibrokit.kernels.pointers import offset_by
-from vibrokit.kernels.templates.scene import COURSE, LENGTH, ROW, STATE, TRIAL
-from vibrokit.kernels.templates.settling import push_of
-from vibrokit.kernels.templates.steps import (
-    AIM,
-    CLOCK,
-    EPSILON,
-    GOAL,
-    HIGH,
-    LOW,
-    RISING,
-    SHORTER,
-    TASK,
-    TIME,
-    TRIES,
-    VALUE,
-    WHOLE,
-    of,
-    put,
-    side_of,
-    size_of,
-    stop,
-    take,
-)
-
-# --- scene above, stepper below ---
 
 DEPTH_GOAL, RATE_GOAL, LAW_GOAL = 0.0, 1.0, 2.0
 

@@ -6,38 +6,6 @@ from numba import njit
 from vibrokit.kernels.cubic import summit
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
-from vibrokit.kernels.templates.contact import conclude_landing, judge_contact, meet
-from vibrokit.kernels.templates.landing import DEPTH_GOAL, RATE_GOAL, depth_at, land, landed
-from vibrokit.kernels.templates.scene import ERROR, FACTOR, LANES, LENGTH, ROW, SLOPES, STATE, STOPS, TRIAL
-from vibrokit.kernels.templates.steps import (
-    AIM,
-    CLOCK,
-    END,
-    EPSILON,
-    FIRST,
-    FLIPS,
-    FREE_STEP,
-    LAST,
-    SPAN,
-    STEPS,
-    TAKEN,
-    TASK,
-    TIME,
-    TOUCHED,
-    TOUCHES,
-    TURNS,
-    UNDERWAY,
-    WHOLE,
-    accept,
-    ask,
-    barriers,
-    of,
-    plan,
-    shortened,
-    side_of,
-)
-
-# --- scene above, stepper below ---
 
 
 @njit(**INNER)

@@ -7,40 +7,10 @@ trajectory has the same bits wherever it was cut.
 import numpy as np
 from numba import njit
 
+from vibrokit.kernels.intrinsics import offset_by, pointer_to
 from vibrokit.kernels.links import LINKS
 from vibrokit.kernels.options import INNER, OPTIONS
-from vibrokit.kernels.pointers import offset_by, pointer_to
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, stop_status, turned_outside
-from vibrokit.kernels.templates.attempts import attempt, misfit
-from vibrokit.kernels.templates.contact import press
-from vibrokit.kernels.templates.order8 import fly, judge
-from vibrokit.kernels.templates.scene import LANES, NUMBERS, ROW, STATE, STOPS
-from vibrokit.kernels.templates.settling import settle
-from vibrokit.kernels.templates.steps import (
-    CLOCK,
-    CONTACT_STEP,
-    COUNT,
-    DEEP,
-    END,
-    FIRST_STEP,
-    FREE_STEP,
-    MEMORIES,
-    MEMORY,
-    ROOM,
-    SIZE,
-    SPAN,
-    TIMED,
-    TOUCHED,
-    UNDERWAY,
-    WORK,
-    barriers,
-    face,
-    of,
-    put,
-    size_of,
-)
-
-# --- scene above, stepper below ---
 
 
 @njit(**INNER)

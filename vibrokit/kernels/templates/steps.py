@@ -15,28 +15,6 @@ from numba import njit
 from vibrokit.kernels.links import LINKS
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import STALLED
-from vibrokit.kernels.templates.scene import (
-    CLOCK,
-    COURSE,
-    DEPTH,
-    FACTOR,
-    GRAIN,
-    LANES,
-    LENGTH,
-    NUMBERS,
-    PUSHES,
-    ROOT,
-    ROW,
-    SIDE,
-    SIGMA,
-    STATE,
-    STOPS,
-    TERMS,
-    TRIAL,
-    WALL,
-)
-
-# --- scene above, stepper below ---
 
 # Numba compiles a function again for each integer constant that it is called with, so these are no integers.
 TIME, ROOT_TIME, ROOT_DEPTH = 0.0, 1.0, 2.0
