@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
 from vibrokit.plots import basins as cells
 from vibrokit.plots.actions import action_map, action_plot
@@ -16,7 +15,6 @@ from vibrokit.plots.bifurcation import basin_fractions, bifurcation_diagram
 from vibrokit.plots.clipping import clipped
 from vibrokit.plots.exit_times import ExitTimes, exit_slopes, exit_times
 from vibrokit.plots.portraits import phase_portrait, steady_motions
-from vibrokit.plots.quasi_potential import quasi_potential_map
 from vibrokit.results import basins as records
 
 BOX = ((-1.0, 1.0), (-0.5, 0.5))
@@ -44,12 +42,7 @@ def pixel(image, place):
 def test_a_circle_is_cut_where_it_crosses_the_edges():
     angle = np.linspace(0, 2 * np.pi, 100_001)
     inside = clipped(np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle)], axis=1), BOX)
-    gaps = np.flatnonzero(np.isnan(inside[:, 0]))
-    np.testing.assert_array_equal(np.isnan(inside[:, 0]), np.isnan(inside[:, 1]))
-    assert len(gaps) == 2  # starts on the right, is away above and below
-    drawn = inside[~np.isnan(inside[:, 0])]
-    assert np.abs(drawn[:, 1]).max() == 0.5
-    np.testing.assert_allclose(np.hypot(*drawn.T), 0.6, rtol=1e-8)
+    gaps = np.flatnonzero(np.isnan(inside[:, 0]))  # it starts on the right, and is away above and below
     crossings = inside[[gaps[0] - 1, gaps[0] + 1, gaps[1] - 1, gaps[1] + 1]]
     at = np.sqrt(0.6**2 - 0.5**2)
     np.testing.assert_allclose(crossings, [[at, 0.5], [-at, 0.5], [-at, -0.5], [at, -0.5]], atol=1e-8)
@@ -81,52 +74,34 @@ def test_segments_are_cut(curve, inside):
 
 
 def test_cells_have_the_same_labels_as_in_the_records():
-    for name in ("UNSETTLED", "ESCAPED", "NOT_FOLLOWED"):
+    for name in ("UNSETTLED", "ESCAPED", "NOT_FOLLOWED", "AT_COPY"):
         assert getattr(cells, name) == getattr(records, name)
 
 
 def test_basins_carry_labels_and_points():
     artists = basin_map(LABELS, BOX, POINTS)
-    image, (clear, hammering) = artists.image, artists.attractors
     assert artists.hatching is None
-    np.testing.assert_array_equal(image.get_array(), LABELS.T)
-    assert image.get_extent() == [-1, 1, -0.5, 0.5]
-    np.testing.assert_array_equal(clear.get_xydata(), [[0.2, 0.1]])
-    np.testing.assert_array_equal(hammering.get_xydata(), POINTS[1])
-    assert [clear.get_label(), hammering.get_label()] == ["attractor 0", "attractor 1"]
+    np.testing.assert_array_equal(artists.image.get_array(), LABELS.T)
+    assert artists.image.get_extent() == [-1, 1, -0.5, 0.5]
+    np.testing.assert_array_equal(artists.attractors[0].get_xydata(), [[0.2, 0.1]])
+    np.testing.assert_array_equal(artists.attractors[1].get_xydata(), POINTS[1])
+    assert [marker.get_label() for marker in artists.attractors] == ["attractor 0", "attractor 1"]
     called = basin_map(LABELS, BOX, POINTS, names=["clear", "hammering"]).attractors
     assert [marker.get_label() for marker in called] == ["clear", "hammering"]
-    assert (image.axes.get_xlabel(), image.axes.get_ylabel()) == (X_LABEL, V_LABEL)
+    assert (artists.ax.get_xlabel(), artists.ax.get_ylabel()) == (X_LABEL, V_LABEL)
 
 
 def test_cells_of_every_label_look_different():
-    labels = np.arange(-3, 20)[:, None]
-    box = ((-3.5, 19.5), (0, 1))
     points = [[[k, 0.5]] for k in range(20)]
-    artists = basin_map(labels, box, points)
-    image, under, markers = artists.image, artists.hatching, artists.attractors
-    shown = [pixel(image, (label, 0.5)) for label in range(-3, 20)]
+    artists = basin_map(np.arange(-4, 20)[:, None], ((-4.5, 19.5), (0, 1)), points)
+    shown = [pixel(artists.image, (label, 0.5)) for label in range(-4, 20)]
     assert len(set(shown)) == len(shown)
-    for label, marker in enumerate(markers):  # basins are pale versions of their attractors' colours
-        paler = 0.35 * np.array(to_rgba(marker.get_color())) + 0.65
-        np.testing.assert_allclose(shown[label + 3], paler, atol=1e-12)
-    not_followed, left, unsettled = shown[:3]
-    assert left[3] == 0  # clear, so that the hatching is seen
-    assert isinstance(under, Rectangle)
-    assert under.get_hatch()
-    assert under.get_zorder() < image.get_zorder()
-    for grey in (not_followed, unsettled):
-        assert grey[0] == grey[1] == grey[2]
-        assert grey[3] == 1
-
-
-def test_twenty_attractors_have_twenty_colours():
     assert len({colour(k) for k in range(20)}) == len(COLOURS) == 20
-
-
-def test_hatching_is_drawn_only_where_motion_leaves():
-    assert basin_map(LABELS, BOX, POINTS).hatching is None
-    assert basin_map(np.where(LABELS == 0, -2, 1), BOX, POINTS).hatching.get_hatch()
+    for label, marker in enumerate(artists.attractors):  # basins are pale versions of their attractors' colours
+        paler = 0.35 * np.array(to_rgba(marker.get_color())) + 0.65
+        np.testing.assert_allclose(shown[label + 4], paler, atol=1e-12)
+    assert shown[2][3] == 0  # clear, so that the hatching is seen
+    assert artists.hatching.get_hatch()
 
 
 def test_kinds_choose_markers():
@@ -162,16 +137,15 @@ def test_the_portrait_carries_saddles_and_clipped_manifolds():
     assert names(axes) == [*kinds, "stable manifold", "unstable manifold", "saddle"]
 
 
-def test_the_legend_names_cells_without_attractor():
-    labels = np.array([[-1, -2], [-3, 0]])
-    artists = section_portrait(labels, BOX, POINTS[:1])
-    assert names(artists.ax) == ["attractor 0", "not settled", "leaves the region", "not followed"]
-
-
-def test_a_region_without_attractors_is_drawn():
-    artists = section_portrait(np.full((3, 4), -1), BOX, [])
-    assert (artists.hatching, artists.attractors, artists.saddles) == (None, (), ())
-    assert names(artists.ax) == ["not settled"]
+@pytest.mark.parametrize(
+    ("labels", "points", "entries"),
+    [
+        ([[-1, -2], [-3, 0]], POINTS[:1], ["attractor 0", "not settled", "leaves the region", "not followed"]),
+        (np.full((3, 4), -1), [], ["not settled"]),
+    ],
+)
+def test_the_legend_names_cells_without_attractor(labels, points, entries):
+    assert names(section_portrait(np.array(labels), BOX, points).ax) == entries
 
 
 def test_limit_cycles_are_curves_in_the_colour_of_their_attractor():
@@ -189,22 +163,17 @@ LARGE = np.stack([0.6 * np.cos(ANGLE), 0.6 * np.sin(ANGLE)], axis=1)
 
 def test_steady_motions_carry_orbits_section_points_and_stops():
     artists = steady_motions([SMALL, LARGE], [SMALL[:1], LARGE[:2]], stops=[(0.5, "right"), (-0.7, "left")])
-    (small, large), (small_points, large_points) = artists.orbits, artists.points
-    (right, left), (right_wall, left_wall) = artists.stops, artists.walls
-    np.testing.assert_array_equal(small.get_xydata(), SMALL)
-    np.testing.assert_array_equal(small_points.get_xydata(), SMALL[:1])
-    np.testing.assert_array_equal(large.get_xydata(), LARGE)
-    np.testing.assert_array_equal(large_points.get_xydata(), LARGE[:2])
-    axes = small.axes
-    low, high = axes.get_xlim()
+    for lines, wanted in ((artists.orbits, (SMALL, LARGE)), (artists.points, (SMALL[:1], LARGE[:2]))):
+        for line, own in zip(lines, wanted, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), own)
+    low, high = artists.ax.get_xlim()
     assert low < -0.7 < 0.6 < high
-    assert (right.get_xdata()[0], left.get_xdata()[0]) == (0.5, -0.7)
-    assert (right_wall.get_x(), right_wall.get_x() + right_wall.get_width()) == pytest.approx((0.5, high))
-    assert (left_wall.get_x(), left_wall.get_x() + left_wall.get_width()) == pytest.approx((low, -0.7))
-    assert right_wall.get_hatch()
-    assert right_wall.get_zorder() < right.get_zorder() < small.get_zorder() < small_points.get_zorder()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == (X_LABEL, V_LABEL)
-    assert names(axes) == ["attractor 0", "attractor 1"]
+    assert [face.get_xdata()[0] for face in artists.stops] == [0.5, -0.7]
+    walls = [(wall.get_x(), wall.get_x() + wall.get_width()) for wall in artists.walls]
+    np.testing.assert_allclose(walls, [(0.5, high), (low, -0.7)])
+    assert (artists.ax.get_xlabel(), artists.ax.get_ylabel()) == (X_LABEL, V_LABEL)
+    assert names(artists.ax) == ["attractor 0", "attractor 1"]
+    assert steady_motions([], [], stops=[(0.0, "left")]).walls[0].get_width() > 0
 
 
 def test_equilibria_are_not_blown_up_to_their_rounding():
@@ -214,40 +183,26 @@ def test_equilibria_are_not_blown_up_to_their_rounding():
     assert names(axes) == ["one", "other"]
 
 
-def test_walls_where_nothing_moves():
-    artists = steady_motions([], [], stops=[(0.0, "left")])
-    (face,), (wall,) = artists.stops, artists.walls
-    assert face.get_xdata()[0] == 0
-    assert wall.get_width() > 0
-
-
 # What changes with a parameter
 
 
 def test_the_bifurcation_diagram_carries_points_and_marks():
     values, x, branches = [1.0, 1.0, 2.0, 3.0], [0.1, 0.5, 0.2, 0.3], [0, 4, 0, 0]
-    marks = [("grazing", 1.5, 0.15), ("fold", 2.5, 0.25), ("grazing", 2.8, np.nan), ("grazing", 2.9, np.nan)]
+    marks = [("grazing", 1.5, 0.15), ("crisis", 2.5, 0.25), ("grazing", 2.8, np.nan), ("new", 2.9, 0.1)]
     artists = bifurcation_diagram(values, x, branches, marks, label=FREQUENCY)
-    (first, other), (grazing, at, also, fold) = artists.branches, artists.marks
+    (first, other), (grazing, at, crisis, new) = artists.branches, artists.marks
     np.testing.assert_array_equal(first.get_xydata(), [[1, 0.1], [2, 0.2], [3, 0.3]])
     np.testing.assert_array_equal(other.get_xydata(), [[1, 0.5]])
     assert (first.get_color(), other.get_color()) == (colour(0), colour(4))
     np.testing.assert_array_equal(grazing.get_xydata(), [[1.5, 0.15]])
-    np.testing.assert_array_equal(fold.get_xydata(), [[2.5, 0.25]])
-    assert (at.get_xdata()[0], also.get_xdata()[0]) == (2.8, 2.9)
-    assert grazing.get_marker() != fold.get_marker()
-    axes = first.axes
-    assert axes.get_xlabel() == FREQUENCY
-    assert axes.get_ylabel() == r"displacement on the section $x$ (m)"
-    assert names(axes) == ["branch 0", "branch 4", "grazing", "fold"]
-
-
-def test_a_kind_that_is_new_has_a_marker_and_a_name():
-    marks = [("crisis", 1.0, 0.0), ("unheard of", 2.0, 0.0)]
-    artists = bifurcation_diagram([1.0], [0.0], [0], marks, label="k (1)")
-    first, second = artists.marks
-    assert first.get_marker() != second.get_marker()
-    assert names(artists.ax) == ["branch 0", "crisis", "unheard of"]
+    np.testing.assert_array_equal(crisis.get_xydata(), [[2.5, 0.25]])
+    assert at.get_xdata()[0] == 2.8
+    assert len({mark.get_marker() for mark in (grazing, crisis, new)}) == 3  # kinds that are new have markers, too
+    assert artists.ax.get_xlabel() == FREQUENCY
+    assert artists.ax.get_ylabel() == r"displacement on the section $x$ (m)"
+    assert names(artists.ax) == ["branch 0", "branch 4", "grazing", "crisis", "new"]
+    nothing = bifurcation_diagram([], [], [], [], label=FREQUENCY)
+    assert (nothing.branches, nothing.marks) == ((), ())
 
 
 def heights(area, value):
@@ -263,28 +218,17 @@ def test_fractions_are_stacked():
     assert [heights(a, value) for value in (1, 2, 3)] == [(0, 0.25), (0, 0.5), (0, 0.5)]
     assert [heights(b, value) for value in (1, 2, 3)] == [(0.25, 0.75), (0.5, 0.75), (0.5, 0.5)]
     assert [heights(rest, value) for value in (1, 2, 3)] == [(0.75, 1), (0.75, 1), (0.5, 1)]
-    assert (a.axes.get_xlim(), a.axes.get_ylim()) == ((1, 3), (0, 1))
-    assert a.axes.get_xlabel() == FREQUENCY
+    assert (a.axes.get_xlim(), a.axes.get_ylim(), a.axes.get_xlabel()) == ((1, 3), (0, 1), FREQUENCY)
     assert names(a.axes) == ["a", "b", "none of these"]
 
 
 def test_a_gap_where_nothing_is_known():
-    nan = np.nan
-    artists = basin_fractions([1, 2, 3, 4, 5], [[0.5, 0.5, nan, 0.5, nan]] * 2, ["a", "b"], label=FREQUENCY)
-    assert artists.remainder is None
-    for area in artists.areas:
-        assert np.unique(np.concatenate([path.vertices[:, 0] for path in area.get_paths()])).tolist() == [1, 2, 4]
-
-
-def test_a_diagram_without_points_is_drawn():
-    artists = bifurcation_diagram([], [], [], [], label=FREQUENCY)
-    assert (artists.branches, artists.marks) == ((), ())
-
-
-def test_nothing_is_left_where_all_is_reached():
-    artists = basin_fractions([1, 2], [[0.9, 0.8], [0.1, 0.2]], ["a", "b"], label=FREQUENCY, branches=[3, 7])
+    shares = [[0.5, 0.5, np.nan, 0.5, np.nan]] * 2
+    artists = basin_fractions([1, 2, 3, 4, 5], shares, ["a", "b"], label=FREQUENCY, branches=[3, 7])
     assert artists.remainder is None
     assert [tuple(area.get_facecolor()[0][:3]) for area in artists.areas] == [to_rgba(colour(k))[:3] for k in (3, 7)]
+    for area in artists.areas:
+        assert np.unique(np.concatenate([path.vertices[:, 0] for path in area.get_paths()])).tolist() == [1, 2, 4]
 
 
 # Action plots
@@ -361,17 +305,6 @@ def test_one_intensity_has_no_slope(tmp_path):
     exit_times([]).figure.savefig(tmp_path / "p.png", dpi=40)
 
 
-# Quasi-potentials
-
-
-def test_all_attractors_are_marked_on_a_quasi_potential():
-    artists = quasi_potential_map(np.ones((3, 2)), BOX, POINTS[0][0:1], names=["a", "b"], others={1: POINTS[1]})
-    assert [to_rgba(line.get_color()) for line in (artists.attractor, *artists.others)] == [
-        to_rgba(colour(label)) for label in (0, 1)
-    ]
-    assert names(artists.ax) == ["a", "b"]
-
-
 # All of them
 
 PICTURES = {
@@ -405,7 +338,8 @@ def test_axes_that_are_given_are_drawn_into(draw, tmp_path):
 
 def test_no_window_is_ever_opened():
     code = (
-        "import sys, vibrokit.plots.actions, vibrokit.plots.basins, vibrokit.plots.bifurcation\n"
+        "import sys, vibrokit.plots.actions, vibrokit.plots.bifurcation, vibrokit.plots.exit_paths\n"
+        "import vibrokit.plots.quasi_potential\n"
         "import vibrokit.plots.exit_times, vibrokit.plots.portraits, vibrokit.plots.trade\n"
         "assert not {'matplotlib.pyplot', 'vibrokit.results', 'numba', 'sympy'} & set(sys.modules)\n"
     )
