@@ -3,38 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
+from vibrokit.results.table import documented
 
 Array = NDArray[np.float64]
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Cycle:
     """An attractor, or a group of attractors among which the motion cycles, and how it is left.
 
-    Attributes
-    ----------
-    members : tuple of int
-        Labels of the attractors.
-    source, target : int
-        Labels of the member from which it is left, and of the attractor that is reached.
-    energy : float
-        The mean time until then grows like exp(energy/D) (m² s⁻³).
-    lower, upper : float
-        Bounds of the energy, from those of the activation energies.
+    The mean time until then grows like exp(energy/D).
     """
 
-    members: tuple[int, ...]
-    source: int
-    target: int
-    energy: float
-    lower: float
-    upper: float
+    members: Annotated[tuple[int, ...], "labels of the attractors"]
+    source: Annotated[int, "label of the member from which it is left"]
+    target: Annotated[int, "label of the attractor that is reached"]
+    energy: Annotated[float, "energy", "m2 s-3"]
+    lower: Annotated[float, "lower bound of the energy, from those of the activation energies", "m2 s-3"]
+    upper: Annotated[float, "upper bound of the energy", "m2 s-3"]
 
 
 def cycle_hierarchy(energies: Array, lower: Array, upper: Array) -> tuple[Cycle, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from scipy.special import logsumexp
 from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.table import documented
 
 _SAME = 1e-9  # relative: intensities that differ by less are one
 _FARTHEST = 30.0  # in ln D, from a computed intensity: twelve decades, farther than any noise is from it
@@ -23,51 +25,30 @@ _STEP = 0.1  # in ln D, of a search for an intensity: ln τ is smooth over 10 %
 Array = NDArray[np.float64]
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class LogTime:
-    """ln of a mean time at one noise intensity.
+    """ln of a mean time in s at one noise intensity."""
 
-    Attributes
-    ----------
-    value, lower, upper : float
-        ln τ, τ in s, and its 95 % interval.
-    intensity : float
-        D (m² s⁻³).
-    methods : tuple of str
-        The method that gives the value, then those whose contradicting intervals are included.
-    extrapolated : bool
-        Whether D lies outside the intensities at which rates were computed.
-    """
-
-    value: float
-    lower: float
-    upper: float
-    intensity: float
-    methods: tuple[str, ...]
-    extrapolated: bool
+    value: Annotated[float, "ln τ"]
+    lower: Annotated[float, "lower end of its 95 % interval"]
+    upper: Annotated[float, "upper end of its 95 % interval"]
+    intensity: Annotated[float, "noise intensity D", "m2 s-3"]
+    methods: Annotated[tuple[str, ...], "the method that gives it, then those that contradict it and are included"]
+    extrapolated: Annotated[bool, "whether D lies outside the intensities at which rates were computed"]
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeanTimes:
-    """ln of the mean time of one exit, or of leaving a state at all, by one method at several noise intensities.
+    """ln of the mean time of one exit, or of leaving a state at all, by one method at several noise intensities."""
 
-    Attributes
-    ----------
-    method : str
-    event : str
-        What counts as an exit, as in `ExitRate`.
-    intensities : array (count,)
-        D (m² s⁻³), descending.
-    log_times, lower, upper : array (count,)
-        ln τ, τ in s, and 95 % intervals.
-    """
-
-    method: str
-    event: str
-    intensities: Array
-    log_times: Array
-    lower: Array
-    upper: Array
+    method: Annotated[str, "method"]
+    event: Annotated[str, "what counts as an exit, as in `ExitRate`"]
+    intensities: Annotated[Array, "noise intensities D (m² s⁻³), descending"]
+    log_times: Annotated[Array, "ln τ, τ in s"]
+    lower: Annotated[Array, "lower ends of 95 % intervals"]
+    upper: Annotated[Array, "upper ends of 95 % intervals"]
 
     @classmethod
     def of(cls, rates: Iterable[ExitRate], method: str) -> MeanTimes:

@@ -101,28 +101,15 @@ def _cell(share: float, lower: float, upper: float, state: str, name: str) -> st
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Balance:
-    """The balance of rates between attractors at one intensity.
-
-    Attributes
-    ----------
-    names : tuple of str
-    log_rates, lower, upper : array (count, count)
-        ln of the rates (s⁻¹) from row to column, and their bounds; −∞ where no rate is known.
-    relaxations : array (count,)
-        Relaxation times of the attractors (s).
-    core_shares : array (count, count)
-        Share of the core of row that lies in the basin of column; NaN where it is not known.
-    log_escapes : array (count,)
-        ln of the rates (s⁻¹) at which the attractors are left for good; −∞ where motion does not escape.
-    """
+    """The balance of rates between attractors at one intensity; those from row to column, in s⁻¹."""
 
     names: tuple[str, ...]
-    log_rates: Array
-    lower: Array
+    log_rates: Array  # ln of the rates; −∞ where none is known
+    lower: Array  # their bounds
     upper: Array
-    relaxations: Array
-    core_shares: Array
-    log_escapes: Array
+    relaxations: Array  # relaxation times of the attractors (s)
+    core_shares: Array  # share of the core of row that lies in the basin of column; NaN where it is not known
+    log_escapes: Array  # ln of the rates at which the attractors are left for good; −∞ where motion does not escape
 
     @cached_property
     def held(self) -> Mask:

@@ -22,25 +22,13 @@ _LEAST_ERROR = 1e-9  # relative: the effect of rounding
 
 @dataclasses.dataclass(frozen=True)
 class Side:
-    """The numbers of one method for one exit or state.
-
-    Attributes
-    ----------
-    method : str
-    energy : Quantity or None
-    series : tuple of Quantity
-        Mean times over D, or shares over D.
-    exit : tuple of str
-        What counts as leaving. Energies can be compared if the first entries are equal, times if both are.
-    remedy : str
-        The setting that refines the method.
-    """
+    """The numbers of one method for one exit or state."""
 
     method: str
     energy: Quantity | None
-    series: tuple[Quantity, ...]
-    exit: tuple[str, str]
-    remedy: str
+    series: tuple[Quantity, ...]  # mean times over D, or shares over D
+    exit: tuple[str, str]  # what counts as leaving: energies need equal first entries, times need both equal
+    remedy: str  # the setting that refines the method
 
 
 Sides = tuple[Side, Side]

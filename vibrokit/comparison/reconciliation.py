@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import xarray
 
@@ -32,28 +32,15 @@ _NAMES = Table("attractor", _OF_ATTRACTORS, index="label")
 
 
 class Reconciliation(Record):
-    """The numbers of several results for each exit, and verdicts on each pair of them.
-
-    Attributes
-    ----------
-    attractors : tuple of str
-        Names of the attractors, in the order of their labels.
-    methods : tuple of str
-        Names of the results that were compared, in their order.
-    quantities : tuple of Quantity
-    verdicts : tuple of Verdict
-        For each pair of results and each exit that one of them knows; for each pair and state with occupancies.
-    level : float
-        Probability of a false alarm in each verdict, if all errors are normal and as stated.
-    """
+    """The numbers of several results for each exit, and verdicts on each pair of them."""
 
     kind: ClassVar[str] = "reconciliation"
 
-    attractors: tuple[str, ...]
-    methods: tuple[str, ...]
-    quantities: tuple[Quantity, ...]
-    verdicts: tuple[Verdict, ...]
-    level: float
+    attractors: Annotated[tuple[str, ...], "names of the attractors, in the order of their labels"]
+    methods: Annotated[tuple[str, ...], "names of the results that were compared, in their order"]
+    quantities: Annotated[tuple[Quantity, ...], "all numbers"]
+    verdicts: Annotated[tuple[Verdict, ...], "for each pair of results, on each exit that one knows and on each share"]
+    level: Annotated[float, "probability of a false alarm in each verdict, if all errors are normal and as stated"]
 
     @property
     def names(self) -> tuple[str, ...]:

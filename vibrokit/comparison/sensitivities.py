@@ -5,34 +5,30 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from typing import Annotated
 
 from vibrokit.arguments import members
 from vibrokit.errors import ParameterError, StructureError, nearest, shown
 from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.table import documented
 from vibrokit.text_table import number_text, text_table
 
 _INTENSITY = "noise.intensity"
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Sensitivity:
     """The effect of 1 % more of one parameter, or of several parameters together.
 
-    Attributes
-    ----------
-    parameter : str
-    energy, energy_error : float
-        Change of ΔU (%), to first order: the exponent of the power with which ΔU grows.
-    time, time_error : float
-        Change of the mean time (%) at the noise intensity D by the factor exp(ΔU/D); the change of the prefactor is
-        neglected. NaN without an intensity.
+    The mean time changes by the factor exp(ΔU/D) at the noise intensity D; the change of its prefactor is neglected.
     """
 
-    parameter: str
-    energy: float
-    energy_error: float
-    time: float
-    time_error: float
+    parameter: Annotated[str, "its path, or a name for several"]
+    energy: Annotated[float, "change of ΔU (%), to first order: the exponent of the power with which ΔU grows"]
+    energy_error: Annotated[float, "error of that change"]
+    time: Annotated[float, "change of the mean time (%); NaN without an intensity"]
+    time_error: Annotated[float, "error of that change"]
 
 
 def sensitivities(

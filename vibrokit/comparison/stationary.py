@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import xarray
@@ -20,6 +20,7 @@ from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import label_of
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
+from vibrokit.results.table import documented
 
 if TYPE_CHECKING:
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
@@ -30,6 +31,7 @@ _ABOVE = 1.3  # the quasi-potential at the highest saddle
 _LOWEST = -1e6  # in place of −inf where ln p is interpolated
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class StationaryDensity(metaclass=Constructed):
     """Stationary probabilities of all attractors and the density on the section, at finite noise.
@@ -37,30 +39,15 @@ class StationaryDensity(metaclass=Constructed):
     The exit rates W between the attractors balance: for two attractors W_12 P_1 = W_21 P_2, where W_12 is the rate from
     1 to 2. The density is the sum of the quasi-stationary ones, each with the probability of its attractor. Nothing
     waits for relaxation between basins, so that it is right also where that takes 10³⁰ periods.
-
-    Attributes
-    ----------
-    intensities : array (count,)
-        Noise intensities D (m² s⁻³), descending.
-    log_weights : array (count, attractors)
-        ln of the weight of the density of each attractor.
-    log_density : array (count, nx, nv)
-        ln p at the nodes; −inf where it is not resolved.
-    x, v : array (nx,), (nv,)
-        Nodes at equal distances.
-    section : Section
-        Attractors and saddles.
-    occupancies : xarray.DataArray
-        Probability of each metastable state with its bounds, as `vibrokit.occupancies` returns it.
     """
 
-    intensities: Array
-    log_weights: Array
-    log_density: Array
-    x: Array
-    v: Array
-    section: Section
-    occupancies: xarray.DataArray
+    intensities: Annotated[Array, "noise intensities D (m² s⁻³), descending"]
+    log_weights: Annotated[Array, "ln of the weight of the density of each attractor, shape (intensities, attractors)"]
+    log_density: Annotated[Array, "ln p at the nodes; −inf where it is not resolved, shape (intensities, nx, nv)"]
+    x: Annotated[Array, "nodes at equal distances (m)"]
+    v: Annotated[Array, "nodes at equal distances (m s⁻¹)"]
+    section: Annotated[Section, "attractors and saddles"]
+    occupancies: Annotated[xarray.DataArray, "probability of each metastable state, as of `vibrokit.occupancies`"]
 
     @classmethod
     @called

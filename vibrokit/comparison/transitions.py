@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from vibrokit.construction import Constructed, called
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import exit_between, label_of
 from vibrokit.results.result import Result
+from vibrokit.results.table import documented
 from vibrokit.text_table import text_table
 
 Array = NDArray[np.float64]
@@ -25,31 +27,20 @@ Array = NDArray[np.float64]
 _ROUNDING = 1e-12  # of sums of energies
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class StationaryWeights:
     """Exponents of the shares of time spent at each attractor in the long run, at one noise intensity.
 
     A share is exp(−w/D) times a prefactor. The activation energies do not determine the prefactor, which may be many
     powers of ten, so that no share follows from them; `vibrokit.occupancies` has shares, from rates.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the attractors, in the order of their labels.
-    intensity : float
-        Noise intensity D (m² s⁻³).
-    exponents : array (count,)
-        −w/D: ln of each share without its prefactor, 0 for the most stable; −∞ for one that is not reached, NaN where
-        they are not known.
-    lower, upper : array (count,)
-        Bounds of each, from those of the energies.
     """
 
-    names: tuple[str, ...]
-    intensity: float
-    exponents: Array
-    lower: Array
-    upper: Array
+    names: Annotated[tuple[str, ...], "names of the attractors, in the order of their labels"]
+    intensity: Annotated[float, "noise intensity D", "m2 s-3"]
+    exponents: Annotated[Array, "−w/D; 0 for the most stable, −∞ for one that is not reached, NaN where not known"]
+    lower: Annotated[Array, "lower bound of each, from those of the energies"]
+    upper: Annotated[Array, "upper bound of each"]
 
     def __str__(self) -> str:
         if np.isnan(self.exponents).any():

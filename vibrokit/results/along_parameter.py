@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.record import Record
@@ -14,21 +14,11 @@ _TEXTS = ("parameter", "symbol", "unit")
 
 
 class AlongParameter(Record, ABC):
-    """What was found along values of one parameter. Abstract.
+    """What was found along values of one parameter. Abstract."""
 
-    Attributes
-    ----------
-    parameter : str
-        Path of the parameter, as in ``osc.parameters``; that of the first if several are tied.
-    symbol : str
-        Its letter, as SymPy writes it.
-    unit : str or None
-        In SI base units.
-    """
-
-    parameter: str
-    symbol: str
-    unit: str | None
+    parameter: Annotated[str, "path of the parameter, as in ``osc.parameters``; of the first if several are tied"]
+    symbol: Annotated[str, "its letter, as SymPy writes it"]
+    unit: Annotated[str | None, "its unit in SI base units"]
 
     @property
     def factors(self) -> dict[str, float]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.table import documented
 
 ENOUGH = 3
 """Noise intensities, at least, that show how a prefactor depends on D, so that an energy has bounds."""
@@ -20,43 +22,29 @@ _DEVIATIONS = 1.96  # of the normal law, for intervals of 95 %
 Array = NDArray[np.float64]
 
 
+_SYSTEMATIC = (
+    "how far the slope may be from ΔU because the prefactor depends on D: what a prefactor proportional to D or 1/D "
+    "changes or, if that is more, one with the power of D that fits; infinite with two intensities"
+)
+
+
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class ArrheniusFit:
-    """A straight line through ln τ against 1/D, each point with the weight of its error.
+    """A straight line through ln τ against 1/D, each point with the weight of its error; NaN where too few are."""
 
-    Attributes
-    ----------
-    slope, slope_error : float
-        d ln τ/d(1/D) (m² s⁻³) and its standard error. It tends to ΔU as D → 0.
-    log_prefactor, log_prefactor_error : float
-        ln τ₀, τ₀ in s.
-    intensities : array (count,)
-        D (m² s⁻³), descending.
-    log_times, errors : array (count,)
-        ln τ and its standard errors.
-    curvature, curvature_error : float
-        Of ln τ against 1/D (m⁴ s⁻⁶), by a parabola; NaN with fewer than three intensities.
-    systematic : float
-        How far the slope may be from ΔU because the prefactor depends on D (m² s⁻³): what a prefactor proportional to D
-        or 1/D changes, or, if that is more, a prefactor with the power of D that fits the rates. Infinite with two
-        intensities: they do not show this power.
-    limit, limit_error : float
-        The slope at D = 0 if the prefactor is a power of D, fitted too, and its standard error; NaN with fewer than
-        three intensities.
-    """
-
-    slope: float
-    slope_error: float
-    log_prefactor: float
-    log_prefactor_error: float
-    intensities: Array
-    log_times: Array
-    errors: Array
-    curvature: float
-    curvature_error: float
-    systematic: float
-    limit: float = math.nan
-    limit_error: float = math.nan
+    slope: Annotated[float, "d ln τ/d(1/D); it tends to ΔU as D → 0", "m2 s-3"]
+    slope_error: Annotated[float, "standard error of the slope", "m2 s-3"]
+    log_prefactor: Annotated[float, "ln τ₀, τ₀ in s"]
+    log_prefactor_error: Annotated[float, "standard error of ln τ₀"]
+    intensities: Annotated[Array, "noise intensities D (m² s⁻³), descending"]
+    log_times: Annotated[Array, "ln τ at each"]
+    errors: Annotated[Array, "standard errors of ln τ"]
+    curvature: Annotated[float, "curvature of ln τ against 1/D by a parabola through three or more", "m4 s-6"]
+    curvature_error: Annotated[float, "standard error of the curvature", "m4 s-6"]
+    systematic: Annotated[float, _SYSTEMATIC, "m2 s-3"]
+    limit: Annotated[float, "slope at D = 0 if the prefactor is a power of D, fitted too", "m2 s-3"] = math.nan
+    limit_error: Annotated[float, "standard error of that slope", "m2 s-3"] = math.nan
 
     @classmethod
     def of(cls, rates: Sequence[ExitRate]) -> ArrheniusFit:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 import xarray
@@ -66,28 +66,14 @@ _MARKS = Table("bifurcation", fields_of(Bifurcation))
 
 
 class Continuation(AlongParameter):
-    """Steady states along values of a parameter, joined into branches, with the bifurcations between.
-
-    Attributes
-    ----------
-    parameter, symbol, unit : str
-        As of `AlongParameter`.
-    region : Region or None
-        What basin fractions are shares of, the same at all values; None if nothing was found.
-    states : tuple of SteadyStates
-        One for each value, in ascending order.
-    branch_names : tuple of str
-        Name of each branch, that of its first attractor.
-    bifurcations : tuple of Bifurcation
-        In ascending order of the value.
-    """
+    """Steady states along values of a parameter, joined into branches, with the bifurcations between."""
 
     kind: ClassVar[str] = "continuation"
 
-    region: Region | None
-    states: tuple[SteadyStates, ...]
-    branch_names: tuple[str, ...]
-    bifurcations: tuple[Bifurcation, ...] = ()
+    region: Annotated[Region | None, "what basin fractions are shares of at all values; None if nothing was found"]
+    states: Annotated[tuple[SteadyStates, ...], "one for each value, in ascending order"]
+    branch_names: Annotated[tuple[str, ...], "name of each branch, that of its first attractor"]
+    bifurcations: Annotated[tuple[Bifurcation, ...], "in ascending order of the value"] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

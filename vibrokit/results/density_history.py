@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 import xarray
@@ -23,27 +23,15 @@ _UNITS = {"x": "m", "v": "m s-1"}
 
 
 class DensityHistory(Record):
-    """The probability density of the state at some times.
-
-    Attributes
-    ----------
-    times : array (count,)
-        Since the start (s), which is on a section.
-    x, v : array (nx,), (nv,)
-        Nodes (m, m s⁻¹); those in x are closer where the oscillator is stiffer.
-    log_density : array (count, nx, nv)
-        ln p (p in s m⁻²), NaN where it is not resolved.
-    mass : array (count,)
-        Probability on the nodes: 1, less what has left the region, and truncation errors.
-    """
+    """The probability density of the state at some times."""
 
     kind: ClassVar[str] = "density_history"
 
-    times: Array
-    x: Array
-    v: Array
-    log_density: Array
-    mass: Array
+    times: Annotated[Array, "since the start, which is on a section (s)"]
+    x: Annotated[Array, "nodes (m), closer where the oscillator is stiffer"]
+    v: Annotated[Array, "nodes (m s⁻¹)"]
+    log_density: Annotated[Array, "ln p (p in s m⁻²), NaN where it is not resolved, shape (times, nx, nv)"]
+    mass: Annotated[Array, "probability on the nodes: 1, less what has left the region, and truncation errors"]
 
     @property
     def names(self) -> tuple[str, ...]:

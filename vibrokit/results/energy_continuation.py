@@ -36,21 +36,14 @@ class EnergyBranch:
     derivative: Annotated[Array, "derivative of the action in the parameter"]
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class LeastPathChange:
-    """A value of the parameter at which another path becomes the cheapest.
+    """A value of the parameter at which another path becomes the cheapest."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter.
-    before, after : int
-        Numbers of the branches that have the least action below and above it.
-    """
-
-    value: float
-    before: int
-    after: int
+    value: Annotated[float, "of the parameter"]
+    before: Annotated[int, "number of the branch that has the least action below it"]
+    after: Annotated[int, "number of the branch that has the least action above it"]
 
 
 _BRANCHES = Table("branch", fields_of(EnergyBranch))
@@ -58,21 +51,12 @@ _ARRAYS = {"action": "action of the path", "error": "numerical error", "derivati
 
 
 class EnergyContinuation(AlongParameter):
-    """Activation energies along values of a parameter.
-
-    Attributes
-    ----------
-    parameter, symbol, unit : str
-        As of `AlongParameter`.
-    values : array (values,)
-        Of the parameter, ascending.
-    branches : tuple of EnergyBranch
-    """
+    """Activation energies along values of a parameter."""
 
     kind: ClassVar[str] = "energy-continuation"
 
-    values: Array
-    branches: tuple[EnergyBranch, ...]
+    values: Annotated[Array, "values of the parameter, ascending"]
+    branches: Annotated[tuple[EnergyBranch, ...], "the exit paths"]
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -5,48 +5,37 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
 from vibrokit.construction import Constructed
 from vibrokit.results.labels import exit_between
+from vibrokit.results.table import documented
 
 _DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
 
 
+_EVENT = (
+    '"commitment", the first state on the section in the core of another attractor, or escape for good; "basin", the '
+    'first in another basin; "contact", the first time at which position and velocity satisfy the exit condition'
+)
+
+
+@documented
 @dataclasses.dataclass(frozen=True)
 class ExitRate(metaclass=Constructed):
-    """Rate of exits from an attractor at a finite noise intensity.
+    """Rate of exits from an attractor at a finite noise intensity."""
 
-    Attributes
-    ----------
-    source, target : int
-        Labels of the attractor that is left and of the one that is reached; −1 for an exit that is no attractor, −2 for
-        escape.
-    intensity : float
-        D (m² s⁻³).
-    log_value : float
-        ln of the rate in s⁻¹, which may be too small for a floating-point number.
-    log_error : float
-        Error estimate of it.
-    log_lower, log_upper : float
-        Interval of ``log_value``: the method's 95 % interval if it has one, otherwise two error estimates on each side.
-    event : str
-        What counts: ``"commitment"``, the first state on the section in the core of another attractor, or escape for
-        good; ``"basin"``, the first one in another basin; or ``"contact"``, the first time at which position and
-        velocity satisfy the exit condition.
-    method : str
-    """
-
-    source: int
-    target: int
-    intensity: float
-    log_value: float
-    log_error: float
-    event: str
-    method: str
-    log_lower: float = math.nan
-    log_upper: float = math.nan
+    source: Annotated[int, "label of the attractor that is left"]
+    target: Annotated[int, "label of the attractor that is reached; −1 for another exit, −2 for escape"]
+    intensity: Annotated[float, "noise intensity D", "m2 s-3"]
+    log_value: Annotated[float, "ln of the rate in s⁻¹, which may be too small for a floating-point number"]
+    log_error: Annotated[float, "error estimate of it"]
+    event: Annotated[str, _EVENT]
+    method: Annotated[str, "method"]
+    log_lower: Annotated[float, "lower end of its 95 % interval; by default two error estimates below"] = math.nan
+    log_upper: Annotated[float, "upper end of its 95 % interval; by default two error estimates above"] = math.nan
 
     def __post_init__(self) -> None:
         for name, side in (("log_lower", -_DEVIATIONS), ("log_upper", _DEVIATIONS)):

@@ -214,32 +214,6 @@ class Series(Field):
         return [tuple(whole.tolist()) for whole in wholes] if self.listed else wholes
 
 
-@dataclasses.dataclass(frozen=True)
-class Spectrum(Field):
-    """An array of complex numbers, real and imaginary parts apart; `finite`: neither NaN nor infinity."""
-
-    noun: ClassVar[str] = "complex array (count,)"
-
-    length: Length = dataclasses.field(kw_only=True)
-    finite: bool = True
-
-    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
-        yield self.length.counts(record, [len(value) for value in values])
-        for part, pieces in (("real", [value.real for value in values]), ("imag", [value.imag for value in values])):
-            about = _about(f"{self.long_name}, {part} part", self.units)
-            yield f"{name}_{part}", (*self.length.lay(record, pieces), about)
-
-    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        parts = (self.length.take(arrays, record, f"{name}_{part}", finite=self.finite) for part in ("real", "imag"))
-        return [_complex(real, imag) for real, imag in zip(*parts, strict=True)]
-
-
-def _complex(real: Array, imag: Array) -> NDArray[np.complex128]:
-    values = np.empty(len(real), dtype=complex)  # real + 1j·imag would turn an infinite part into NaN
-    values.real, values.imag = real, imag
-    return values
-
-
 class Column(NamedTuple):
     """One column of an array of vectors: the end of its name, its long name, its units."""
 
@@ -278,10 +252,10 @@ class Vectors(Field):
 
     noun: ClassVar[str] = "array (count, n)"
 
-    units: str = ""
     length: Length = dataclasses.field(kw_only=True)
     columns: Columns = dataclasses.field(kw_only=True)
     prefixed: bool = True  # whether the names of the arrays contain that of the attribute
+    finite: bool = True  # neither NaN nor infinity
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
         yield self.length.counts(record, [len(value) for value in values])
@@ -298,9 +272,30 @@ class Vectors(Field):
         most = len(arrays.dataset.variables)
         names = [self._name(record, name, column) for column in self.columns.of(most)]
         least = len(self.columns.first)
-        present = [*names[:least], *itertools.takewhile(arrays.__contains__, names[least:])]
-        columns = [self.length.take(arrays, record, column, finite=True) for column in present]
+        present = names[:least] + list(itertools.takewhile(arrays.__contains__, names[least:]))
+        columns = [self.length.take(arrays, record, column, finite=self.finite) for column in present]
         return [np.stack(piece, axis=1) for piece in zip(*columns, strict=True)]
 
     def _name(self, record: str, name: str, column: Column) -> str:
         return f"{name if self.prefixed else record}_{column.name}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Spectrum(Field):
+    """An array of complex numbers, real and imaginary parts apart; `finite`: neither NaN nor infinity."""
+
+    noun: ClassVar[str] = "complex array (count,)"
+
+    length: Length = dataclasses.field(kw_only=True)
+    finite: bool = True
+
+    @property
+    def _parts(self) -> Vectors:
+        parts = (Column(part[:4], f"{self.long_name}, {part} part", self.units) for part in ("real", "imaginary"))
+        return Vectors("", length=self.length, columns=Columns(tuple(parts)), finite=self.finite)
+
+    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
+        yield from self._parts.variables(record, name, [np.stack([one.real, one.imag], axis=1) for one in values])
+
+    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
+        return [np.ascontiguousarray(pair).view(complex)[:, 0] for pair in self._parts.read(arrays, record, name)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import xarray
 
@@ -17,22 +17,13 @@ from vibrokit.results.summary import Summary
 
 
 class PlainRecord(Record):
-    """The arrays and the provenance of a file whose kind is unknown here.
-
-    Attributes
-    ----------
-    dataset : xarray.Dataset
-    unknown_kind : str
-        The kind that the file names.
-    content : bytes
-        Of the file; empty for a part of another record. Saved again, the record writes the same file.
-    """
+    """The arrays and the provenance of a file whose kind is unknown here."""
 
     kind: ClassVar[str] = "plain"
 
-    dataset: xarray.Dataset
-    unknown_kind: str
-    content: bytes = b""
+    dataset: Annotated[xarray.Dataset, "the arrays"]
+    unknown_kind: Annotated[str, "the kind that the file names"]
+    content: Annotated[bytes, "of the file, saved again as it is; empty for a part of another record"] = b""
 
     @property
     def names(self) -> tuple[str, ...]:

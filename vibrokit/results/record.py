@@ -9,7 +9,7 @@ import os
 import platform
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import ResultFileError
@@ -20,6 +20,7 @@ from vibrokit.results.finding import Finding, check_findings
 from vibrokit.results.netcdf import content_of
 from vibrokit.results.provenance import provenance_data
 from vibrokit.results.summary import Summary
+from vibrokit.results.table import documented
 
 if TYPE_CHECKING:
     import xarray
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from vibrokit.oscillator import Oscillator
     from vibrokit.report.report import Report
 
+Data = Mapping[str, Any]
+
+_SETTINGS = "the arguments or the analyzer's configuration as plain data, from which the same can be built again"
 _LIBRARIES = ("vibrokit", "numpy", "scipy", "sympy", "numba")
 
 
@@ -35,30 +39,13 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _LIBRARIES}
 
 
+@documented
 @dataclass_transform(frozen_default=True, eq_default=False, kw_only_default=True, field_specifiers=(dataclasses.field,))
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Record(ABC, metaclass=Constructed):
     """The outcome of one piece of work. Abstract.
 
     A subclass becomes a frozen dataclass by itself; no decorator is needed.
-
-    Attributes
-    ----------
-    scene : dict
-        The scene as plain data, with every parameter.
-    settings : dict
-        The arguments or the analyzer's configuration, as plain data from which the same can be built again.
-    findings : tuple of Finding
-    stats : Stats
-        How much work it took.
-    complete : bool
-        False if the work was stopped before its end.
-    seed : int or None
-        Seed of what was random.
-    seconds : float
-        Time that it took.
-    versions : dict
-        Versions of the toolkit and of the libraries it uses.
 
     For developers
     --------------
@@ -69,18 +56,18 @@ class Record(ABC, metaclass=Constructed):
 
     kind: ClassVar[str] = ""
 
-    scene: Mapping[str, Any]
-    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
-    stats: Stats = dataclasses.field(default_factory=Stats)
-    complete: bool = True
-    seed: int | None = None
-    seconds: float = 0.0
-    versions: Mapping[str, str] = dataclasses.field(default_factory=versions)
+    scene: Annotated[Data, "the scene as plain data, with every parameter"]
+    settings: Annotated[Data, _SETTINGS] = dataclasses.field(default_factory=dict)
+    findings: Annotated[tuple[Finding, ...], "what was found besides numbers"] = ()
+    stats: Annotated[Stats, "how much work it took"] = dataclasses.field(default_factory=Stats)
+    complete: Annotated[bool, "False if the work was stopped before its end"] = True
+    seed: Annotated[int | None, "seed of what was random"] = None
+    seconds: Annotated[float, "time that it took", "s"] = 0.0
+    versions: Annotated[Data, "versions of the toolkit and of libraries"] = dataclasses.field(default_factory=versions)
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)(cls)
+        documented(dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)(cls))
         if not inspect.isabstract(cls) and ABC not in cls.__bases__ and not cls.__dict__.get("kind"):
             raise TypeError(
                 f'{cls.__name__} names no kind; write kind: ClassVar[str] = "...", the name that its files carry.'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 import xarray
@@ -26,23 +26,13 @@ if TYPE_CHECKING:
     from vibrokit.plots.exit_paths import ExitPathArtists, HistoryArtists
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists
 
+_DATA = "arrays behind the numbers, along the dimension ``source`` (labels of attractors)"
 _AT_REST = 0.01  # of the extent of a path: a path that moves less at first leaves an equilibrium
 _SHOWN = 1.5  # times the largest energy: above it, all shades of a quasi-potential are the same
 
 
 class Result(Record):
     """The outcome of one analysis.
-
-    Attributes
-    ----------
-    energies : tuple of ActivationEnergy
-        The best one of each exit of each attractor.
-    branches : tuple of ActivationEnergy
-        All exit paths that were found, also those that are not the best.
-    section : Section
-        Basins, attractors, saddles and stable manifolds.
-    data : xarray.Dataset
-        Arrays behind the numbers, along the dimension ``source`` (labels of attractors).
 
     For developers
     --------------
@@ -54,10 +44,10 @@ class Result(Record):
     refined_by: ClassVar[str] = "run it again with finer settings"
     """What makes its numbers more certain."""
 
-    energies: tuple[ActivationEnergy, ...]
-    section: Section
-    branches: tuple[ActivationEnergy, ...] = ()
-    data: xarray.Dataset = dataclasses.field(default_factory=xarray.Dataset)
+    energies: Annotated[tuple[ActivationEnergy, ...], "the best one of each exit of each attractor"]
+    section: Annotated[Section, "basins, attractors, saddles and stable manifolds"]
+    branches: Annotated[tuple[ActivationEnergy, ...], "all exit paths, also those that are not the best"] = ()
+    data: Annotated[xarray.Dataset, _DATA] = dataclasses.field(default_factory=xarray.Dataset)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from vibrokit.results.fields import Variable
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region, centres
 from vibrokit.results.structure import Structure
-from vibrokit.results.table import Table, fields_of
+from vibrokit.results.table import Table, documented, fields_of
 
 Array = NDArray[np.float64]
 
@@ -29,33 +29,18 @@ _LISTS = {
 }
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Section:
-    """Basins, attractors and what lies between them.
+    """Basins, attractors and what lies between them."""
 
-    Attributes
-    ----------
-    labels : int16 array (nx, nv)
-        Label of the attractor that each cell leads to, or as in `Basins`.
-    bounds : array (2, 2)
-        Bounds of x and v.
-    points : tuple of array (count, n)
-        Points of each attractor, by label.
-    names : tuple of str
-        Names of the attractors, by label.
-    saddles, chaotic : tuple of array (count, n)
-        Points of each saddle orbit, and samples of chaotic sets on the boundary.
-    stable : tuple of array (count, 2)
-        Branches of the saddles' stable manifolds.
-    """
-
-    labels: NDArray[np.int16]
-    bounds: Array
-    points: tuple[Array, ...]
-    names: tuple[str, ...]
-    saddles: tuple[Array, ...] = ()
-    chaotic: tuple[Array, ...] = ()
-    stable: tuple[Array, ...] = ()
+    labels: Annotated[NDArray[np.int16], "label of the attractor that each cell leads to, or as in `Basins`, (nx, nv)"]
+    bounds: Annotated[Array, "bounds of x and v, (2, 2)"]
+    points: Annotated[tuple[Array, ...], "points of each attractor by label, (count, n)"]
+    names: Annotated[tuple[str, ...], "names of the attractors, by label"]
+    saddles: Annotated[tuple[Array, ...], "points of each saddle orbit"] = ()
+    chaotic: Annotated[tuple[Array, ...], "samples of chaotic sets on the boundary"] = ()
+    stable: Annotated[tuple[Array, ...], "branches of the saddles' stable manifolds, (count, 2)"] = ()
 
     @classmethod
     def of(cls, structure: Structure) -> Section:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import xarray
 
@@ -30,44 +30,20 @@ _MANIFOLDS = Table("manifold", fields_of(Manifold))
 
 
 class Structure(Record):
-    """Attractors, basins, saddles and manifolds of a scene.
-
-    Attributes
-    ----------
-    attractors : tuple of Attractor
-        Sorted by stop hits; those that run clear of the stops come first.
-    basins : Basins
-    saddles : tuple of Saddle
-        Those on the boundaries of the basins.
-    manifolds : tuple of Manifold
-        Branches of the saddles' stable and unstable manifolds.
-    survival : tuple of Survival
-        How long starts went on without settling; empty if all settled soon.
-    settling : float
-        Distance at which an attractor counts as reached, as a fraction of the region's widths in x and v.
-    budget : int
-        Largest number of periods for which a trajectory was followed.
-    stepper : str
-        Stepper of the basin grid, as `vibrokit run --stepper` reads it: ``"rk4:256"``.
-    shift : float
-        Distance along x (m) by which a state may be moved without a change of its motion, that is, one turn; 0 for
-        none.
-    circle : bool
-        Whether states a turn apart count as one; if not, motion that ends at a copy of an attractor has escaped.
-    """
+    """Attractors, basins, saddles and manifolds of a scene."""
 
     kind: ClassVar[str] = "structure"
 
-    attractors: tuple[Attractor, ...]
-    basins: Basins
-    saddles: tuple[Saddle, ...] = ()
-    manifolds: tuple[Manifold, ...] = ()
-    survival: tuple[Survival, ...] = ()
-    settling: float
-    budget: int
-    stepper: str
-    shift: float = 0.0
-    circle: bool = False
+    attractors: Annotated[tuple[Attractor, ...], "sorted by stop hits; those that run clear of the stops come first"]
+    basins: Annotated[Basins, "the basins on a grid"]
+    saddles: Annotated[tuple[Saddle, ...], "those on the boundaries of the basins"] = ()
+    manifolds: Annotated[tuple[Manifold, ...], "branches of the saddles' stable and unstable manifolds"] = ()
+    survival: Annotated[tuple[Survival, ...], "how long starts went on without settling; none if all settled soon"] = ()
+    settling: Annotated[float, "distance at which an attractor counts as reached, as a fraction of the region's widths"]
+    budget: Annotated[int, "largest number of periods for which a trajectory was followed"]
+    stepper: Annotated[str, 'stepper of the basin grid, as `vibrokit run --stepper` reads it: "rk4:256"']
+    shift: Annotated[float, "distance along x that changes no motion: one turn; 0 for none", "m"] = 0.0
+    circle: Annotated[bool, "whether states a turn apart count as one; if not, motion to a copy has escaped"] = False
 
     @property
     def region(self) -> Region:

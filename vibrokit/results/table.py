@@ -78,6 +78,7 @@ class Part(Field):
 
 # Declared by annotations
 
+_NOUNS = {np.ndarray: "array", Mapping: "mapping"}
 _BY_TYPE: dict[Any, type[Scalar]] = {float: Number, int: Whole, bool: Flag, str: Word}
 
 
@@ -102,6 +103,8 @@ def _noun(kind: Any) -> str:
     """A type in words: ``"tuple of Survival"``, ``"ExitPath or None"``."""
     if get_origin(kind) is tuple:
         return f"tuple of {_noun(get_args(kind)[0])}"
+    if get_origin(kind) in _NOUNS:
+        return _NOUNS[get_origin(kind)]
     return " or ".join(map(_noun, get_args(kind))) or kind.__name__.removesuffix("Type")
 
 
@@ -111,12 +114,19 @@ def fields_of(kind: type) -> dict[str, Field]:
 
 
 def documented(kind: type[T]) -> type[T]:
-    """Describe the attributes of a dataclass in its docstring, as its annotations declare them."""
-    lines, hints = [(kind.__doc__ or "").rstrip(), "", "    Attributes", "    ----------"], get_type_hints(kind)
+    """Describe the attributes of a dataclass in its docstring, as its own annotations declare them."""
+    if not any("Annotated" in str(one) for one in vars(kind).get("__annotations__", {}).values()):
+        return kind
+    hints, lines = get_type_hints(kind), []
     for name, _, noun, text, units in _declared(kind):
-        raised = re.sub(r"(?<=[a-z])-?\d", lambda power: power[0].translate(_RAISED), units)
-        first, semicolon, rest = text.partition(";")
-        words = f"{first[:1].upper()}{first[1:]}{f' ({raised})' if units not in ('', '1') else ''}{semicolon}{rest}."
-        lines += [f"    {name} : {noun or _noun(hints[name])}", textwrap.indent(textwrap.fill(words, 112), " " * 8)]
-    kind.__doc__ = "\n".join(lines)
+        if name in vars(kind)["__annotations__"]:
+            raised = re.sub(r"(?<=[a-z])-?\d", lambda power: power[0].translate(_RAISED), units)
+            first, semicolon, rest = text.partition(";")
+            unit = f" ({raised})" if units not in ("", "1") else ""
+            start = first if first.startswith("ln ") else f"{first[:1].upper()}{first[1:]}"
+            words = textwrap.fill(f"{start}{unit}{semicolon}{rest}.", 112)
+            lines += [f"    {name} : {noun or _noun(hints[name])}", textwrap.indent(words, " " * 8)]
+    kind.__doc__ = "\n".join([(kind.__doc__ or "").rstrip(), "", "    Attributes", "    ----------", *lines])
+    own = kind.__init__.__annotations__  # signatures show types alone
+    own |= {name: hint for name, hint in hints.items() if name in own}
     return kind
