@@ -262,7 +262,7 @@ def test_a_file_that_cannot_be_written_leaves_the_tables(toys, monkeypatch, caps
     def full(path, content):
         raise FileError(f"{path} cannot be written (No space left on device).")
 
-    monkeypatch.setattr("vibrokit.results.files.write_atomically", full)
+    monkeypatch.setattr("vibrokit.results.record.write_atomically", full)
     assert main([*TOY, "-o", "r.nc"]) == 1
     out, err = capsys.readouterr()
     assert "left-rest → right-rest" in out
