@@ -8,48 +8,29 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from typing import TextIO
+from typing import Annotated, TextIO
+
+from vibrokit.documented import documented
 
 _PATIENCE = 1.0  # seconds after which a stage is shown
 _PAUSE = 0.2  # seconds between two changes of the line
 _WIDTH = 80  # columns of a terminal that does not tell
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Update:
-    """What a listener is told.
+    """What a listener is told."""
 
-    Attributes
-    ----------
-    stage : str
-        What is being done, such as ``"basins"`` or ``"graph"``.
-    subject : str
-        The attractor or other thing that the work is about; may be empty.
-    done : int
-        How many units are done.
-    total : int or None
-        How many there are; None where that is not known beforehand.
-    unit : str
-        What is counted, in the plural.
-    elapsed : float
-        Time since the stage began (s).
-    remaining : float or None
-        Estimated time until the stage ends (s), which never grows; None where the total is unknown.
-    compiling : bool
-        Whether a kernel is being compiled.
-    finished : bool
-        Whether the stage has ended.
-    """
-
-    stage: str
-    subject: str
-    done: int
-    total: int | None
-    unit: str
-    elapsed: float
-    remaining: float | None
-    compiling: bool = False
-    finished: bool = False
+    stage: Annotated[str, 'what is being done, such as "basins" or "graph"']
+    subject: Annotated[str, "the attractor or other thing that the work is about; may be empty"]
+    done: Annotated[int, "how many units are done"]
+    total: Annotated[int | None, "how many there are; None where that is not known beforehand"]
+    unit: Annotated[str, "what is counted, in the plural"]
+    elapsed: Annotated[float, "time since the stage began", "s"]
+    remaining: Annotated[float | None, "estimated time until it ends; it never grows, and None is unknown", "s"]
+    compiling: Annotated[bool, "whether a kernel is being compiled"] = False
+    finished: Annotated[bool, "whether the stage has ended"] = False
 
 
 class Display:

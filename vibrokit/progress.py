@@ -13,7 +13,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vibrokit.arguments import real
 from vibrokit.blas import one_blas_thread
 from vibrokit.display import Display
 from vibrokit.display import Update as Update
+from vibrokit.documented import documented
 from vibrokit.errors import OutOfTime, StructureError, shown
 
 TRAJECTORIES = "trajectories"
@@ -32,6 +33,7 @@ AFTERWARDS = 1.0
 A call with a time limit so returns within two seconds of it.
 """
 
+_SECONDS = 'time spent in each stage (s), without the stages inside it; "compiling" is one of them'
 _SETTLED = 1.0  # seconds of a stage after which its pace is known well enough to estimate the time left
 
 
@@ -42,33 +44,22 @@ class Deadline(KeyboardInterrupt):
     """
 
 
+Seconds = Mapping[str, float]
 Listener = Callable[[Update], None]
 Progress = bool | Listener | None
 """What public calls take: True for a display on standard error, a function of an `Update`, or None."""
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Stats:
-    """How much work a result took.
+    """How much work a result took."""
 
-    Attributes
-    ----------
-    trajectories : int
-        Trajectories integrated.
-    intervals : int
-        Section intervals integrated, over all trajectories.
-    steps : int
-        Steps of fixed size taken; steppers that choose their own steps do not count them.
-    newton_iterations : int
-    seconds : dict of str to float
-        Time spent in each stage (s), without the stages inside it; ``"compiling"`` is one of them.
-    """
-
-    trajectories: int = 0
-    intervals: int = 0
-    steps: int = 0
-    newton_iterations: int = 0
-    seconds: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    trajectories: Annotated[int, "trajectories integrated"] = 0
+    intervals: Annotated[int, "section intervals integrated, over all trajectories"] = 0
+    steps: Annotated[int, "steps of fixed size taken; steppers that choose their own steps do not count them"] = 0
+    newton_iterations: Annotated[int, "iterations of Newton's method"] = 0
+    seconds: Annotated[Seconds, _SECONDS] = dataclasses.field(default_factory=dict)
 
     def __add__(self, other: Stats) -> Stats:
         """The work of two results together."""

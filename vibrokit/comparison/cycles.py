@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
-from vibrokit.results.table import documented
+from vibrokit.documented import documented
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import logsumexp
 
+from vibrokit.documented import documented
 from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.table import documented
 
 _SAME = 1e-9  # relative: intensities that differ by less are one
 _FARTHEST = 30.0  # in ln D, from a computed intensity: twelve decades, farther than any noise is from it

@@ -7,8 +7,8 @@ import math
 from enum import StrEnum
 from typing import Annotated
 
+from vibrokit.documented import documented
 from vibrokit.results.rated import HELD, METASTABLE
-from vibrokit.results.table import documented
 
 DEVIATIONS = 1.96
 """Standard errors on each side of a value in an interval of 95 %."""

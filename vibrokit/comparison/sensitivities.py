@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from vibrokit.arguments import members
+from vibrokit.documented import documented
 from vibrokit.errors import ParameterError, StructureError, nearest, shown
 from vibrokit.results.energy import ActivationEnergy
-from vibrokit.results.table import documented
 from vibrokit.text_table import number_text, text_table
 
 _INTENSITY = "noise.intensity"

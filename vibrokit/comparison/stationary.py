@@ -16,11 +16,11 @@ from scipy.special import logsumexp
 from vibrokit.arguments import pair
 from vibrokit.comparison.occupancies import balances, occupancies, shares_text
 from vibrokit.construction import Constructed, called
+from vibrokit.documented import documented
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import label_of
 from vibrokit.results.section import Section
 from vibrokit.results.sgcm import SGCMResult
-from vibrokit.results.table import documented
 
 if TYPE_CHECKING:
     from vibrokit.plots.quasi_potential import QuasiPotentialArtists

@@ -16,10 +16,10 @@ from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
 from vibrokit.comparison.difference_bounds import difference_bounds
 from vibrokit.comparison.in_trees import tree_costs
 from vibrokit.construction import Constructed, called
+from vibrokit.documented import documented
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import exit_between, label_of
 from vibrokit.results.result import Result
-from vibrokit.results.table import documented
 from vibrokit.text_table import text_table
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
+from vibrokit.documented import documented
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import DASHES, MARKS, axes_or_new, colour, mark, named, span
 
@@ -22,32 +23,17 @@ _FILLS = ("none", "full", "left", "bottom", "right", "top")
 _POINTS: dict[str, Any] = {"marker": "o", "markersize": 4.5, "capsize": 2.5, "linewidth": 1.0}
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExitTimes:
-    """Mean exit times of one exit at several noise intensities.
+    """Mean exit times of one exit at several noise intensities."""
 
-    Attributes
-    ----------
-    intensities : array (count,)
-        D (m² s⁻³).
-    log_times : array (count,)
-        ln τ, τ in s.
-    errors : array (count,)
-        Error estimates of ln τ.
-    label : int
-        Of the attractor that is left: chooses the colour.
-    title : str
-        What the legend calls the exit.
-    place : int
-        Among the exits of one attractor: chooses how markers are filled and lines are dashed.
-    """
-
-    intensities: ArrayLike
-    log_times: ArrayLike
-    errors: ArrayLike
-    label: int = 0
-    title: str = ""
-    place: int = 0
+    intensities: Annotated[ArrayLike, "noise intensities D (m² s⁻³)"]
+    log_times: Annotated[ArrayLike, "ln τ at each, τ in s"]
+    errors: Annotated[ArrayLike, "error estimates of ln τ"]
+    label: Annotated[int, "label of the attractor that is left: chooses the colour"] = 0
+    title: Annotated[str, "what the legend calls the exit"] = ""
+    place: Annotated[int, "among the exits of one attractor: chooses how markers are filled and lines are dashed"] = 0
 
     def in_order(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return 1/D in ascending order, ln τ and its errors."""

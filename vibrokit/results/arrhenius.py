@@ -10,9 +10,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import StructureError
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.table import documented
 
 ENOUGH = 3
 """Noise intensities, at least, that show how a prefactor depends on D, so that an energy has bounds."""

@@ -9,11 +9,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import PLANE, STATE, BySide, Length, Number, Spectrum, Variable, Vectors, Whole, Word
 from vibrokit.results.survival import Survival
-from vibrokit.results.table import Table, documented, fields_of
+from vibrokit.results.table import Table, fields_of
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

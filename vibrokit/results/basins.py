@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError, StructureError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import Variable
@@ -29,23 +30,20 @@ AT_COPY = -4
 """Label of cells whose motion came to a copy of an attractor, whole turns away, where x is not taken modulo a turn."""
 
 _OTHERS = {AT_COPY: "at_copy", NOT_FOLLOWED: "not_followed", ESCAPED: "left_region", UNSETTLED: "unsettled"}
+_LABELS = (
+    "label of the attractor that each cell's centre leads to; UNSETTLED, ESCAPED, NOT_FOLLOWED or AT_COPY if it leads "
+    "to none, shape (nx, nv)"
+)
 _AXES = {"x": ("displacement", "m"), "v": ("velocity", "m s-1")}
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Basins:
-    """Labels of the cells of a region.
+    """Labels of the cells of a region."""
 
-    Attributes
-    ----------
-    region : Region
-    labels : int16 array (nx, nv)
-        Label of the attractor that each cell's centre leads to; UNSETTLED, ESCAPED, NOT_FOLLOWED or AT_COPY if it
-        leads to none.
-    """
-
-    region: Region
-    labels: NDArray[np.int16]
+    region: Annotated[Region, "the region"]
+    labels: Annotated[NDArray[np.int16], _LABELS]
 
     def fraction(self, label: int) -> float:
         """Share of the cells with a label."""

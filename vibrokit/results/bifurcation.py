@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.results.fields import LARGEST, STATE, Length, Number, Vectors, Whole, Word
-from vibrokit.results.table import documented
 
 _KIND = Word(
     '"fold", where the branch turns back; "pitchfork or transcritical", where another branch crosses it; "period '

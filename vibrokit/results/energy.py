@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.construction import Constructed
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.fields import STATE, ByName, Column, Columns, Length, Series, Variable, Vectors, Whole
 from vibrokit.results.labels import exit_between
-from vibrokit.results.table import Part, Table, documented, fields_of
+from vibrokit.results.table import Part, Table, fields_of
 
 Array = NDArray[np.float64]
 Slopes = Mapping[str, float]

@@ -11,12 +11,13 @@ import xarray
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import LARGEST
 from vibrokit.results.summary import Summary
-from vibrokit.results.table import Table, documented, fields_of
+from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.energy_curves import EnergyCurveArtists

@@ -10,8 +10,8 @@ from typing import Annotated
 import numpy as np
 
 from vibrokit.construction import Constructed
+from vibrokit.documented import documented
 from vibrokit.results.labels import exit_between
-from vibrokit.results.table import documented
 
 _DEVIATIONS = 2.0  # error estimates on each side of ln of a rate, as 95 % of normal errors
 

@@ -8,10 +8,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import counted
 from vibrokit.results.fields import PLANE, Length, Vectors, Whole
 from vibrokit.results.sentenced import Sentenced
-from vibrokit.results.table import documented
 
 
 class ManifoldEnd(Sentenced):

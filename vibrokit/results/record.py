@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed, called
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError
 from vibrokit.progress import Stats
 from vibrokit.results.atomic import write_atomically
@@ -20,7 +21,6 @@ from vibrokit.results.finding import Finding, check_findings
 from vibrokit.results.netcdf import content_of
 from vibrokit.results.provenance import provenance_data
 from vibrokit.results.summary import Summary
-from vibrokit.results.table import documented
 
 if TYPE_CHECKING:
     import xarray

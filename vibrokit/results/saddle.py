@@ -8,11 +8,12 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import counted
 from vibrokit.results.attractor import Array, Attractor, Complex
 from vibrokit.results.basins import NOT_FOLLOWED
 from vibrokit.results.fields import STATE, Length, Series, Vectors, Word
-from vibrokit.results.table import documented, fields_of
+from vibrokit.results.table import fields_of
 
 _AS = fields_of(Attractor)
 _KIND = Word(

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
@@ -16,7 +17,7 @@ from vibrokit.results.fields import Variable
 from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region, centres
 from vibrokit.results.structure import Structure
-from vibrokit.results.table import Table, documented, fields_of
+from vibrokit.results.table import Table, fields_of
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.results.table import documented
+from vibrokit.documented import documented
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Annotated
 
+from vibrokit.documented import documented
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.finding import Finding
-from vibrokit.results.table import documented
 
 
 @documented

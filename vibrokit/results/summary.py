@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from html import escape
+from typing import Annotated
 
+from vibrokit.documented import documented
 from vibrokit.results.codes import Severity
 from vibrokit.results.finding import Finding, together
 
@@ -13,19 +15,13 @@ _ROWS = 3  # with the title and a finding, five lines
 _WIDTH = 160
 
 
+@documented
 @dataclasses.dataclass(frozen=True)
 class Summary:
-    """A title and a table.
+    """A title and a table."""
 
-    Attributes
-    ----------
-    title : str
-    rows : tuple of tuple of str
-        The first cell of each row is its name.
-    """
-
-    title: str
-    rows: tuple[tuple[str, ...], ...] = ()
+    title: Annotated[str, "the title"]
+    rows: Annotated[tuple[tuple[str, ...], ...], "the first cell of each row is its name"] = ()
 
     def text(self, findings: Sequence[Finding], names: Sequence[str]) -> str:
         """Return at most five lines: the title, the first rows, the first warning or error."""

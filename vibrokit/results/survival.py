@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.documented import documented
 from vibrokit.results.fields import Length, Series
-from vibrokit.results.table import documented
 
 _SETTLED = Series(
     "forcing periods until the start settled; -1 if it did not", length=Length("start", "starts"), low=-1

@@ -1,28 +1,22 @@
 """Tables: the attributes of records as arrays of a dataset, declared once and used to write, to read and to describe.
 
 ``period: Annotated[int, "period in forcing periods"]`` declares an attribute: these words describe it in files and in
-the docstring of its class. ``Annotated[float, "time after which it repeats", "s"]`` has a unit; where more is to be
-said, `Annotated` takes a field.
+the docstring of its class, by `vibrokit.documented`. ``Annotated[float, "time after which it repeats", "s"]`` has a
+unit; where more is to be said, `Annotated` takes a field.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import re
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from vibrokit.errors import ResultFileError
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import Field, Flag, Number, Scalar, Variable, Whole, Word
-
-T = TypeVar("T")
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,57 +70,19 @@ class Part(Field):
         return [row if has else None for has, row in zip(known, rows, strict=True)]
 
 
-# Declared by annotations
-
-_NOUNS = {np.ndarray: "array", Mapping: "mapping"}
 _BY_TYPE: dict[Any, type[Scalar]] = {float: Number, int: Whole, bool: Flag, str: Word}
-
-
-def _declared(kind: type) -> Iterator[tuple[str, Field | None, str, str, str]]:
-    """Each attribute of a dataclass that says what it is: its field, if files hold it, its type, text and unit."""
-    for name, hint in get_type_hints(kind, include_extras=True).items():
-        if not hasattr(hint, "__metadata__"):
-            continue
-        own, said = hint.__origin__, hint.__metadata__
-        field: Field | None = said[0] if isinstance(said[0], Field) else None
-        if field is not None:
-            yield name, field, "" if get_origin(own) is tuple else field.noun, field.long_name, field.units
-            continue
-        if own in _BY_TYPE:
-            field = _BY_TYPE[own](*said)
-        elif isinstance(own, type) and issubclass(own, StrEnum):
-            field = Word(said[0], known=own)
-        yield name, field, "", said[0], said[1] if len(said) > 1 else ""
-
-
-def _noun(kind: Any) -> str:
-    """A type in words: ``"tuple of Survival"``, ``"ExitPath or None"``."""
-    if get_origin(kind) is tuple:
-        return f"tuple of {_noun(get_args(kind)[0])}"
-    if get_origin(kind) in _NOUNS:
-        return _NOUNS[get_origin(kind)]
-    return " or ".join(map(_noun, get_args(kind))) or kind.__name__.removesuffix("Type")
 
 
 def fields_of(kind: type) -> dict[str, Field]:
     """Return the fields that the annotations of a dataclass declare, by attribute."""
-    return {name: field for name, field, *_ in _declared(kind) if field is not None}
-
-
-def documented(kind: type[T]) -> type[T]:
-    """Describe the attributes of a dataclass in its docstring, as its own annotations declare them."""
-    if not any("Annotated" in str(one) for one in vars(kind).get("__annotations__", {}).values()):
-        return kind
-    hints, lines = get_type_hints(kind), []
-    for name, _, noun, text, units in _declared(kind):
-        if name in vars(kind)["__annotations__"]:
-            raised = re.sub(r"(?<=[a-z])-?\d", lambda power: power[0].translate(_RAISED), units)
-            first, semicolon, rest = text.partition(";")
-            unit = f" ({raised})" if units not in ("", "1") else ""
-            start = first if first.startswith("ln ") else f"{first[:1].upper()}{first[1:]}"
-            words = textwrap.fill(f"{start}{unit}{semicolon}{rest}.", 112)
-            lines += [f"    {name} : {noun or _noun(hints[name])}", textwrap.indent(words, " " * 8)]
-    kind.__doc__ = "\n".join([(kind.__doc__ or "").rstrip(), "", "    Attributes", "    ----------", *lines])
-    own = kind.__init__.__annotations__  # signatures show types alone
-    own |= {name: hint for name, hint in hints.items() if name in own}
-    return kind
+    found: dict[str, Field] = {}
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        said: tuple[Any, ...] = getattr(hint, "__metadata__", ())
+        own = hint.__origin__ if said else None
+        if said and isinstance(said[0], Field):
+            found[name] = said[0]
+        elif own in _BY_TYPE:
+            found[name] = _BY_TYPE[own](*said)
+        elif isinstance(own, type) and issubclass(own, StrEnum):
+            found[name] = Word(said[0], known=own)
+    return found

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
+from vibrokit.documented import documented
 
 if TYPE_CHECKING:
     import xarray
@@ -16,23 +17,14 @@ if TYPE_CHECKING:
     from vibrokit.plots.portraits import PortraitArtists
 
 
+@documented
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
-    """A trajectory at equally spaced times.
+    """A trajectory at equally spaced times."""
 
-    Attributes
-    ----------
-    t : array (count,)
-        Times (s).
-    states : array (count, n)
-        Displacement (m), velocity (m s⁻¹), extra noise states.
-    stops : tuple of float
-        Positions of the stops (m), for pictures.
-    """
-
-    t: NDArray[np.float64]
-    states: NDArray[np.float64]
-    stops: tuple[float, ...] = ()
+    t: Annotated[NDArray[np.float64], "times (s)"]
+    states: Annotated[NDArray[np.float64], "displacement (m), velocity (m s⁻¹), extra noise states, shape (count, n)"]
+    stops: Annotated[tuple[float, ...], "positions of the stops (m), for pictures"] = ()
 
     @property
     def x(self) -> NDArray[np.float64]:
