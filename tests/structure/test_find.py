@@ -18,6 +18,8 @@ from vibrokit.structure.persistence import persistent_stepper
 def test_the_paper_scene_has_a_clear_and_a_hammering_state(paper):
     _, structure = paper
     clear, hammering = structure.attractors
+    assert structure.names == ("clear", "hammering")
+    assert structure.attractor("ham") is hammering
     assert (clear.label, clear.impacts, clear.kind, clear.period) == (0, 0, "periodic", 1)
     assert hammering.impacts > 0
     assert sum(hammering.hits.values()) == hammering.impacts
@@ -222,7 +224,7 @@ def test_stages_count_to_their_totals(well):
 
 def test_an_interrupt_at_any_moment_leaves_what_was_found(well):
     osc, whole, seen = well
-    for call in np.unique(np.linspace(1, len(seen), 40).astype(int)):
+    for call in np.unique(np.linspace(1, len(seen), 20).astype(int)):
         part = vk.find_structure(osc, **WELL, progress=Listener(call))
         (stopped,) = part.found(Code.STOPPED)
         doing = stopped.values["stage"]

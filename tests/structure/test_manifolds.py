@@ -168,17 +168,6 @@ def test_the_stable_manifold_is_the_boundary_of_the_basins(scene):
 
 
 @SCENES
-def test_images_of_a_branch_lie_on_it(scene):
-    """By the stepper that grew it, to what chords of this length and bend are off: chord · angle/8."""
-    osc, _, _, branches = scene()
-    width = np.diff(np.array(WIDE if scene is duffing else SQUARE))[0, 0]
-    for branch in branches[2:]:
-        nodes = branch.curve[: len(branch.curve) // 2 : 20]
-        images = run_ensemble(osc, Flow.STATE, vk.RK4(1024), nodes).states
-        assert distances(images, branch.curve).max() < 0.01 * 0.2 / 8 * width
-
-
-@SCENES
 def test_chords_and_angles_keep_their_bounds(scene):
     width = np.diff(np.array(WIDE if scene is duffing else SQUARE))[0, 0]
     for branch in scene()[3]:

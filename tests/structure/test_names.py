@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-import vibrokit as vk
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.attractors.names import labelled, names_of
 
@@ -57,22 +56,3 @@ def test_names(attractors, names):
 def test_an_orbit_without_stops_is_an_oscillation():
     assert names_of([made(width=1.0), made(width=3.0)], has_stops=False) == ("small-oscillation", "large-oscillation")
     assert names_of([made(period=3)], has_stops=False) == ("oscillation-period-3",)
-
-
-@pytest.mark.parametrize(
-    ("scene", "names"),
-    [
-        ("double-well", {"left-rest", "right-rest"}),
-        ("duffing", {"small-oscillation", "large-oscillation"}),
-        ("hertz-0.570", {"clear", "hammering"}),
-    ],
-)
-def test_names_of_bundled_scenes(scene, names):
-    osc = vk.load_scene(scene)
-    structure = vk.find_structure(osc, cells=(4, 4), starts=(12, 12), saddles=False)
-    assert set(structure.names) == names
-    for name in names:
-        attractor = structure.attractor(name)
-        assert structure.names[attractor.label] == name
-    if scene == "double-well":
-        assert structure.attractor("left").points[0, 0] == pytest.approx(-1.0, abs=1e-9)

@@ -1,34 +1,18 @@
 """The size of the motions of a scene follows from the formulas of its excitations."""
 
 import math
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import vibrokit as vk
 from vibrokit.kernels.choice import single_stepper
-from vibrokit.parts.functions import cos, sin, tanh
+from vibrokit.parts.functions import cos, sin
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import refine_equilibrium
 from vibrokit.structure.regions import frame_of, search_region
 from vibrokit.structure.scales import length_of
 from vibrokit.symbolic.flow_kind import Flow
-
-
-class Square(vk.Excitation):
-    """A smoothed square wave."""
-
-    strength: float = vk.parameter("s", "m s^-2")
-    duration: float = vk.parameter("d", "s", above=0)
-    sharpness: ClassVar = 20
-
-    def force(self, t):
-        return self.strength * tanh(self.sharpness * cos(2 * math.pi * t / self.duration))
-
-    @property
-    def period(self):
-        return self.duration
 
 
 class TwoTones(vk.Excitation):
@@ -43,19 +27,6 @@ class TwoTones(vk.Excitation):
     @property
     def period(self):
         return 2 * math.pi / self.rate
-
-
-class Push(vk.Excitation):
-    """A constant under another name."""
-
-    strength: float = vk.parameter("s", "m s^-2")
-
-    def force(self, t):
-        return self.strength
-
-    @property
-    def period(self):
-        return None
 
 
 class Incommensurate(vk.Excitation):
@@ -92,9 +63,7 @@ def test_harmonic_and_constant_forces_count_by_amplitude_and_force():
 def test_any_excitation_counts_by_its_largest_force(scale):
     times = np.linspace(0.0, 2 * math.pi, 2_000_001)
     two = np.abs(np.cos(times + 1) + np.cos(2 * times)).max()
-    assert length_of(scene(Square(0.7 * scale, 3.0))) == pytest.approx(3.5 * scale, rel=1e-12)
     assert length_of(scene(TwoTones(0.7 * scale, 3.0))) == pytest.approx(3.5 * two * scale, rel=1e-11)
-    assert length_of(scene(Push(-0.7 * scale))) == 0.7 * scale
 
 
 @pytest.mark.parametrize(("damping", "frequency"), [(1e-3, 1.0), (0.02, 1.05), (0.02, 0.9)])

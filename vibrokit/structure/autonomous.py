@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
 import math
 from collections.abc import Callable, Iterator
 from typing import ClassVar
@@ -87,7 +86,6 @@ def refine_equilibrium(osc: Oscillator, guess: Array) -> Equilibrium:
     return Equilibrium(point[None], 1, 0.0, monodromy[None], float(residual))
 
 
-@functools.lru_cache(maxsize=256)
 def equilibria(osc: Oscillator, low: float, high: float) -> tuple[Equilibrium, ...]:
     """Return the equilibria between two places (m), by position: the force at rest changes its sign there.
 

@@ -29,10 +29,10 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import SETTLING, BasinGrid, with_fractions
-from vibrokit.structure.basins.stop_cells import MARGIN, centres
+from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SOON, SaddleSearch
 from vibrokit.structure.circle import turn_of
-from vibrokit.structure.manifolds import BRANCHES, branch_count, default_arc_length, grow_manifolds
+from vibrokit.structure.manifolds import BRANCHES, default_arc_length, grow_manifolds
 from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_stepper, slowest_rate, wait_of
 from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
 from vibrokit.structure.rest import in_front_of_stops, tops_around
@@ -174,7 +174,7 @@ class Finder:
         labels, region = self.grid.basins.labels, self.grid.basins.region
         lost = np.flatnonzero(np.isin(labels, (ESCAPED, UNSETTLED)))
         some = lost[:: -(-len(lost) // 64)] if len(lost) else lost
-        return self.search.go_on(centres(self.osc, region, labels.shape, some), self.budget)
+        return self.search.go_on(states_at(self.osc, region.cell_centres(labels.shape)[some]), self.budget)
 
     def _fill_grid(self) -> None:
         request = self.request
@@ -201,7 +201,7 @@ class Finder:
         assert self.saddle_search is not None
         every = enumerate(self.saddle_search.saddles)
         saddles = [(n, one) for n, one in every if one.kind in ("saddle", "flip saddle") and not one.embedded]
-        count = sum(branch_count(saddle) for _, saddle in saddles)
+        count = sum(4 * len(saddle.points) for _, saddle in saddles)
         length = default_arc_length(self.frame, max(count, 1))
         with stage("manifolds", unit=BRANCHES, total=count):
             for index, saddle in saddles:

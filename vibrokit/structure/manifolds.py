@@ -67,11 +67,6 @@ class FlowMap:
         return np.where((ended.status == COMPLETED)[:, None], ended.states * flip, np.nan)
 
 
-def branch_count(saddle: Saddle) -> int:
-    """Return the number of branches of both manifolds."""
-    return 4 * len(saddle.points)
-
-
 def default_arc_length(region: Any, branches: int = 1) -> float:
     """Return 10 diagonals of a region for each of a few branches; many branches share 160 diagonals."""
     return min(10.0, 160.0 / branches) * float(np.linalg.norm(np.diff(Region.of(region).bounds)))

@@ -18,9 +18,13 @@ def bracketed_roots(function: Callable[[float], float], places: Array, values: A
     so that the two roots of a pair closer together than the samples are found. Values that are not finite bound a part
     without roots.
     """
+
+    def root(low: float, high: float) -> float:
+        return float(brentq(function, low, high, xtol=min(2e-12, 1e-10 * (high - low))))  # in any unit
+
     found = [float(place) for place in places[values == 0]]
     crossed = np.flatnonzero(values[:-1] * values[1:] < 0)
-    found += [float(brentq(function, places[at], places[at + 1])) for at in crossed]
+    found += [root(places[at], places[at + 1]) for at in crossed]
     sizes = np.abs(values)
     same = (values[:-2] * values[1:-1] > 0) & (values[1:-1] * values[2:] > 0)
     for at in 1 + np.flatnonzero(same & (sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] <= sizes[2:])):
@@ -31,5 +35,5 @@ def bracketed_roots(function: Callable[[float], float], places: Array, values: A
             options={"xatol": 1e-8 * (high - low)},
         )
         if nearest.fun <= 0:
-            found += [float(brentq(function, low, nearest.x)), float(brentq(function, nearest.x, high))]
+            found += [root(low, nearest.x), root(nearest.x, high)]
     return sorted(found)

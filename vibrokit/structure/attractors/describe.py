@@ -145,17 +145,13 @@ def contacts_along(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> 
     """
     barrier = osc.barriers[stop]
     depth, _ = _depth_and_rate(path.states, barrier)
-    entries, deepest, hardest = int(np.sum((depth[:-1] <= 0) & (depth[1:] > 0))), 0.0, 0.0
-    touching = np.flatnonzero(depth > 0)
-    for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1):
-        if run.size:
-            around = _around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, len(depth) - 1), stepper)
-            peak = _peak(osc, around, stop, stepper)
-            deepest, hardest = max(deepest, peak[0]), max(hardest, peak[1])
-    for unseen in _hidden(osc, path, barrier, stepper, 6):
-        peak = _peak(osc, unseen, stop, stepper)
-        entries, deepest, hardest = entries + 1, max(deepest, peak[0]), max(hardest, peak[1])
-    return Contacts(entries, deepest, hardest)
+    entries, touching = int(np.sum((depth[:-1] <= 0) & (depth[1:] > 0))), np.flatnonzero(depth > 0)
+    runs = [run for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1) if run.size]
+    last, unseen = len(depth) - 1, _hidden(osc, path, barrier, stepper, 6)
+    around = [_around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, last), stepper) for run in runs]
+    peaks = [_peak(osc, each, stop, stepper) for each in (*around, *unseen)]
+    deepest, hardest = np.max([(0.0, 0.0), *peaks], axis=0).tolist()
+    return Contacts(entries + len(unseen), deepest, hardest)
 
 
 def _depth_and_rate(states: Array, barrier: Barrier) -> tuple[Array, Array]:

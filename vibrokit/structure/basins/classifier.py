@@ -112,7 +112,7 @@ class BasinClassifier:
         # sections of a stretch are kept in memory.
         longest = self.budget if self.mask is None else _CONFIRMED
         stretch, known = 8, 0
-        while (active := trajectories.active()).size:
+        while (active := np.flatnonzero(found == NOT_FOLLOWED)).size:
             trajectories.follow(active, stretch)
             stretch = min(4 * stretch, longest)
             trajectories.close()
@@ -165,9 +165,6 @@ class _Trajectories:
         # By extended attractor: sections since a marked cell was entered (0: not yet), and how many were not near.
         self.stayed, self.missed = np.zeros((2, len(states), extended), dtype=np.int64)
         self.sections = 0  # of all together
-
-    def active(self) -> Whole:
-        return np.flatnonzero(self.found == NOT_FOLLOWED)
 
     def to_section(self, start_time: float) -> None:
         """Integrate states between two sections to the next one."""

@@ -19,9 +19,10 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
-from vibrokit.structure.basins.stop_cells import FINEST, MARGIN, agreeing, centres
+from vibrokit.structure.basins.stop_cells import FINEST, MARGIN, agreeing
 from vibrokit.structure.persistence import persistent_stepper
 from vibrokit.structure.regions import on_circle
+from vibrokit.structure.scales import states_at
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -167,15 +168,14 @@ class BasinGrid:
     def _follow(self, labels: Labels, classifier: BasinClassifier) -> None:
         """Follow the cells that are not known yet, some at a time."""
         self._sections = 0
-        places = np.flatnonzero(labels == NOT_FOLLOWED)
+        places, centres = np.flatnonzero(labels == NOT_FOLLOWED), classifier.region.cell_centres(labels.shape)
         advance(labels.size - len(places))
         chunk = 2**15  # cells that are followed together: more need more memory, and are no faster
         for start in range(0, len(places), chunk):
             part = places[start : start + chunk]
             found = np.full(len(part), NOT_FOLLOWED, dtype=np.int64)
             try:
-                states = centres(classifier.osc, classifier.region, labels.shape, part)
-                self._sections += classifier.label(found, states)
+                self._sections += classifier.label(found, states_at(classifier.osc, centres[part]))
             finally:
                 labels.flat[part] = found
 

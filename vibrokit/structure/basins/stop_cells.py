@@ -17,7 +17,6 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
-from vibrokit.structure.autonomous import equilibria
 from vibrokit.structure.basins.landings import Landings
 from vibrokit.structure.circle import wrapped
 from vibrokit.structure.rest import SteadyForce
@@ -55,7 +54,8 @@ def core_of(
     """
     certain = agreeing(basins.labels, margin)
     cells, shape, labels = np.flatnonzero(certain), certain.shape, basins.labels.flat
-    ended = run_ensemble(osc, Flow.STATE, stepper, centres(osc, basins.region, shape, cells), executor=executor)
+    states = states_at(osc, basins.region.cell_centres(shape)[cells])
+    ended = run_ensemble(osc, Flow.STATE, stepper, states, executor=executor)
     ends = wrapped(osc, ended.states, float(np.mean(basins.region.x))) if circle else ended.states
     reached, inside = basins.region.cells_at(ends, shape)
     targets = np.ravel_multi_index(tuple(reached.T), shape)
@@ -72,13 +72,6 @@ def agreeing(labels: Labels, margin: int) -> Mask:
     size = 2 * margin + 1
     least = ndimage.minimum_filter(labels, size=size, mode="nearest")
     return (least >= 0) & (least == ndimage.maximum_filter(labels, size=size, mode="nearest"))
-
-
-def centres(osc: Oscillator, region: Region, shape: tuple[int, ...], cells: Whole) -> NDArray[np.float64]:
-    """Return states (count, n) at the centres of some cells; states of the noise are 0."""
-    low, high = region.bounds.T
-    places = np.stack(np.unravel_index(cells, shape), axis=1)
-    return states_at(osc, low + (high - low) * (places + 0.5) / np.array(shape))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -156,11 +149,10 @@ def wells(
         return None
     low, high = region.x
     edges, speeds = np.linspace(low, high, cells[0] + 1), np.linspace(*region.v, num=cells[1] + 1, dtype=np.float64)
-    rests = equilibria(osc, low, high)
-    bounds = [low, *sorted([*osc.model.domain.borders(low, high), *(float(rest.point[0]) for rest in rests)]), high]
+    steady = SteadyForce(osc)
+    bounds = [low, *sorted([*osc.model.domain.borders(low, high), *steady.zeros(low, high)]), high]
     stops = [barrier.position for barrier in osc.barriers if low < barrier.position < high]
     places = np.unique([*edges, *stops, *bounds])
-    steady = SteadyForce(osc)
     inside, work = steady.work(places)
     halved = steady.work(np.sort([*places, *(0.5 * (places[:-1] + places[1:]))]))[1].reshape(-1, 2).sum(axis=1)
     potential = np.concatenate([[0.0], -np.cumsum(work)])

@@ -158,9 +158,6 @@ class Straddles:
         self._points = [points[kept] for points in self._points]
         self._stretches = [stretches[kept] for stretches in self._stretches]
 
-    def tracks(self) -> list[EdgeTrack]:
-        return [self.track(index) for index in range(len(self))]
-
     def track(self, index: int) -> EdgeTrack:
         """One motion so far."""
         low, high = sorted(int(label) for label in self.end_labels[index])

@@ -260,7 +260,7 @@ class SaddleSearch:
         """Describe the motions that converged to no orbit, those of each pair of labels together."""
         self._explain(straddles, np.ones(len(straddles), dtype=bool))
         tracks: defaultdict[Pair, list[EdgeTrack]] = defaultdict(list)
-        for track in straddles.tracks():
+        for track in map(straddles.track, range(len(straddles))):
             tracks[track.labels].append(track)
         for pair, motions in tracks.items():
             scaled = [self.region.scaled(motion.points) for motion in motions]

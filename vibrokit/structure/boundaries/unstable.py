@@ -58,7 +58,8 @@ def describe_unstable(osc: Oscillator, orbit: Orbit, stepper: Stepper, leads_to:
         with np.errstate(over="ignore"):  # next to a pole, one may be too large for a number
             multipliers = np.exp(exponents * osc.section_interval)
     else:
-        order = _descending(orbit.multipliers)
+        # The largest first; of a complex pair the one above the real axis first.
+        order = np.lexsort((-orbit.multipliers.imag, -np.abs(orbit.multipliers).round(14)))
         multipliers, exponents = orbit.multipliers[order], orbit.exponents[order]
     return Saddle(
         # No direction in (x, v) leads to a cycle but its own.
@@ -95,11 +96,6 @@ def _kind_of(multipliers: NDArray[np.complex128]) -> str:
     if len(growing) > 1:
         return "repeller"
     return "flip saddle" if growing[0].real < 0 else "saddle"
-
-
-def _descending(values: NDArray[np.complex128]) -> NDArray[np.intp]:
-    """The order of multipliers, the largest first; of a complex pair the one above the real axis first."""
-    return np.lexsort((-values.imag, -np.abs(values).round(14)))
 
 
 def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable, Mapping
 
@@ -12,28 +11,32 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from vibrokit.errors import VibrokitError
-from vibrokit.structure.tracing.families import Family, Member
+from vibrokit.structure.tracing.families import FOLD, HOPF, TORUS, Family, Member
 from vibrokit.structure.tracing.turns import NEXT_TO, Surface, surfaces_of, turns_at
 
-FOLD, CROSSING = "fold", "pitchfork or transcritical"
-DOUBLING, TORUS, HOPF, GRAZING = "period doubling", "Neimark–Sacker", "Hopf", "grazing"
-
+GRAZING = "grazing"
+_CROSSING = "pitchfork or transcritical"
 _JUST_AHEAD = 1e-3  # in units of the span: how far ahead a grazing may lie, and how far back an extrapolation begins
 _SHARP = 1e-13  # fraction of a step that roots are found to
 
 Array = NDArray[np.float64]
+Test = Callable[[Member], float]
+"""A function that is 0 at a bifurcation."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stage:
-    """A member of a family, with what is computed of it while the family is followed."""
+    """A member of a family, with what depends on the way there."""
 
     member: Member
-    slope: Array  # (n,), derivative of its defect in the parameter
     tangent: Array  # (n + 1,), of the family, in the direction of travel
-    tests: dict[str, float]  # functions that change their sign at the bifurcation they are named after
     reaches: Mapping[Surface, Array]  # at the turns towards each surface, the farthest first; negative short of it
-    stable: bool
+
+    @classmethod
+    def of(cls, member: Member, ahead: Array) -> Stage:
+        """Evaluate a member; `ahead` is the direction of travel. A VibrokitError is raised where motion diverges."""
+        osc = member.family.at(member.value)
+        return cls(member, member.tangent(ahead), turns_at(member, osc, surfaces_of(osc)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,25 +56,13 @@ class Located:
     bracketed: bool = False  # whether it is only known to lie between two members
 
 
-def stage(family: Family, member: Member, ahead: Array) -> Stage:
-    """Evaluate a member; `ahead` is the direction of travel."""
-    slope = family.slope(member)
-    rates = _rates(family, member)
-    stable = bool((rates.real < 0).all() if family.kind == "equilibrium" else (np.abs(rates) < 1).all())
-    osc = family.at(member.value)
-    reaches = turns_at(family, member, osc, surfaces_of(osc))
-    return Stage(
-        member, slope, family.tangent(member, slope, ahead), _tests(family, member, rates), reaches, stable
-    )  # fmt: skip
-
-
-def bifurcations_between(family: Family, before: Stage, after: Stage) -> list[Located]:
+def bifurcations_between(before: Stage, after: Stage) -> list[Located]:
     """Locate the bifurcations of a family of attractors between two members; those of unstable motion are left out."""
-    if not (before.stable or after.stable):
+    if not (before.member.stable or after.member.stable):
         return []
-    found, interval = [], _Interval(family, before, after)
-    for name, value in before.tests.items():
-        if value * after.tests[name] < 0:
+    found, interval = [], _Interval(before.member.family, before, after)
+    for name, value in before.member.tests.items():
+        if value * after.member.tests[name] < 0:
             found.append(interval.located(name, _test(name)))
     for surface in before.reaches:
         counts = sorted(int(np.sum(each.reaches[surface] > 0)) for each in (before, after))
@@ -92,17 +83,15 @@ def _grazing_between(interval: _Interval, surface: Surface, turn: int) -> Locate
     return _passed(short, towards, reach, side) or found
 
 
-def grazing_ahead(family: Family, here: Stage) -> list[Located]:
+def grazing_ahead(here: Stage) -> list[Located]:
     """Locate grazing just beyond the last stage that a family could be followed to.
 
     Beyond grazing with a stiff stop an orbit may no longer exist, or turn back too soon to be followed; short of it,
     the family is smooth. An orbit that does not touch the stop is followed through it; of any other, the reach is
     extrapolated to 0, from members ever closer to it.
     """
-    found = []
-    if not here.stable:
-        return []
-    for surface, reaches in here.reaches.items():
+    found, family = [], here.member.family
+    for surface, reaches in here.reaches.items() if here.member.stable else ():
         turn = int(np.sum(reaches > 0))
         if turn < len(reaches) and reaches[turn] > -NEXT_TO:
             short = _short_of_touch(family, surface, turn)
@@ -123,7 +112,7 @@ def _short_of_touch(family: Family, surface: Surface, turn: int) -> Family:
     return dataclasses.replace(family, osc=family.osc.replace({f"barriers.{surface.stop}.position": away}))
 
 
-def _passed(family: Family, here: Stage, depth: Callable[[Family, Member], float], side: str) -> Located | None:
+def _passed(family: Family, here: Stage, depth: Test, side: str) -> Located | None:
     """Locate the root of a depth between a stage and a member of a smooth family just ahead; None if it is not there.
 
     The distance to that member is doubled until the depth is positive.
@@ -131,32 +120,30 @@ def _passed(family: Family, here: Stage, depth: Callable[[Family, Member], float
     distance = _SHARP
     try:
         while distance <= _JUST_AHEAD:
-            ahead = family.corrected(here.member.place + distance * here.tangent, here.slope, here.tangent)
-            if depth(family, ahead) > 0:
-                return _Interval(family, here, stage(family, ahead, here.tangent)).located(GRAZING, depth, side)
+            ahead = family.corrected(here.member.place + distance * here.tangent, here.member.slope, here.tangent)
+            if depth(ahead) > 0:
+                return _Interval(family, here, Stage.of(ahead, here.tangent)).located(GRAZING, depth, side)
             distance *= 2
     except VibrokitError:
         pass  # no such member exists
     return None
 
 
-def _extrapolated(
-    family: Family, here: Stage, depth: Callable[[Family, Member], float], side: str
-) -> Located | None:  # fmt: skip
+def _extrapolated(family: Family, here: Stage, depth: Test, side: str) -> Located | None:
     """Approach the root of a depth along the tangent from short of it; None if it does not lie just ahead."""
 
     def member(distance: float) -> Member:
-        return family.corrected(here.member.place + distance * here.tangent, here.slope, here.tangent)
+        return family.corrected(here.member.place + distance * here.tangent, here.member.slope, here.tangent)
 
     distance, now, remaining = 0.0, here.member, math.inf
     try:
-        before, last, deep = -_JUST_AHEAD, depth(family, member(-_JUST_AHEAD)), depth(family, now)
+        before, last, deep = -_JUST_AHEAD, depth(member(-_JUST_AHEAD)), depth(now)
         for _ in range(8):
             remaining = -deep * (distance - before) / (deep - last) if deep > last else math.inf
             if not 0 <= remaining <= _JUST_AHEAD:
                 return None
             nearer = member(distance + 0.9 * remaining)
-            new = depth(family, nearer)
+            new = depth(nearer)
             if not deep < new <= 0:
                 break
             before, last, distance, deep, now = distance, deep, distance + 0.9 * remaining, new, nearer
@@ -169,32 +156,15 @@ def _extrapolated(
     return Located(GRAZING, now.value + ahead, error, family.period, now.point, side)
 
 
-def _rates(family: Family, member: Member) -> NDArray[np.complex128]:
-    """Exponents at an equilibrium; multipliers of an orbit, without that of a shift along a limit cycle."""
-    rates = np.linalg.eigvals(member.derivative).astype(complex)
-    return np.delete(rates, np.argmin(np.abs(rates - 1))) if family.kind == "limit cycle" else rates
+def _test(name: str) -> Test:
+    return lambda member: member.tests[name]
 
 
-def _tests(family: Family, member: Member, rates: NDArray[np.complex128]) -> dict[str, float]:
-    pairs = list(itertools.combinations(rates, 2))
-    tests = {FOLD: float(np.linalg.det(member.jacobian / family.sizes))}
-    if family.kind == "equilibrium":
-        return tests | {HOPF: float(np.prod([first + second for first, second in pairs]).real)}
-    tests[DOUBLING] = float(np.prod(rates + 1).real)
-    if pairs:
-        tests[TORUS] = float(np.prod([first * second - 1 for first, second in pairs]).real)
-    return tests
-
-
-def _test(name: str) -> Callable[[Family, Member], float]:
-    return lambda family, member: _tests(family, member, _rates(family, member))[name]
-
-
-def _reach(owner: Family, surface: Surface, turn: int) -> Callable[[Family, Member], float]:
+def _reach(owner: Family, surface: Surface, turn: int) -> Test:
     """Return the reach of a member at one of its turns, for a surface where it is in the scenes of the owner."""
 
-    def reach(family: Family, member: Member) -> float:
-        reaches = turns_at(family, member, owner.at(member.value), [surface])[surface]
+    def reach(member: Member) -> float:
+        reaches = turns_at(member, owner.at(member.value), [surface])[surface]
         return float(reaches[turn]) if turn < len(reaches) else -1.0
 
     return reach
@@ -210,22 +180,21 @@ class _Interval:
 
     def member(self, fraction: float) -> Member:
         """Return the member at a fraction of the chord, on the plane across it."""
-        start, slope = self.before.member.place, self.before.slope
+        start, slope = self.before.member.place, self.before.member.slope
         chord = self.after.member.place - start
-        slope = slope + fraction * (self.after.slope - slope)
+        slope = slope + fraction * (self.after.member.slope - slope)
         return self.family.corrected(start + fraction * chord, slope, chord / np.linalg.norm(chord))
 
-    def located(self, kind: str, test: Callable[[Family, Member], float], side: str = "") -> Located | None:
+    def located(self, kind: str, test: Test, side: str = "") -> Located | None:
         """Locate the root of a test; None if it is no bifurcation of that kind."""
         if kind == FOLD and self.before.tangent[-1] * self.after.tangent[-1] > 0:
-            kind = CROSSING
+            kind = _CROSSING
         try:
             fraction = brentq(
-                lambda fraction: test(self.family, self.member(fraction)),
-                0.0, 1.0, xtol=_SHARP, rtol=8 * np.finfo(float).eps,
-            )  # fmt: skip
+                lambda fraction: test(self.member(fraction)), 0.0, 1.0, xtol=_SHARP, rtol=8 * np.finfo(float).eps
+            )
             member = self.member(fraction)
-            if _spurious(kind, self.family, member, test):
+            if _spurious(kind, member, test):
                 return None
             error = self._error(fraction, test)
         except (VibrokitError, ValueError, FloatingPointError):  # Newton's method converged to another family
@@ -235,20 +204,20 @@ class _Interval:
             return Located(kind, value, error, self.family.period, first.point, side, bracketed=True)
         return Located(kind, member.value, error, self.family.period, member.point, side)
 
-    def _error(self, fraction: float, test: Callable[[Family, Member], float]) -> float:
+    def _error(self, fraction: float, test: Test) -> float:
         """Return how far a root moves when the integration is tightened, in the parameter."""
         family = dataclasses.replace(self.family, stepper=self.family.stepper.refined())
         finer = dataclasses.replace(self, family=family)
         low, high = max(fraction - 1e-4, 0.0), min(fraction + 1e-4, 1.0)
-        steepness = (test(self.family, self.member(high)) - test(self.family, self.member(low))) / (high - low)
-        moved = -test(family, finer.member(fraction)) / steepness
+        steepness = (test(self.member(high)) - test(self.member(low))) / (high - low)
+        moved = -test(finer.member(fraction)) / steepness
         tight = finer.member(min(max(fraction + moved, 0.0), 1.0))
         value = self.member(fraction).value
         return abs(tight.value - value) + 4 * float(np.spacing(abs(value))) + _SHARP * family.span
 
 
-def _spurious(kind: str, family: Family, member: Member, test: Callable[[Family, Member], float]) -> bool:
+def _spurious(kind: str, member: Member, test: Test) -> bool:
     """Whether a test vanishes for another reason: two real rates of opposite sign, or a turn that came or went."""
     if kind in (TORUS, HOPF):
-        return not (np.abs(_rates(family, member).imag) > 1e-9).any()
-    return kind == GRAZING and not abs(test(family, member)) < 1e-6
+        return not (np.abs(member.rates.imag) > 1e-9).any()
+    return kind == GRAZING and not abs(test(member)) < 1e-6

@@ -26,8 +26,8 @@ from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.orbits import SAMPLES, Orbit, refine_orbit, visited
 from vibrokit.structure.parameter_values import ParameterLine
-from vibrokit.structure.tracing.bifurcations import DOUBLING, GRAZING, Located
-from vibrokit.structure.tracing.families import Member
+from vibrokit.structure.tracing.bifurcations import GRAZING, Located
+from vibrokit.structure.tracing.families import DOUBLING, Member
 from vibrokit.structure.tracing.following import follow
 
 _SAME = 1e-5  # fraction of the region's size within which two points are one
@@ -114,7 +114,7 @@ class Tracing:
             other = self._add(attractor, end, to)
         if other is None:
             osc = self.at(end.value)
-            orbit = Orbit(end.point[None], attractor.period, end.duration, end.derivative[None], end.residual(osc))
+            orbit = Orbit(end.point[None], attractor.period, end.duration, end.derivative[None], end.residual)
             self._led_to[at, index, to] = visited(osc, orbit, self.stepper)
             return
         first, second, pair = (index, other, at) if to > at else (other, index, to)
@@ -135,13 +135,11 @@ class Tracing:
         osc, period = self.at(self.values[at]), origin.period
         try:
             if origin.kind == "limit cycle":
-                orbit: Orbit = Cycle(
-                    member.point[None], 1, member.duration, member.derivative[None], member.residual(osc)
-                )
+                orbit: Orbit = Cycle(member.point[None], 1, member.duration, member.derivative[None], member.residual)
             else:
                 point, duration = member.point[None], period * osc.section_interval
                 steps = linear_map(osc, point, self.stepper, intervals=period).derivatives
-                orbit = Orbit(point, period, duration, steps, member.residual(osc))
+                orbit = Orbit(point, period, duration, steps, member.residual)
             attractor = describe_orbit(osc, orbit, self.stepper)
         except VibrokitError:
             return None

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -20,6 +22,7 @@ from vibrokit.structure.orbits import section_equations
 from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.scales import units_of
 
+FOLD, DOUBLING, TORUS, HOPF = "fold", "period doubling", "Neimark–Sacker", "Hopf"
 _CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
 
 Array = NDArray[np.float64]
@@ -27,9 +30,9 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Member:
-    """One steady motion of a family."""
+    """One steady motion of a family, or a place next to it where its equations are evaluated."""
 
-    value: float  # of the parameter
+    family: Family
     place: Array  # (n + 1,), unknowns in units of their sizes, then the value in units of the span
     point: Array  # (n,), on the section
     duration: float  # time after which it repeats (s); 0 for an equilibrium
@@ -37,9 +40,57 @@ class Member:
     defect: Array  # (n,), image less point; at an equilibrium, the rate of change times a sixteenth of 2π/ω_n
     jacobian: Array  # (n, n), derivative of the defect in the unknowns, each in units of its size
 
-    def residual(self, osc: Oscillator) -> float:
+    @property
+    def value(self) -> float:
+        """Value of the parameter."""
+        return float(self.place[-1] * self.family.span)
+
+    @property
+    def residual(self) -> float:
         """Size of the defect in units of the scene."""
-        return float(np.linalg.norm(self.defect / units_of(osc)))
+        return float(np.linalg.norm(self.defect / units_of(self.family.at(self.value))))
+
+    @cached_property
+    def slope(self) -> Array:
+        """Derivative of the defect in the parameter, in units of the span: a difference, inwards.
+
+        A StructureError is raised if the motion diverges at the neighbouring value.
+        """
+        family, step = self.family, np.copysign(1e-4, self.family.middle - self.value)
+        nudged = family.equations(family.at(self.value + step * family.span))(self.place[None, :-1] * family.sizes)
+        slope = np.asarray((nudged.residuals[0] - self.defect) / step)
+        if not np.isfinite(slope).all():
+            raise StructureError(f"a trajectory went out of range from {tuple(self.point.tolist())}.")
+        return slope
+
+    def tangent(self, ahead: Array) -> Array:
+        """Return the unit tangent of the family, on the side of `ahead`."""
+        tangent: Array = np.linalg.svd(np.column_stack([self.jacobian, self.slope]))[2][-1]
+        return tangent if tangent @ ahead >= 0 else -tangent
+
+    @cached_property
+    def rates(self) -> NDArray[np.complex128]:
+        """Exponents at an equilibrium; multipliers of an orbit, without that of a shift along a limit cycle."""
+        rates = np.linalg.eigvals(self.derivative).astype(complex)
+        return np.delete(rates, np.argmin(np.abs(rates - 1))) if self.family.kind == "limit cycle" else rates
+
+    @property
+    def stable(self) -> bool:
+        """Whether deviations decay."""
+        rates = self.rates
+        return bool((rates.real < 0).all() if self.family.kind == "equilibrium" else (np.abs(rates) < 1).all())
+
+    @cached_property
+    def tests(self) -> Mapping[str, float]:
+        """Functions that change their sign at the bifurcation they are named after."""
+        pairs = list(itertools.combinations(self.rates, 2))
+        tests = {FOLD: float(np.linalg.det(self.jacobian / self.family.sizes))}
+        if self.family.kind == "equilibrium":
+            return tests | {HOPF: float(np.prod([first + second for first, second in pairs]).real)}
+        tests[DOUBLING] = float(np.prod(self.rates + 1).real)
+        if pairs:
+            tests[TORUS] = float(np.prod([first * second - 1 for first, second in pairs]).real)
+        return tests
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,10 +125,9 @@ class Family(ABC):
 
     def member(self, place: Array) -> Member:
         """Evaluate the defect and its derivatives at a place, which need not be on the family."""
-        value, unknowns = float(place[-1] * self.span), place[:-1] * self.sizes
-        osc = self.at(value)
+        unknowns, osc = place[:-1] * self.sizes, self.at(float(place[-1] * self.span))
         (defect,), (jacobian,), (derivative,) = self.equations(osc)(unknowns[None])
-        return Member(value, place, *self.parted(osc, unknowns), derivative, defect, jacobian * self.sizes)
+        return Member(self, place, *self.parted(osc, unknowns), derivative, defect, jacobian * self.sizes)
 
     def corrected(self, guess: Array, slope: Array, normal: Array) -> Member:
         """Return the member on the plane through a guess with a normal, by Newton's method until the residual stays.
@@ -99,26 +149,9 @@ class Family(ABC):
         found: Member = members[0]
         return found
 
-    def slope(self, member: Member) -> Array:
-        """Return the derivative of the defect in the parameter, in units of the span: a difference, inwards.
-
-        A StructureError is raised if the motion diverges at the neighbouring value.
-        """
-        step = np.copysign(1e-4, self.middle - member.value)
-        nudged = self.equations(self.at(member.value + step * self.span))(member.place[None, :-1] * self.sizes)
-        slope = np.asarray((nudged.residuals[0] - member.defect) / step)
-        if not np.isfinite(slope).all():
-            raise StructureError(f"a trajectory went out of range from {tuple(member.point.tolist())}.")
-        return slope
-
     def closes_early(self, member: Member) -> bool:
         """Whether an orbit repeats after a part of its period, so that it belongs to another family."""
         return False
-
-    def tangent(self, member: Member, slope: Array, ahead: Array) -> Array:
-        """Return the unit tangent of the family at a member, on the side of `ahead`."""
-        tangent: Array = np.linalg.svd(np.column_stack([member.jacobian, slope]))[2][-1]
-        return tangent if tangent @ ahead >= 0 else -tangent
 
 
 class PeriodicFamily(Family):

@@ -13,7 +13,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.parameter_values import ParameterLine
-from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead, stage
+from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations_between, grazing_ahead
 from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
 _LONGEST = 0.01  # fraction of the region's size that a motion may move in one step
@@ -55,7 +55,7 @@ def follow(
     across = np.abs(ahead)
     try:
         first = family.corrected(family.place_of(unknowns, start), np.zeros(len(unknowns)), across)
-        here = stage(family, first, ahead)
+        here = Stage.of(first, ahead)
     except VibrokitError:
         return Followed(None, False, ())
     found: list[Located] = []
@@ -64,18 +64,18 @@ def follow(
         guess, normal, arriving = _predicted(here, length, target / family.span, across)
         length = float(np.linalg.norm(guess - here.member.place))
         there = _step(family, here, guess, normal)
-        passed = bifurcations_between(family, here, there) if there else []
+        passed = bifurcations_between(here, there) if there else []
         if there is None or (length > 1e-3 and any(one.bracketed for one in passed)):
             length /= 2
             if length < _SHORTEST:
-                found += grazing_ahead(family, here)
+                found += grazing_ahead(here)
                 break
             continue
         found += passed
         if there.tangent @ ahead < 0:
             break
         if arriving:
-            return Followed(there.member, there.stable, tuple(found))
+            return Followed(there.member, there.member.stable, tuple(found))
         here, length = there, 2 * length
     return Followed(None, False, tuple(found))
 
@@ -96,7 +96,7 @@ def _step(family: Family, here: Stage, guess: Array, normal: Array) -> Stage | N
     """Return the next stage, or None if the step was too long for it."""
     length = float(np.linalg.norm(guess - here.member.place))
     try:
-        there = stage(family, family.corrected(guess, here.slope, normal), here.tangent)
+        there = Stage.of(family.corrected(guess, here.member.slope, normal), here.tangent)
     except VibrokitError:
         return None
     astray = float(np.linalg.norm(there.member.place - guess))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.single import record
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.tracing.families import Family, Member
+from vibrokit.structure.tracing.families import Member
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.numeric import contact_force_of
 
@@ -55,12 +55,13 @@ def surfaces_of(osc: Oscillator) -> list[Surface]:
     return found + [Release(stop, True) for stop, contact in enumerate(osc.model.contacts) if contact.clamped]
 
 
-def turns_at(family: Family, member: Member, scene: Oscillator, surfaces: Sequence[Surface]) -> dict[Surface, Array]:
+def turns_at(member: Member, scene: Oscillator, surfaces: Sequence[Surface]) -> dict[Surface, Array]:
     """Return how far beyond each surface of a scene a motion is at its turns towards it, the farthest first.
 
     The unit is the extent of the reach, which is that of the motion in x, or of the force. An equilibrium, which turns
     nowhere, has one reach, from outside, in units of the family.
     """
+    family = member.family
     osc = family.at(member.value)
     if family.kind == "equilibrium":
         place = member.point[None]
