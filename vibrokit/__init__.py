@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
     from vibrokit.kernels.order8 import Order8 as Order8
     from vibrokit.kernels.rk4 import RK4 as RK4
+    from vibrokit.kernels.rk8 import RK8 as RK8
     from vibrokit.oscillator import Oscillator as Oscillator
     from vibrokit.parts.barrier import Barrier as Barrier
     from vibrokit.parts.contact.contact_law import ContactLaw as ContactLaw
@@ -108,6 +109,7 @@ _MODULES = {
     "FreeFlight": "vibrokit.kernels.free_flight",
     "Order8": "vibrokit.kernels.order8",
     "RK4": "vibrokit.kernels.rk4",
+    "RK8": "vibrokit.kernels.rk8",
     "Oscillator": "vibrokit.oscillator",
     "Barrier": "vibrokit.parts.barrier",
     "ContactLaw": "vibrokit.parts.contact.contact_law",

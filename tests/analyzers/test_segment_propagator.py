@@ -25,7 +25,7 @@ def one_by_one(propagator, lengths):
     )
 
 
-@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-10), vk.RK4(256)], ids=repr)
+@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-10), vk.RK4(256), vk.RK8(128)], ids=repr)
 @pytest.mark.parametrize("last", [None, 0.3])
 def test_nodes_of_all_phases_are_carried_together(stepper, last):
     propagator = SegmentPropagator(OSC, stepper)

@@ -177,7 +177,9 @@ class TestVisits:
         assert ended.states.tobytes() == self.sections(stepper, 11).tobytes()
 
 
-@pytest.mark.parametrize("stepper", [vk.RK4(steps=256), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name)
+@pytest.mark.parametrize(
+    "stepper", [vk.RK4(steps=256), vk.RK8(steps=64), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name
+)
 def test_starts_at_several_phases(stepper):
     """Trajectories that begin at parts of the period end where those of a whole period do."""
     osc, parts = impacting(), 16

@@ -1,4 +1,4 @@
-"""RK4: order 4 where forces are smooth, and across contacts the order that the force leaves."""
+"""RK4 and RK8: their orders where forces are smooth, and across contacts the order that the force leaves."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import vibrokit as vk
 from vibrokit.errors import StepperError
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.single import record
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -38,21 +39,35 @@ def extremals():
     return starts, reference(starts, 3 * PERIOD)
 
 
-def test_order_4_in_hamiltons_equations(extremals):
+@pytest.mark.parametrize(
+    ("kind", "steps", "order", "least"), [(vk.RK4, (128, 256, 512), 4.0, 1e-8), (vk.RK8, (12, 24, 48), 8.5, 1e-11)]
+)
+def test_order_in_hamiltons_equations(extremals, kind, steps, order, least):
     starts, ends = extremals
 
-    def error(steps):
-        found = run_ensemble(DUFFING, Flow.HAMILTONIAN, vk.RK4(steps), starts, 3).states
+    def error(count):
+        found = run_ensemble(DUFFING, Flow.HAMILTONIAN, kind(count), starts, 3).states
         return np.median(np.linalg.norm(found - ends, axis=1))
 
-    errors = [error(steps) for steps in (128, 256, 512)]
-    assert errors[-1] < 1e-8
-    np.testing.assert_allclose(-np.diff(np.log2(errors)), 4.0, atol=0.2)
+    errors = [error(count) for count in steps]
+    assert errors[-1] < least
+    np.testing.assert_allclose(-np.diff(np.log2(errors)), order, atol=order / 8)
 
 
-def test_recorded_states_are_those_of_the_ensemble():
-    recorded = record(DUFFING, Flow.STATE, vk.RK4(40), STARTS[0], 0.0, PERIOD, 3)
-    ends = np.array([DUFFING.section_map(STARTS[:1], periods, stepper=vk.RK4(40))[0] for periods in (1, 2, 3)])
+def test_derivatives_are_those_of_the_flow():
+    """Of many equations, whose stages are computed in another way."""
+    module = kernel_for(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.RK8(64)).module
+    start = np.zeros((1, module.EQUATIONS))
+    start[0, :4] = 0.4, -0.2, 1e-2, -2e-2
+    one = run_ensemble(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.RK8(64), start, 1).states
+    other = run_ensemble(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.Order8(1e-13), start, 1).states
+    np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("stepper", [vk.RK4(40), vk.RK8(40)], ids=repr)
+def test_recorded_states_are_those_of_the_ensemble(stepper):
+    recorded = record(DUFFING, Flow.STATE, stepper, STARTS[0], 0.0, PERIOD, 3)
+    ends = np.array([DUFFING.section_map(STARTS[:1], periods, stepper=stepper)[0] for periods in (1, 2, 3)])
     np.testing.assert_allclose(recorded[1:], ends, rtol=1e-12)  # the forcing of later periods is rounded differently
 
 
@@ -69,6 +84,11 @@ def test_the_power_of_the_depth_at_first_touch_sets_the_order_of_rk4(power, erro
     )
     assert np.log2(coarse / small) / 4 == pytest.approx(min(1 + power, 4.0), abs=0.1)
     assert small == pytest.approx(error, rel=0.1)
+
+
+def test_noise_is_refused():
+    with pytest.raises(StepperError, match="RK4"):
+        DUFFING.section_map(STARTS, stepper=vk.RK8(32), rng=0)
 
 
 @pytest.mark.parametrize("steps", [0, -3, 1.5, True, 10**8])

@@ -10,7 +10,7 @@ import vibrokit as vk
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.structure.orbits import refine_orbit
 
-STEPPERS = [vk.RK4(steps=8192), vk.Order8(tolerance=1e-14), vk.FreeFlight(tolerance=1e-14)]
+STEPPERS = [vk.RK4(steps=8192), vk.RK8(steps=256), vk.Order8(tolerance=1e-14), vk.FreeFlight(tolerance=1e-14)]
 
 
 def linear_scene(damping, natural=1.0, amplitude=0.1, frequency=0.57, constant=0.05):

@@ -15,7 +15,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 X, V = sympy.symbols("x v", real=True)
 NAMES = {name: sympy.Symbol(name, real=True) for name in ("a", "b", "c", "d", "h", "k", "n")} | {"x": X, "v": V}
-STEPPERS = (vk.RK4(), vk.Order8())
+STEPPERS = (vk.RK4(), vk.RK8(), vk.Order8())
 
 
 def borders(formula):

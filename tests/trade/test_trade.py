@@ -13,6 +13,7 @@ from vibrokit.trade.steppers import measure_steppers, starts_between_stops
 SETTINGS = {"starts": 8, "periods": 1, "seconds": 0.01}
 LADDERS = (
     tuple(vk.RK4(steps) for steps in (32, 64, 128, 256)),
+    tuple(vk.RK8(steps) for steps in (8, 16, 32)),
     tuple(vk.Order8(10.0**-k) for k in (5, 7, 9)),
     tuple(vk.FreeFlight(10.0**-k) for k in (5, 7, 9)),
 )
@@ -26,10 +27,11 @@ def linear():
 
 def test_orders_without_contact(linear):
     assert linear.orders["RK4"] == pytest.approx(4, abs=0.3)
+    assert linear.orders["RK8"] == pytest.approx(8, abs=0.5)
 
 
 def test_errors_fall_from_coarse_to_fine(linear):
-    for name in ("RK4", "Order8"):
+    for name in ("RK4", "RK8", "Order8"):
         errors = [row.error_median for row in linear.rows if row.name == name]
         assert errors == sorted(errors, reverse=True)
         assert len(set(errors)) == len(errors)
@@ -46,7 +48,7 @@ def test_numbers_are_complete(linear):
         assert row.error_median <= row.error_90
         assert min(row.seconds, row.seconds_alone, row.memory) > 0
     assert [row.stepper for row in linear.rows if row.default] == ["RK4(steps=256)"]
-    assert set(linear.references) == {"RK4", "Order8", "FreeFlight"}
+    assert set(linear.references) == {"RK4", "RK8", "Order8", "FreeFlight"}
     assert linear.references["FreeFlight"].startswith("Order8")
 
 
@@ -71,7 +73,7 @@ def test_refusal_is_told():
     trade = measure_steppers(load_scene("duffing"), ladders=LADDERS, **SETTINGS)
     assert list(trade.refused) == ["FreeFlight"]
     assert "FreeFlight: not used. FreeFlight needs linear motion" in str(trade)
-    assert trade.references == {"RK4": "Order8 at 1e-14", "Order8": "DOP853 at 2.3e-14"}
+    assert trade.references == {"RK4": "Order8 at 1e-14", **dict.fromkeys(("RK8", "Order8"), "DOP853 at 2.3e-14")}
 
 
 def test_settings_with_which_trajectories_diverge_are_told():

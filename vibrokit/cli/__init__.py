@@ -92,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     run.add_argument(
         "--stepper", metavar="NAME[:NUMBER]",
-        help="rk4:STEPS, order8:TOLERANCE or free-flight:TOLERANCE",
+        help="rk4:STEPS, rk8:STEPS, order8:TOLERANCE or free-flight:TOLERANCE",
     )  # fmt: skip
     run.add_argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)")
     run.add_argument("--seed", type=int, default=0, help="seed of what is random (default 0)")

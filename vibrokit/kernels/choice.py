@@ -11,6 +11,7 @@ from types import FrameType
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.contact_time import contact_times
+from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
@@ -73,7 +74,7 @@ def single_stepper(scene: Scene, flow: Flow) -> Stepper:
 
 def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     """Warn, at the line that called into this package, if fixed steps are too few in a contact to follow it."""
-    if not isinstance(stepper, RK4):
+    if not isinstance(stepper, FixedSteps):
         return
     shortest = min((contact.duration for contact in contact_times(scene, flow)), default=math.inf)
     taken, needed = stepper.steps * shortest / scene.time_unit, _steps_of_changes(scene, flow)
@@ -88,7 +89,7 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     if flow is not Flow.NOISY:
         advice += f", or {type(single_stepper(scene, flow)).__name__}, which finds contacts and pulses"
     warnings.warn(
-        f"RK4(steps={stepper.steps}) {problem}; {advice}.",
+        f"{type(stepper).__name__}(steps={stepper.steps}) {problem}; {advice}.",
         CoarseStepsWarning,
         stacklevel=_frames_inside(sys._getframe()),
     )

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibrokit.kernels.tableau import RESULT, STAGES, WEIGHTS
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -12,7 +17,7 @@ if TYPE_CHECKING:
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
 _FORCES = ("f0", "f1", "f2")
-_NODES = (0.0, 0.5, 1.0)
+CLASSICAL_NODES = (0.0, 0.5, 1.0)
 # `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
 # because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
 # only where a scene and a flow need them.
@@ -23,13 +28,12 @@ _STEP = (
 _STAGES = (("", ""), ("0.5*h*", "k1_"), ("0.5*h*", "k2_"), ("h*", "k3_"))
 
 
-def pieces_of_step(text: SceneText) -> list[str]:
-    """Pieces of a kernel of classical Runge–Kutta steps, with noise or without."""
-    pieces = [_tabulation(text), text.derivative, text.crossed, text.amplitude, text.slope]
+def step_function(text: SceneText, step: Sequence[str], nodes: int) -> str:
+    """Function `step_lanes`, which takes steps of every lane, from the lines of one step."""
     lines = [*_STEP]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    for step in range(steps):", *[f"        _node = {len(_NODES)}*step"] * text.forced]
-    return [*pieces, "\n".join([*lines, *(f"    {line}" for line in _step(text)), ""])]
+    lines += ["    for step in range(steps):", *[f"        _node = {nodes}*step"] * text.forced]
+    return "\n".join([*lines, *(f"    {line}" for line in step), ""])
 
 
 def lanes_of(text: SceneText) -> int:
@@ -45,7 +49,7 @@ def _ended(text: SceneText, start: Sequence[str], point: Sequence[str], target: 
     return [f"        {target} += crossed({', '.join([*states, *text.parameters])})"]
 
 
-def _step(text: SceneText) -> list[str]:
+def classical_step(text: SceneText) -> list[str]:
     """Lines of a classical Runge–Kutta step, between two kicks where there is noise.
 
     With U₁, U₂ standard normal, ΔW = √h U₁ and ΔZ = ½ h^(3/2) (U₁ + U₂/√3) have the right joint law.
@@ -72,6 +76,48 @@ def _step(text: SceneText) -> list[str]:
     return [*lines, *_ended(text, names, start, start[0])]
 
 
+def staged_step(text: SceneText) -> list[str]:
+    """Lines of a Dormand–Prince step of order 8, without noise. The rows of `z` after the variables keep its slopes.
+
+    With few equations, a stage is one loop over the lanes. With many, that loop would need more registers and a longer
+    compilation than it gains: the point of a stage is computed in a loop over all numbers of all lanes first, which
+    halves both times.
+    """
+    names, lanes = text.variables, lanes_of(text)
+    few, size = len(names) <= _FEW_EQUATIONS, len(names) * lanes
+
+    def at(place: int, row: int) -> str:
+        return f"z[{place * size + row * lanes} + lane]"
+
+    def moved(weights: NDArray[np.float64], row: int) -> str:
+        return at(0, row) + _combined(weights, lambda stage: at(1 + stage, row))
+
+    def number(stage: int) -> str:
+        return f"z[{(1 + stage) * size} + number]"
+
+    lines, rows, start = list[str](), range(len(names)), [at(0, row) for row in range(text.states)]
+    for stage, weights in enumerate(WEIGHTS):
+        point = [moved(weights, row) if few else at(1 + STAGES, row) for row in rows]
+        if not few:
+            lines += [f"    for number in range({size}):"]
+            lines += [f"        {number(STAGES)} = z[number]{_combined(weights, number)}"]
+        lines += [f"    force = forces[_node + {stage}]"] * text.forced
+        lines += ["    for lane in range(LANES):"]
+        lines += [f"        {', '.join(at(1 + stage, row) for row in rows)} = \\"]
+        lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
+        lines += _ended(text, start, point, at(1 + stage, 0)) if stage else []
+    if text.gauges:
+        last = [moved(RESULT, row) for row in range(text.states)]
+        lines += ["    for lane in range(LANES):", *_ended(text, start, last, at(1, 0))]
+    return [*lines, f"    for number in range({size}):", f"        z[number] = z[number]{_combined(RESULT, number)}"]
+
+
+def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
+    """Text that adds the weighted slopes of a step, if there are any; `slope` gives the text of that of a stage."""
+    terms = [f"{float(weight)!r}*{slope(stage)}" for stage, weight in enumerate(weights) if weight]
+    return f" + h*({' + '.join(terms)})" if terms else ""
+
+
 def _kicks(driven: str, text: SceneText) -> list[str]:
     """Lines that kick the driven state before the step and keep the kick after it; Milstein's term is in the latter."""
     milstein = " + _size*sqrt(h)*slope(x, v, theta)*(_first*_first - 1.0)" if text.slope else ""
@@ -83,13 +129,13 @@ def _kicks(driven: str, text: SceneText) -> list[str]:
     ]
 
 
-def _tabulation(text: SceneText) -> str:
+def tabulation(text: SceneText, nodes: Sequence[float]) -> str:
     """Function `tabulate(start, h, steps, theta, table)`: the forcing at the nodes of steps; empty without."""
     if not text.forced:
         return ""
     lines = ["def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
     lines += [
-        f"        table[{len(_NODES)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
-        for place, node in enumerate(_NODES)
+        f"        table[{len(nodes)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
+        for place, node in enumerate(nodes)
     ]
     return "\n".join([*lines, ""])

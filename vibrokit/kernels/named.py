@@ -10,10 +10,12 @@ from vibrokit.errors import StepperError, nearest, shown
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.rk8 import RK8
 from vibrokit.kernels.stepper import Stepper
 
 _KINDS: Mapping[str, tuple[Callable[..., Stepper], Callable[[str], float]]] = {
-    kind.name.replace("_", "-"): (kind, number) for kind, number in ((RK4, int), (Order8, float), (FreeFlight, float))
+    kind.name.replace("_", "-"): (kind, number)
+    for kind, number in ((RK4, int), (RK8, int), (Order8, float), (FreeFlight, float))
 }
 
 
@@ -30,7 +32,7 @@ def check_stepper(stepper: Any) -> None:
 
 
 def named_stepper(text: str) -> Stepper:
-    """Read a stepper from its name and its number: ``rk4:512``, ``order8:1e-10``, ``free-flight``.
+    """Read a stepper from its name and its number: ``rk4:512``, ``rk8:32``, ``order8:1e-10``, ``free-flight``.
 
     Raises StepperError for an unknown name, and for a number that the stepper does not take.
     """

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import IntegrationError, StepperError
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
+from vibrokit.kernels.fixed_steps import FixedSteps
 from vibrokit.kernels.free_flight import FreeFlight
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.rk8 import RK8
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
@@ -31,6 +33,7 @@ STEPS = tuple(2**k for k in range(5, 13))
 TOLERANCES = tuple(10.0**-k for k in range(4, 15, 2))
 LADDERS: tuple[tuple[Stepper, ...], ...] = (
     tuple(RK4(steps) for steps in STEPS),
+    tuple(RK8(steps // 4) for steps in STEPS),
     tuple(Order8(tolerance) for tolerance in TOLERANCES),
     tuple(FreeFlight(tolerance) for tolerance in TOLERANCES),
 )
@@ -136,7 +139,7 @@ def measure_steppers(
     The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to a finer reference
     by another method: FreeFlight at 1e-14 for all others, Order8 at 1e-14 for FreeFlight. What these two share, the
     steps in contact, is checked by SciPy's DOP853, restarted at every change of contact. Where FreeFlight cannot
-    integrate the scene, DOP853 is the reference of Order8, and Order8 that of RK4.
+    integrate the scene, DOP853 is the reference of Order8 and RK8, and Order8 that of RK4.
 
     Each of `ladders` has the settings of one stepper, coarse to fine, each timed for some `seconds`. The `starts` lie
     at random between the stops. NoSectionError is raised if the excitations have no common period, IntegrationError if
@@ -182,8 +185,8 @@ def _references(osc: Oscillator, states: Array, periods: int) -> dict[str, tuple
         flown = f"FreeFlight at {_FINEST:g}", osc.section_map(states, periods, stepper=FreeFlight(_FINEST))
     except StepperError:
         own = f"DOP853 at {TIGHTEST:g}", reference_map(osc, states, periods, tolerance=TIGHTEST)
-        return {"RK4": order8, "Order8": own}
-    return {"RK4": flown, "Order8": flown, "FreeFlight": order8}
+        return {"RK4": order8, "RK8": own, "Order8": own}
+    return {"RK4": flown, "RK8": flown, "Order8": flown, "FreeFlight": order8}
 
 
 def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) -> Array:
@@ -233,8 +236,8 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
-        cost=float(stepper.steps if isinstance(stepper, RK4) else 1 / getattr(stepper, "tolerance", np.nan)),
-        in_steps=isinstance(stepper, RK4),
+        cost=float(stepper.steps if isinstance(stepper, FixedSteps) else 1 / getattr(stepper, "tolerance", np.nan)),
+        in_steps=isinstance(stepper, FixedSteps),
         error_median=float(np.median(errors)),
         error_90=float(np.quantile(errors, 0.9)),
         seconds=together / len(many),

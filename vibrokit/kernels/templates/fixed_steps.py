@@ -24,9 +24,9 @@ from vibrokit.kernels.options import CONTRACTED, INNER_LANES
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, left_in_step, stop_status
 from vibrokit.kernels.streams import normal_pair
 
-# Facts, before the parameters of a scene: lanes of a block, and whether the forcing depends on time.
-LANES, FORCED = 1, 2
-NODES = 3  # of a step, at which the forcing is tabulated
+# Facts, before the parameters of a scene: lanes of a block, whether the forcing depends on time, values of the forcing
+# in a step, and rows that a step keeps beside those of the variables.
+LANES, FORCED, NODES, ROWS = 1, 2, 3, 4
 MOST_STEPS = 4096  # taken in one go
 
 
@@ -40,10 +40,10 @@ def draw_lanes(streams, normals, lanes):
 
 def memory_of(states, parameters, settings, streams):
     """What `advance` keeps from call to call; the last array has what waits and what is active."""
-    equations, lanes = states.shape[1], int(parameters[LANES])
+    equations, lanes, nodes = states.shape[1], int(parameters[LANES]), int(parameters[NODES])
     intervals = max(int(settings[1]), 1) if parameters[FORCED] > 0.0 else 0
-    z, before = np.zeros((equations, lanes)), np.zeros((equations, lanes))
-    tabulated = np.zeros(max(intervals * int(settings[0]) * NODES, 1))
+    z, before = np.zeros((equations + int(parameters[ROWS]), lanes)), np.zeros((equations, lanes))
+    tabulated = np.zeros(max(intervals * int(settings[0]) * nodes, 1))
     stream, drawn = np.zeros((4, lanes), dtype=np.uint64), np.zeros(2 * lanes)
     holder, done = np.full(lanes, -1), np.zeros(lanes, dtype=np.int64)
     outside = np.zeros(lanes, dtype=np.bool_)
@@ -88,7 +88,7 @@ def advance(
     place,
     most,  # steps before it returns
 ):
-    count, equations, lanes = states.shape[0], states.shape[1], int(parameters[LANES])
+    count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
     forced, noisy, steps = parameters[FORCED] > 0.0, streams.shape[1] > 0, int(settings[0])
     # Intervals after which the forcing repeats; 0 if it never does.
     cycle = int(settings[1]) if forced else 1
@@ -101,7 +101,7 @@ def advance(
         elapsed = 0
         if forced:
             for phase in range(cycle):
-                tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * NODES))
+                tabulate(start_time + phase * interval, h, steps, theta, offset_by(table, phase * steps * nodes))
     while used < most and (waiting < count or active > 0):
         # If the forcing never repeats, lanes that do not share the phase of a newcomer go on first.
         if step == 0 and (active == 0 or cycle > 0):
@@ -137,7 +137,7 @@ def advance(
                 outside[lane] = False
                 for e in range(equations):
                     before[e, lane] = z[e, lane]
-        forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * NODES)
+        forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
         end = min(step + MOST_STEPS, steps)
         used += end - step
         at_once = 1 if noisy or between else end - step
@@ -155,7 +155,7 @@ def advance(
                 for lane in range(lanes):
                     x, v = z[0, lane], z[1, lane]
                     outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, region)
-            forces = offset_by(forces, NODES)
+            forces = offset_by(forces, nodes)
         step = end if end < steps else 0
         if step > 0:
             continue

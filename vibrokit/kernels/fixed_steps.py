@@ -1,0 +1,90 @@
+"""FixedSteps: steps of one length, many trajectories at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from abc import abstractmethod
+from typing import TYPE_CHECKING, ClassVar, Self
+
+from vibrokit.errors import StepperError
+from vibrokit.kernels.lanes import lanes_of, tabulation
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.scene import Scene
+
+if TYPE_CHECKING:
+    from vibrokit.symbolic.source import SceneText
+
+_LARGEST = 10**7
+
+
+@dataclasses.dataclass(frozen=True)
+class FixedSteps(Stepper):
+    """A stepper whose steps are all of one length, trajectories packed in vector lanes. Abstract.
+
+    Parameters
+    ----------
+    steps : int
+        Steps from section to section (forcing period, or 2π/ω_n without forcing).
+    """
+
+    templates: ClassVar[tuple[str, ...]] = ("fixed_steps",)
+    nodes: ClassVar[tuple[float, ...]]
+    """Fractions of a step at which the forcing is evaluated."""
+    slopes: ClassVar[int] = 0
+    """Values for each variable that a step keeps in memory."""
+
+    steps: int = 256
+
+    def __post_init__(self) -> None:
+        if isinstance(self.steps, bool) or not isinstance(self.steps, int) or not 1 <= self.steps <= _LARGEST:
+            raise StepperError(
+                f"{type(self).__name__}: steps must be a whole number from 1 to {_LARGEST}, got {self.steps!r}."
+            )
+
+    def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
+        """Steps in this interval, and after how many intervals the forcing repeats."""
+        return float(self.steps_in(scene, interval)), float(scene.intervals_in_period(interval))
+
+    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
+        """Steps from sample to sample, none longer than those of an ensemble, under a forcing that never repeats."""
+        return float(max(1, math.ceil(spacing * self.steps / scene.time_unit - 1e-9))), 0.0
+
+    def steps_in(self, scene: Scene, interval: float) -> int:
+        """Return the number of steps in an interval (s), 1 or more."""
+        return max(1, round(self.steps * interval / scene.time_unit))
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """The lane-packed step, and what it calls; and the laws of the stops.
+
+        Raises StepperError for momenta or derivatives under a force that jumps: they jump too, and steps across the
+        jump miss that. So do steps across an infinite slope: 1024 of `RK4` left derivatives under √depth off by 0.3.
+        """
+        name, what = type(self).__name__, "momenta" if text.flow.has_momenta else "derivatives of the motion"
+        if text.jumps and text.breaks:
+            raise StepperError(
+                f"{name} steps across contacts, and where a contact force jumps at first touch, the {what} "
+                "jump too; use FreeFlight or Order8, which locate contacts."
+            )
+        if text.steep:
+            raise StepperError(
+                f"{name} steps across a place where the slope of a force is infinite, as that of the root "
+                f"of the depth at first touch, and there the {what} are far off; use Order8, which shortens its steps."
+            )
+        sizes = f"{len(self.nodes)}, {self.slopes * len(text.variables)}"
+        facts = f"LANES = {lanes_of(text)}\nFACTS = (LANES, FORCED, {sizes})\nWALLS = ()  # steps go across contacts\n"
+        step = [tabulation(text, self.nodes), text.derivative, text.crossed, *self.step_part(text)]
+        # The laws are compiled only if contact times are needed.
+        return [text.constants, facts, text.forcing, *step, text.stops]
+
+    @abstractmethod
+    def step_part(self, text: SceneText) -> list[str]:
+        """Return the function `step_lanes`, and what only it calls."""
+
+    def refined(self) -> Self:
+        """Twice the steps."""
+        return dataclasses.replace(self, steps=2 * self.steps)
+
+    def coarsened(self) -> Self:
+        """Half the steps."""
+        return dataclasses.replace(self, steps=max(1, self.steps // 2))
