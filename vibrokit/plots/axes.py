@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,9 @@ COLOURS = (
     "#9bbf3b", "#5b2a6e", "#6fb1e0", "#8c1c2f", "#0f6b4f", "#b58bd6", "#d9c56b", "#a66a52", "#e8a0a0", "#2b8fb3",
 )  # fmt: skip
 MARKS = "osD^vP*X"
+DOTS: Mapping[str, Any] = {"markersize": 2.2, "markeredgewidth": 0}  # of a sample of points
+CROWD = 32  # points above which they are a sample of motion that never repeats, or as crowded as one
+DENSE = 20_000  # points of a curve above which it is drawn as pixels
 DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
 _LEAST_SAMPLE = 4.0  # points
 _ROUNDING = 1e-9

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, phase_plane, rows
+from vibrokit.plots.axes import DENSE, DOTS, add_legend, axes_or_new, colour, draw, named, phase_plane, rows
 from vibrokit.plots.clipping import clipped
 
 Style = dict[str, Any]
@@ -26,12 +26,11 @@ _GREY, _DARK, _CLEAR = (0.8, 0.8, 0.8, 1.0), (0.42, 0.42, 0.42, 1.0), (1.0, 1.0,
 _PAPER = (0.96, 0.93, 0.86, 1.0)
 _HATCH: Style = {"facecolor": "white", "edgecolor": "0.72", "hatch": "////", "linewidth": 0}
 _PALE = 0.35
-_DENSE = 20_000  # points of a curve above which it is drawn as pixels
 _FEW = 4  # points of an orbit that are drawn large
 
 STABLE, UNSTABLE = "#101010", "#c4007a"
 _EDGED: Style = {"linestyle": "none", "markeredgecolor": "white"}
-_DOTS: Style = {"marker": "o", "markersize": 2.2, "markeredgewidth": 0}
+_DOTS: Style = {"marker": "o", **DOTS}
 _MARKERS: Mapping[str, Style] = {
     "periodic": {"marker": "o", "markersize": 6},
     "limit cycle": {"marker": "D", "markersize": 6},
@@ -183,7 +182,7 @@ def section_portrait(
 def _draw_curves(axes: Axes, curves: Sequence[NDArray[np.float64]], ink: str, name: str) -> tuple[Line2D, ...]:
     lines: list[Line2D] = []
     for curve in curves:
-        label, dense = "_more" if lines else name, len(curve) > _DENSE
+        label, dense = "_more" if lines else name, len(curve) > DENSE
         lines.append(draw(axes, curve, color=ink, linewidth=0.8, zorder=3, rasterized=dense, label=label))
     return tuple(lines)
 

@@ -14,12 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, mark, named, rows, span
+from vibrokit.plots.axes import CROWD, DOTS, add_legend, axes_or_new, colour, draw, mark, named, rows, span
 from vibrokit.plots.basins import SectionArtists, cell_samples, section_portrait
 
 _BEGUN = 1e-4  # of the whole action: before, p₂ and S cannot be told from 0 in a picture
-_MOST_STRANDS = 32  # points of an attractor above which it is no orbit, and points of a path are not joined
-_DOTS: Mapping[str, Any] = {"markersize": 2.2, "markeredgewidth": 0}
 _LONE_DOTS: Mapping[str, Any] = {
     "linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black",
 }  # fmt: skip
@@ -95,8 +93,8 @@ def exit_paths(
         labels, bounds, points, names=names, saddles=[*saddles, *chaotic], saddle_kinds=kinds, stable=stable, ax=axes
     )
     for marker, visits in zip(section.attractors, points, strict=True):
-        if len(rows(visits)) > _MOST_STRANDS:
-            marker.set(**_DOTS, zorder=4)
+        if len(rows(visits)) > CROWD:
+            marker.set(**DOTS, zorder=4)
     drawn: list[tuple[tuple[Line2D, ...], Line2D, Line2D]] = []
     for index, (path, source) in enumerate(zip(paths, sources, strict=True)):
         whole = bool(curves) and curves[index]
@@ -127,8 +125,8 @@ def _add_legend(artists: ExitPathArtists, given: Axes | None, labels: NDArray[An
 def _draw_path(
     axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, look: tuple[str, Any], title: str
 ) -> tuple[tuple[Line2D, ...], Line2D, Line2D]:
-    joined = strands <= _MOST_STRANDS
-    style = {**_DOTS, "linestyle": look[1]} if joined else _LONE_DOTS
+    joined = strands <= CROWD
+    style = {**DOTS, "linestyle": look[1]} if joined else _LONE_DOTS
     lines: list[Line2D] = []
     for first in range(strands if joined else 1):
         some, label = place[first::strands] if joined else place, "_strand" if first else title

@@ -11,10 +11,19 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, draw, named, phase_plane, rows, span
-
-_SAMPLE = 32  # points above which they are a sample of motion that never repeats, or as crowded as one
-_DENSE = 20_000  # samples of a line above which it is drawn thin, as pixels
+from vibrokit.plots.axes import (
+    CROWD,
+    DENSE,
+    DOTS,
+    add_legend,
+    axes_or_new,
+    colour,
+    draw,
+    named,
+    phase_plane,
+    rows,
+    span,
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -94,11 +103,10 @@ def steady_motions(
     marks: list[Line2D] = []
     paths = [rows(orbit) for orbit in orbits]
     for label, (path, visits) in enumerate(zip(paths, points, strict=True)):
-        many, ink, name = len(path) > _DENSE, colour(label), attractor_name(label, names)
+        many, ink, name = len(path) > DENSE, colour(label), attractor_name(label, names)
         look = {"linewidth": 0.3, "alpha": 0.6} if many else {"linewidth": 1.2, "alpha": 1.0}
         lines.append(draw(axes, path, color=ink, label=name, rasterized=many, zorder=2, **look))
-        dots = {"markersize": 2.2, "markeredgewidth": 0}
-        edge = dots if len(rows(visits)) > _SAMPLE else {"markersize": 6, "markeredgecolor": "white"}
+        edge = DOTS if len(rows(visits)) > CROWD else {"markersize": 6, "markeredgecolor": "white"}
         mark = {"linestyle": "none", "marker": "o", **edge}
         marks.append(draw(axes, visits, color=ink, label="_section", zorder=3, **mark))
     reach = span([*(path[:, 0] for path in paths), [place for place, _ in stops]])
