@@ -210,8 +210,7 @@ class Series(Field):
         for piece in pieces:
             if not np.all((piece == np.floor(piece)) & (piece >= self.low) & (piece <= LARGEST_WHOLE)):
                 raise ResultFileError(f"its array {name!r} holds numbers that are not whole, or below {self.low}")
-        wholes = [piece.astype(np.int64) for piece in pieces]
-        return [tuple(whole.tolist()) for whole in wholes] if self.listed else wholes
+        return [tuple(map(int, piece)) if self.listed else piece.astype(np.int64) for piece in pieces]
 
 
 class Column(NamedTuple):
@@ -269,8 +268,7 @@ class Vectors(Field):
             yield self._name(record, name, column), (*self.length.lay(record, pieces), column.about)
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        most = len(arrays.dataset.variables)
-        names = [self._name(record, name, column) for column in self.columns.of(most)]
+        names = [self._name(record, name, column) for column in self.columns.of(len(arrays.dataset.variables))]
         least = len(self.columns.first)
         present = names[:least] + list(itertools.takewhile(arrays.__contains__, names[least:]))
         columns = [self.length.take(arrays, record, column, finite=self.finite) for column in present]
