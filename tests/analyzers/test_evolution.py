@@ -50,6 +50,7 @@ def test_a_normal_distribution_stays_one_with_the_exact_moments_to_second_order_
 
 
 def test_probability_is_kept(history):
+    np.testing.assert_allclose(history.times, np.array([0.25, 1, 3]) * LINEAR.section_interval)
     np.testing.assert_allclose(history.mass, 1.0, rtol=1e-12)
     np.testing.assert_allclose(history.marginal("x").integrate("x"), history.mass, rtol=1e-2)
     assert not history.findings
@@ -85,10 +86,6 @@ def test_a_start_on_an_attractor(history):
     np.testing.assert_array_equal(begun.log_density, same.log_density)
 
 
-def test_times_are_those_asked_for(history):
-    np.testing.assert_allclose(history.times, np.array([0.25, 1, 3]) * LINEAR.section_interval)
-
-
 def test_saved_and_reopened(history, tmp_path):
     history.save(tmp_path / "history.nc")
     again = vk.load_result(tmp_path / "history.nc")
@@ -122,20 +119,12 @@ def test_a_time_limit_keeps_what_was_reached():
 @pytest.mark.parametrize(
     ("given", "shown"),
     [
-        ({"intervals": ()}, "()"),
-        ({"intervals": (2, 1)}, "(2, 1)"),
-        ({"intervals": (0.0,)}, "0"),
-        ({"intervals": (float("nan"),)}, "nan"),
-        ({"start": (3.0, 0.0)}, "3"),
-        ({"start": (0.1, 0.2, 0.3)}, "0.3"),
-        ({"start": "a"}, "'a'"),
-        ({"nodes": (1, 1)}, "(1, 1)"),
-        ({"steps": 0}, "0"),
-        ({"steps": 7}, "7"),
-        ({"start": ((0.0, 1e-4), (0.0, 1e-4)), "nodes": (50, 50)}, "contains no node"),
-        ({"phase": 1.0}, "1"),
+        ({"intervals": ()}, "()"), ({"intervals": (2, 1)}, "(2, 1)"), ({"intervals": (0.0,)}, "0"),
+        ({"intervals": (float("nan"),)}, "nan"), ({"start": (3.0, 0.0)}, "3"), ({"start": (0.1, 0.2, 0.3)}, "0.3"),
+        ({"start": "a"}, "'a'"), ({"start": ((0.0, 1e-4), (0.0, 1e-4)), "nodes": (50, 50)}, "contains no node"),
+        ({"nodes": (1, 1)}, "(1, 1)"), ({"steps": 0}, "0"), ({"steps": 7}, "7"), ({"phase": 1.0}, "1"),
     ],
-)
+)  # fmt: skip
 def test_bad_arguments(given, shown):
     with pytest.raises(vk.errors.StructureError, match="evolve_density") as refused:
         vk.evolve_density(LINEAR, REGION, **given)

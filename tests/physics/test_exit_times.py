@@ -11,8 +11,8 @@ import vibrokit as vk
 from tests.klein_kramers import double_well_rate
 from tests.scenes import Coloured, scene
 from vibrokit.analyzers.checkpoint import Checkpoint
-from vibrokit.analyzers.mfet.estimates import rate_around
 from vibrokit.analyzers.mfet.importance import from_distances
+from vibrokit.analyzers.mfet.measurement import rate_around
 from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
 from vibrokit.analyzers.problem import ExitProblem

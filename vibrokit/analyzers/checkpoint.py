@@ -35,6 +35,10 @@ class Checkpoint:
     ----------
     failure : str
         Why the file could not be written; empty if it could.
+    parts : dict of str to dict of str to array
+        The arrays of each part, by its name.
+    written : float
+        When the file was last written, by the monotonic clock (s).
 
     Raises
     ------
@@ -46,25 +50,12 @@ class Checkpoint:
         self.path = path
         self.failure = ""
         self._about = json.dumps(about, sort_keys=True, default=str)
-        self._arrays: dict[str, NDArray[Any]] = {}
-        self._written = time.monotonic()
-        if path is not None and path.exists():
-            self._arrays = self._read(path)
+        self.parts = self._read(path) if path is not None and path.exists() else {}
+        self.written = time.monotonic()
 
     def slot(self, *key: object) -> Slot:
         """Return the place of one part."""
         return Slot(self, "/".join(map(str, key)))
-
-    def set(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the arrays of one part in place of those before, and write the file if the last time is long ago."""
-        self._arrays = {key: value for key, value in self._arrays.items() if key.rpartition("/")[0] != name}
-        self._arrays |= {f"{name}/{key}": value for key, value in arrays.items()}
-        if time.monotonic() - self._written >= _PAUSE:
-            self.flush()
-
-    def get(self, name: str) -> dict[str, NDArray[Any]]:
-        """Return the arrays of one part; none if it is not known."""
-        return {key.rpartition("/")[2]: array for key, array in self._arrays.items() if key.rpartition("/")[0] == name}
 
     def flush(self) -> None:
         """Write the file, whole or not at all. A failure, as on a full disk, is kept as a text; the work goes on."""
@@ -72,15 +63,16 @@ class Checkpoint:
             return
         content = io.BytesIO()
         about = np.frombuffer(self._about.encode(), dtype=np.uint8)
-        np.savez(content, allow_pickle=False, **{_ABOUT: about, **self._arrays})
+        arrays = {f"{part}/{name}": array for part, some in self.parts.items() for name, array in some.items()}
+        np.savez(content, allow_pickle=False, **{_ABOUT: about, **arrays})
         body = content.getvalue()
         try:
             write_atomically(self.path, hashlib.sha256(body).digest() + body)
         except OSError as error:
             self.failure = str(error)
-        self._written = time.monotonic()
+        self.written = time.monotonic()
 
-    def _read(self, path: Path) -> dict[str, NDArray[Any]]:
+    def _read(self, path: Path) -> dict[str, dict[str, NDArray[Any]]]:
         try:
             content = path.read_bytes()
         except (OSError, ValueError) as error:
@@ -101,7 +93,11 @@ class Checkpoint:
                 f"the checkpoint {path} belongs to other work: {_difference(found, self._about)}; choose "
                 "another name, or delete it."
             )
-        return arrays
+        parts: dict[str, dict[str, NDArray[Any]]] = {}
+        for key, array in arrays.items():
+            part, _, name = key.rpartition("/")
+            parts.setdefault(part, {})[name] = array
+        return parts
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -117,26 +113,24 @@ class Slot:
 
     def read(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
         """Return the arrays that were kept; None if there are none with these names."""
-        found = self.checkpoint.get(self.name)
+        found = self.checkpoint.parts.get(self.name, {})
         return found if set(found) == set(names) else None
 
     def write(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep arrays in place of those before."""
-        self.checkpoint.set(self.name, arrays)
+        """Keep arrays in place of those before, and write the file if the last time is long ago."""
+        self.checkpoint.parts[self.name] = dict(arrays)
+        if time.monotonic() - self.checkpoint.written >= _PAUSE:
+            self.checkpoint.flush()
 
 
 def _difference(found: str, wanted: str) -> str:
     """Name what differs."""
     try:
         one, other = json.loads(found), json.loads(wanted)
-        for key in other:
-            if one.get(key) != other[key] and key == "settings":
-                names = [name for name in other[key] if one[key].get(name) != other[key][name]]
-                return (
-                    f"the settings {', '.join(names)} differ" if len(names) > 1 else f"the setting {names[0]} differs"
-                )
-            if one.get(key) != other[key]:
-                return f"it has another {key}" if key != "versions" else "it was written by other versions"
-    except (ValueError, AttributeError, KeyError, IndexError):
-        pass
-    return "what it was made for is not known"
+        key = next(key for key in other if one.get(key) != other[key])
+        if key == "settings":
+            names = [name for name in other[key] if one[key].get(name) != other[key][name]]
+            return f"the settings {', '.join(names)} differ" if len(names) > 1 else f"the setting {names[0]} differs"
+    except (ValueError, AttributeError, KeyError, IndexError, StopIteration):
+        return "what it was made for is not known"
+    return f"it has another {key}" if key != "versions" else "it was written by other versions"

@@ -14,11 +14,6 @@ from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.structure import Structure
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAMPLES = 256  # cells that lead to attractors, and as many that lead outside
-_CHECKS = 16  # places of a motion in a section interval
-_AT_ONCE = 8  # section intervals over which x is averaged to tell where motion is
-_FOLLOWED = 256  # section intervals at most: 7 relaxations at a damping ratio of 0.0045
-
 Array = NDArray[np.float64]
 
 
@@ -63,27 +58,29 @@ def escape_faces(osc: Oscillator, structure: Structure, attractor: Attractor) ->
     return faces
 
 
-def _some(states: Array) -> Array:
-    """At most `_SAMPLES` of the states, evenly chosen."""
-    return states[np.unique(np.linspace(0, len(states) - 1, min(len(states), _SAMPLES)).astype(int))]
+def _some(states: Array, most: int = 256) -> Array:
+    """At most so many of the states, evenly chosen."""
+    return states[np.unique(np.linspace(0, len(states) - 1, min(len(states), most)).astype(int))]
 
 
 def _followed(osc: Oscillator, states: Array, borders: tuple[float, float]) -> tuple[Array, Array]:
-    """Least and largest x of motions from some states (count, 2): over all time, and over the last section intervals.
+    """Least and largest x of motions from some states (count, 2): over all time, and over the last 8 section intervals.
 
-    Both have shape (count, 2). Motion that ends, at a pole or because it diverges, is placed at the border ahead of it.
+    Both have shape (count, 2). Motions are followed for 256 section intervals at most, which is 7 relaxations at a
+    damping ratio of 0.0045, and seen at 16 places in each. Motion that ends, at a pole or because it diverges, is
+    placed at the border ahead of it.
     """
     started = np.zeros((len(states), 2 + len(osc.noise.extra_states if osc.noise else ())))
     started[:, :2] = states
     stepper, going = ensemble_stepper(osc, Flow.STATE), np.arange(len(states))
     extent = np.repeat(states[:, :1], 2, axis=1)
     late = extent.copy()
-    for number in range(_FOLLOWED // _AT_ONCE):
+    count = 8 * 16
+    for number in range(256 // 8):
         if not len(going):
             break
-        count = _CHECKS * _AT_ONCE
         ended = run_ensemble(
-            osc, Flow.STATE, stepper, started[going], count, interval=osc.section_interval / _CHECKS, visits=count,
+            osc, Flow.STATE, stepper, started[going], count, interval=osc.section_interval / 16, visits=count,
             phases=number * count,
         )  # fmt: skip
         x = np.where(np.arange(count) < ended.intervals[:, None], ended.visits[:, :, 0], np.nan)

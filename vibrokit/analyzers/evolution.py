@@ -33,9 +33,6 @@ from vibrokit.symbolic.flow_kind import Flow
 
 _DEPTH = 60.0  # in ln p below the maximum that is resolved
 _KEPT = 0.01  # change of the probability that a finding reports
-_START = 1.5  # standard deviation of a start at one state, in node spacings
-_MOST_INTERVALS = 100_000
-_SAME = 1e-9  # section intervals: times that differ by less are equal
 
 Array = NDArray[np.float64]
 
@@ -98,64 +95,48 @@ def evolve_density(
         An argument has a value that is not allowed, or the start is outside the region.
     """
     check_means(osc, stepper, executor)
-    noise = checked_noise(osc)
-    shape = checked_nodes("evolve_density", nodes)
-    wanted = _checked_times(intervals)
-    area = Region.of(region)
-    begins = _checked_phase(phase)
+    noise, shape, wanted = checked_noise(osc), checked_nodes("evolve_density", nodes), _checked_times(intervals)
+    area, begins = Region.of(region), _checked_phase(phase)
     grid = DensityGrid.of(osc, area, shape)
     count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
     check_steps("evolve_density", count)
-    allowed = gibibytes("evolve_density: max_memory_gib", max_memory_gib)
-    check_memory(shape, DensityFlow.memory(shape, count, osc.autonomous), count, allowed)
-    begun = _start(grid, start)
-    kept: list[Array] = []
-    masses: list[float] = []
-    changes: list[float] = []
+    check_memory(osc, shape, count, gibibytes("evolve_density: max_memory_gib", max_memory_gib))
+    begun, reached = _start(grid, start), list[tuple[Array, float]]()
     with working(progress, time_limit) as work:
         with Stoppable("evolve_density") as walk:
-            chosen = stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL)
-            flow = DensityFlow(osc, chosen, grid, count, watches_edge=True)
+            flow = DensityFlow(osc, stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL), grid, count)
             propagator = Propagator(flow, noise.intensity, executor)
-            for carried, change in _at([begins + time for time in wanted], begins, propagator, begun):
-                kept.append(resolved(carried))
-                masses.append(math.exp(grid.mass(carried)))
-                changes.append(change)
-        times = np.array(wanted[: len(kept)]) * osc.section_interval
-        findings = [*walk.findings, *_findings(times, masses, changes)]
-        arguments = {
-            "region": area,
-            "intervals": wanted,
-            "start": _plain_start(start),
-            "phase": phase,
-            "nodes": shape,
-            "steps": count,
-        }
+            for one in _at([begins + time for time in wanted], begins, propagator, begun):
+                reached.append(one)
+        times = np.array(wanted[: len(reached)]) * osc.section_interval
+        masses = [math.exp(grid.mass(phi)) for phi, _ in reached]
+        origin = start.points[:, :2].tolist() if isinstance(start, Attractor) else start
+        arguments = {"region": area, "intervals": wanted, "start": origin, "phase": phase, "nodes": shape}
         return DensityHistory(
             times=times,
             x=grid.x,
             v=grid.v,
-            log_density=np.array(kept).reshape(-1, *shape),
+            log_density=np.array([resolved(phi) for phi, _ in reached]).reshape(-1, *shape),
             mass=np.array(masses),
             scene=scene_data(osc),
-            settings=plain(arguments | {"stepper": stepper}),
-            findings=tuple(findings),
+            settings=plain(arguments | {"steps": count, "stepper": stepper}),
+            findings=(*walk.findings, *_findings(times, masses, [change for _, change in reached])),
             stats=work.stats,
-            complete=len(kept) == len(wanted),
+            complete=len(reached) == len(wanted),
             seconds=work.seconds,
         )
 
 
 def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> Iterator[tuple[Array, float]]:
     """Yield ln p at some times, in section intervals, and ln of what truncation has changed in its probability."""
-    flow, change = propagator.flow, 0.0
+    flow, change, same = propagator.flow, 0.0, 1e-9  # times that differ by less are equal
     interval, floor = flow.scene.section_interval, float(phi.max()) - _DEPTH
     with stage("density", unit="section intervals", total=math.ceil(ends[-1])):
         for end in ends:
-            while now < end - _SAME:
-                section = math.floor(now + _SAME)
+            while now < end - same:
+                section = math.floor(now + same)
                 until = min(section + 1.0, end)
-                whole_interval = now < section + _SAME and until > section + 1 - _SAME
+                whole_interval = now < section + same and until > section + 1 - same
                 legs = flow.legs if whole_interval else flow.between(*(interval * (t - section) for t in (now, until)))
                 phi, added = propagator.along(legs, phi, floor)
                 lower = float(phi.max()) - _DEPTH
@@ -188,9 +169,9 @@ def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
     found = members(intervals)
     given = (intervals,) if found is None else found
     for time in given:
-        if not 0 < real(time) <= _MOST_INTERVALS:
+        if not 0 < real(time) <= 100_000:
             raise StructureError(
-                f"evolve_density: intervals must be numbers above 0 and up to {_MOST_INTERVALS}, got {shown(time)}."
+                f"evolve_density: intervals must be numbers above 0 and up to 100000, got {shown(time)}."
             )
     if not given or list(given) != sorted(set(given)):
         raise StructureError(f"evolve_density: intervals must be one or more in ascending order, got {shown(given)}.")
@@ -218,7 +199,7 @@ def _start(grid: DensityGrid, start: Any) -> Array:
             )
         phi = np.where(inside, 0.0, -_DEPTH)
     else:
-        roots = np.eye(2) / (_START * grid.local_spacing(corners))[:, None, :]
+        roots = np.eye(2) / (1.5 * grid.local_spacing(corners))[:, None, :]
         phi = -0.5 * nearest(grid.nodes, corners, roots)
     return phi - grid.mass(phi)
 
@@ -229,7 +210,3 @@ def _numbers(start: Any) -> Array:
         return np.asarray(start, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)
-
-
-def _plain_start(start: Any) -> Any:
-    return start.points[:, :2].tolist() if isinstance(start, Attractor) else start

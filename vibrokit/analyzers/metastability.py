@@ -20,10 +20,6 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.rated import HELD, METASTABLE
 
-_SAMPLES = 400  # of a core, at equal areas: its share in a basin is known to a few per cent
-_CENTRES = 64  # points of an attractor whose ellipses are sampled
-_RESOLVED = 1.0  # widths of a cell in the least semi-axis of a core, from which on cells tell what the core covers
-
 Array = NDArray[np.float64]
 
 
@@ -92,7 +88,8 @@ def core_shares(problem: ExitProblem, attractor: Attractor, intensity: float) ->
     """Return which share of an attractor's core lies in the basin of each attractor, by label.
 
     It is NaN where no core decides about exits, where the core is too narrow for the cells of the basins, or where
-    noise gives it no width.
+    noise gives it no width. At most 64 ellipses are sampled, each by 400 states at equal areas: shares are known to a
+    few per cent.
     """
     structure = problem.structure
     basins, unknown = structure.basins, np.full(len(structure.attractors), np.nan)
@@ -102,13 +99,13 @@ def core_shares(problem: ExitProblem, attractor: Attractor, intensity: float) ->
         centres, roots = core_of(problem, attractor, intensity)
     except StructureError:
         return unknown
-    some = np.unique(np.linspace(0, len(centres) - 1, min(len(centres), _CENTRES)).astype(int))
+    some = np.unique(np.linspace(0, len(centres) - 1, min(len(centres), 64)).astype(int))
     axes = np.linalg.inv(roots[some])
     cells = np.array([np.ptp(basins.region.x), np.ptp(basins.region.v)]) / basins.labels.shape
-    if np.linalg.svd(axes / cells[:, None], compute_uv=False).min() < _RESOLVED:
+    if np.linalg.svd(axes / cells[:, None], compute_uv=False).min() < 1.0:
         return unknown
-    order = np.arange(_SAMPLES) + 0.5
-    radius, angle = np.sqrt(order / _SAMPLES), math.pi * (1.0 + math.sqrt(5.0)) * order
+    order = np.arange(400) + 0.5
+    radius, angle = np.sqrt(order / len(order)), math.pi * (1.0 + math.sqrt(5.0)) * order
     disk = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     labels = basins.at(problem.on_turn(centres[some, None] + np.einsum("nij,kj->nki", axes, disk)))
     return np.array([np.mean(labels == other.label) for other in structure.attractors])

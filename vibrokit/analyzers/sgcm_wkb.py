@@ -14,10 +14,9 @@ from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.metastability import with_states
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.rate_analyzer import RateAnalyzer, rate_variables
-from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
+from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, limit_of
 from vibrokit.analyzers.sgcm.density_flow import check_steps
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
-from vibrokit.analyzers.sgcm.energies import limit_of
 from vibrokit.analyzers.sgcm.propagator import checked_noise
 from vibrokit.analyzers.sgcm.solution import ACCURACY, DensitySolver
 from vibrokit.errors import StructureError
@@ -123,23 +122,19 @@ class SGCM(RateAnalyzer):
         if not wanted:
             return Analysis(findings=limits)
         solver = DensitySolver(problem, self.nodes, self.steps, self.max_memory_gib, self.accuracy)
-        solved: list[AtIntensity] = []
-        unresolved: list[Unresolved] = []
+        solved, refused = list[AtIntensity](), dict[float, str]()
         with Stoppable("density", problem.source) as work:
-            for one in solver.solve(wanted):
-                if isinstance(one, Unresolved):
-                    unresolved.append(one)
-                else:
-                    solved.append(one)
+            for one in solver.solve(wanted, refused):
+                solved.append(one)
         if work.stopped and not solved:
             return Analysis(findings=(*limits, *work.findings), complete=False)
         if not solved:
-            raise StructureError(unresolved[-1].reason)
+            raise StructureError(list(refused.values())[-1])
         energies, more = _energies(problem, solved)
         return Analysis(
             energies,
             _data(problem, solver, solved),
-            (*limits, *_findings(problem, solved, unresolved), *more, *work.findings),
+            (*limits, *_findings(problem, solved, refused), *more, *work.findings),
             complete=not work.stopped,
         )
 
@@ -228,11 +223,11 @@ def _committor(one: AtIntensity, target: int) -> NDArray[np.float64]:
     return np.full(one.grid.shape, np.nan) if known is None else resolved(known.log_values)
 
 
-def _findings(problem: ExitProblem, solved: list[AtIntensity], unresolved: list[Unresolved]) -> tuple[Finding, ...]:
+def _findings(problem: ExitProblem, solved: list[AtIntensity], refused: dict[float, str]) -> tuple[Finding, ...]:
     """What limits the rates."""
     found = [
-        Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=one.intensity, reason=one.reason)
-        for one in unresolved
+        Finding.of(Code.INTENSITY_FAILED, problem.source, intensity=intensity, reason=reason)
+        for intensity, reason in refused.items()
     ]
     for one in solved:
         if not one.converged:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibrokit.analyzers.sgcm.at_intensity import AtIntensity
-from vibrokit.analyzers.sgcm.committor import Committor
+from vibrokit.analyzers.sgcm.quasi_stationary import Committor
 from vibrokit.analyzers.sgcm.solution import COARSER
 
 

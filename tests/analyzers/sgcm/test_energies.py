@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibrokit.analyzers.sgcm.energies import limit_of
+from vibrokit.analyzers.sgcm.at_intensity import limit_of
 
 ENERGY = 5.0
 LADDERS = [(1.5, 1.2, 1.0), (1.0, 0.7), (2.5, 0.8, 0.4, 0.25), (1.2, 0.3)]

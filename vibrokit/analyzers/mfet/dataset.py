@@ -9,8 +9,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.mfet.estimates import CONFIDENCE
-from vibrokit.analyzers.mfet.measurement import AtIntensity
+from vibrokit.analyzers.mfet.measurement import CONFIDENCE, AtIntensity
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.rate_analyzer import Variable, rate_variables
 

@@ -20,24 +20,12 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Exits:
-    """What some walkers have done so far.
+    """What some walkers have done so far."""
 
-    Attributes
-    ----------
-    tests : int64 array (count,)
-        Exit tests until each exit, in ascending order.
-    targets : int64 array (count,)
-        Label of the attractor that each exit leads to; −1 for an exit that is no attractor, −2 for escape.
-    at_risk : int
-        Exit tests of all walkers together, also of those that have not left.
-    censored : int
-        Walkers that have not left.
-    """
-
-    tests: Whole
-    targets: Whole
-    at_risk: int
-    censored: int
+    tests: Whole  # until each exit, in ascending order
+    targets: Whole  # label that each exit leads to; −1 for an exit that is no attractor, −2 for escape
+    at_risk: int  # exit tests of all walkers together, also of those that have not left
+    censored: int  # walkers that have not left
 
     def __len__(self) -> int:
         return len(self.tests)
@@ -45,20 +33,11 @@ class Exits:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Escapes:
-    """Realizations on their way out, aligned at the exit.
+    """Realizations on their way out, aligned at the exit."""
 
-    Attributes
-    ----------
-    times : array (samples,)
-        Time since the exit (s), up to 0.
-    paths : array (count, samples, 2)
-        x and v; NaN before the start of a walker.
-    targets : int64 array (count,)
-    """
-
-    times: Array
-    paths: Array
-    targets: Whole
+    times: Array  # (samples,): since the exit (s), up to 0
+    paths: Array  # (count, samples, 2): x and v; NaN before the start of a walker
+    targets: Whole  # (count,)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,19 +59,7 @@ class DirectRun:
 
     It ends with the first round after which the wanted number of walkers have left. The others are censored at that
     time, all at the same one, so that nothing waits for the last walkers, and the estimate is unbiased for exponential
-    times.
-
-    Parameters
-    ----------
-    walk : Walk
-    wanted : int
-        Exits.
-    from_orbit : bool
-        Whether walkers start on the orbit, in place of the density in the core.
-    slot : Slot
-        Where the state is kept.
-    key : int
-        Chooses the random streams.
+    times. Walkers start in the core, or on the orbit. The state is kept in a slot; the key chooses the random streams.
     """
 
     def __init__(self, walk: Walk, wanted: int, from_orbit: bool, slot: Slot, key: int) -> None:
@@ -118,15 +85,10 @@ class DirectRun:
         """Section intervals of all walkers."""
         return float(self.state.tests.sum()) / self.walk.checks
 
-    @property
-    def done(self) -> bool:
-        """Whether as many have left as are wanted."""
-        return self.left >= self.wanted
-
     def run(self, most: float = math.inf) -> bool:
         """Go on until it is done; return False if it is not after so many section intervals of all walkers."""
         with stage("direct simulation", unit="exits", total=self.wanted):
-            while not self.done:
+            while self.left < self.wanted:
                 report(self.left, self.wanted)
                 if self.at_risk > most:
                     return False

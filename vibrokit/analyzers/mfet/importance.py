@@ -23,38 +23,19 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Importance:
-    """A score on nodes and at several times, larger the closer a state is to an exit.
+    """A score on nodes and at several times, larger the closer a state is to an exit."""
 
-    Attributes
-    ----------
-    times : array (stages,)
-        In section intervals after the section, ascending from 0; that of the next section is the first.
-    x, v : array (nx,), (nv,)
-    values : array (stages, nx, nv)
-    depth : float
-        ln of the probability to leave, from the attractor to the exit; a guess if it is not known.
-    """
-
-    times: Array
+    times: Array  # (stages,): in section intervals, ascending from 0; at the next section the first one holds again
     x: Array
     v: Array
-    values: Array
-    depth: float
+    values: Array  # (stages, nx, nv)
+    depth: float  # ln of the probability to leave, from the attractor to the exit; a guess if it is not known
 
     def records(self, visits: Array, counts: Whole, phases: Whole, looks: int, highest: Array) -> Array:
         """Return the scores of states that are higher than all before in their row, −∞ elsewhere; raise `highest`.
 
-        Parameters
-        ----------
-        visits : array (count, most, n)
-        counts : int64 array (count,)
-            How many states each row has.
-        phases : int64 array (count,)
-            Looks from a section to the start of each row.
-        looks : int
-            In a section interval.
-        highest : array (count,)
-            Changed in place.
+        `visits` (count, most, n) has so many states in each row as `counts` says. There are so many looks in a section
+        interval; `phases` are those from a section to the start of each row.
         """
         scores = np.empty(visits.shape[:2])
         climb(visits, counts, phases, looks, self.times, self.x, self.v, self.values, highest, scores)

@@ -35,18 +35,10 @@ Whole = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Estimates:
-    """Independent estimates of the probability that a section interval begins an excursion that leaves.
+    """Independent estimates of the probability that a section interval begins an excursion that leaves."""
 
-    Attributes
-    ----------
-    log_values : array (count,)
-        ln of each; −∞ if no excursion of a replica left.
-    targets : int64 array (count, walkers)
-        Where the excursions of the last level led.
-    """
-
-    log_values: Array
-    targets: Whole
+    log_values: Array  # (count,): ln of each; −∞ if no excursion of a replica left
+    targets: Whole  # (count, walkers): where the excursions of the last level led
 
     @property
     def log_mean(self) -> float:
@@ -76,19 +68,7 @@ class Estimates:
 
 
 class SplittingRun:
-    """Batches of replicas, until the estimate is as exact as wanted.
-
-    Parameters
-    ----------
-    walk : Walk
-    importance : Importance
-    wanted : float
-        Relative standard error.
-    most : int
-        Replicas, at most.
-    slot : Slot
-        Where finished batches are kept.
-    """
+    """Batches of replicas, `most` at most, until the relative standard error is as wanted; a slot keeps the batches."""
 
     def __init__(self, walk: Walk, importance: Importance, wanted: float, most: int, slot: Slot) -> None:
         self.walk, self.importance, self.wanted, self.slot = walk, importance, wanted, slot
@@ -203,13 +183,8 @@ class Excursions:
 
     An excursion begins in the core, on the section, and returns when it is there again on a later section. Its states
     are looked at several times in a relaxation: otherwise strong damping would let it come far between two looks.
-
-    Attributes
-    ----------
-    scores : array (count,)
-        The largest score of each; infinite for one that has left.
-    targets : int64 array (count,)
-        Where it led: `NOT_OUT`, a label, or the negative one of an exit that is no attractor.
+    `scores` are the largest score of each, infinite for one that has left, and `targets` where it led: `NOT_OUT`, a
+    label, or the negative one of an exit that is no attractor.
     """
 
     def __init__(self, walk: Walk, importance: Importance, states: Array, *key: int) -> None:

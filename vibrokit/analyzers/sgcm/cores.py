@@ -32,38 +32,18 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CoreSets:
-    """The cores on one grid at one intensity.
+    """The cores on one grid at one intensity, as shares of each cell, shape (nx, nv)."""
 
-    Attributes
-    ----------
-    own : array (nx, nv)
-        How much of each cell belongs to the core of the attractor that is left.
-    others : mapping of int to array (nx, nv)
-        By label: the same for the cores of other attractors and the cells committed to them, or for their basins if
-        basins count; empty if position decides.
-    entry : array (nx, nv)
-        ln p, up to a constant, with which what has left is put back; −∞ outside the own core.
-    outlet : int or None
-        Target of what leaves by position, at any time; None if nothing does.
-    committed : array (nx, nv)
-        How much of each cell absorbs because of the basin that it is in.
-    """
-
-    own: Array
-    others: Mapping[int, Array]
-    entry: Array
-    outlet: int | None
-    committed: Array
+    own: Array  # of the attractor that is left
+    others: Mapping[int, Array]  # by label: cores and cells committed to them, or basins; empty if position decides
+    entry: Array  # ln p, up to a constant, with which what has left is put back; −∞ outside the own core
+    outlet: int | None  # target of what leaves by position, at any time; None if nothing does
+    committed: Array  # of each cell, what absorbs because of the basin that it is in
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cores:
-    """The cores of all attractors, as one of them is left.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    """
+    """The cores of all attractors, as one of them is left."""
 
     problem: ExitProblem
 

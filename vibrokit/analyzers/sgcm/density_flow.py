@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -28,11 +28,7 @@ from vibrokit.symbolic.flow_kind import Flow
 # the rate from the clear orbit is -6.379 with 18 of them in a section interval, -6.432 with 24 and -6.434 with 36; at
 # equal distances it is -6.381 with 18. Each flow adds an error of interpolation, so that more are not better.
 _PER_RADIAN = 2.0  # of the fastest oscillation or decay: 24 in a forcing period of hertz-0.570
-_FEWEST = 8
-MOST_STEPS = 4096
-"""Largest number of times that noise acts in a section interval."""
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
-_CHECKS = 16  # exit tests in a leg: on hertz-0.570 a mass that turns back between two has gone 1e-5 further
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
 _SAME = 1e-9  # of a section interval: times that differ by less are equal
@@ -48,57 +44,31 @@ _MIRROR = np.array([1.0, -1.0])  # the reversed flow has −v in place of v
 class Leg:
     """The flow over a piece of time, between the nodes of a grid, after which noise acts.
 
-    Attributes
-    ----------
-    feet : array (nx, nv, 2)
-        Where the motion that ends at each node comes from, in node spacings; or, for a leg backwards, where the motion
-        goes that starts there. NaN if it diverges.
-    growth : array (nx, nv)
-        ln of the factor by which the flow compresses areas; 0 for a leg backwards.
-    crossed : array (nx, nv)
-        Share of each cell whose motions have been at the exit in this time, from 0 to below 1. Its shape is (0, 0) if
-        position does not decide.
-    noise : float
-        For how long noise acts (s).
-    leaving : array (nx, nv) or None
-        Share of each cell whose motions leave the grid, if that is asked for; where position decides, past the exit.
+    `feet` (nx, nv, 2) are the places, in node spacings, from which the motion comes that ends at each node; or, for a
+    leg backwards, to which the motion goes that starts there. They are NaN if it diverges.
     """
 
     feet: Array
-    growth: Array
-    crossed: Array
-    noise: float = 0.0
-    leaving: Array | None = None
+    growth: Array  # ln of the factor by which the flow compresses areas; 0 for a leg backwards
+    crossed: Array  # share of each cell whose motions have been at the exit; (0, 0) if position does not decide
+    leaving: Array  # share of each cell whose motions leave the grid; past the exit, if position decides
+    noise: float = 0.0  # for how long noise acts (s)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DensityFlow:
-    """What carries a density on a grid over a section interval.
-
-    Attributes
-    ----------
-    scene : Oscillator
-    stepper : Stepper
-    grid : DensityGrid
-    steps : int
-        How often noise acts in a section interval; even.
-    beyond : callable or None
-        How far states are beyond the exit, see `Exit.beyond`, if position decides.
-    watches_edge : bool
-        Whether legs have `leaving`.
-    """
+    """What carries a density on a grid over a section interval."""
 
     scene: Oscillator
     stepper: Stepper
     grid: DensityGrid
-    steps: int
-    beyond: Beyond | None = None
-    watches_edge: bool = False
+    steps: int  # how often noise acts in a section interval; even
+    beyond: Beyond | None = None  # how far states are beyond the exit, see `Exit.beyond`, if position decides
 
     @cached_property
     def legs(self) -> list[Leg]:
         """The legs of a section interval."""
-        return self.between(0.0, self.scene.section_interval)
+        return [leg for leg, _ in self._both]
 
     @property
     def leg_times(self) -> Array:
@@ -108,17 +78,19 @@ class DensityFlow:
     @cached_property
     def backward_legs(self) -> list[Leg]:
         """The legs that carry an expected value back over a section interval, the last one first."""
-        pieces = list(self._pieces(0.0, self.scene.section_interval))
-        noise = [0.0, *(time for _, _, time in pieces[:-1])]
-        back = [(start, end, time) for (start, end, _), time in zip(pieces, noise, strict=True)]
-        return self._made(back[::-1], self._from)
+        noise = [0.0, *(leg.noise for leg in self.legs[:-1])]
+        return [dataclasses.replace(back, noise=time) for (_, back), time in zip(self._both, noise, strict=True)][::-1]
+
+    @cached_property
+    def _both(self) -> list[tuple[Leg, Leg]]:
+        return self._made(0.0, self.scene.section_interval)
 
     def between(self, start: float, end: float) -> list[Leg]:
         """Return the legs of a part of a section interval, from `start` to `end` since the section (s).
 
         Noise acts as often as in a whole interval, for their times.
         """
-        return self._made(list(self._pieces(start, end)), self._into)
+        return [leg for leg, _ in self._made(start, end)]
 
     @cached_property
     def amplitude(self) -> Array:
@@ -137,22 +109,21 @@ class DensityFlow:
             arrivals |= held & nodes[i, j] & (leg.crossed > 0)
         return arrivals
 
-    @staticmethod
-    def memory(shape: tuple[int, int], steps: int, autonomous: bool) -> float:
-        """Memory that legs take (GiB)."""
-        return shape[0] * shape[1] * (3 if autonomous else steps + 1) * 3 * 8 / 2**30
+    def _made(self, start: float, end: float) -> list[tuple[Leg, Leg]]:
+        """Legs of a part of a section interval, in both directions.
 
-    def _made(self, pieces: Sequence[tuple[float, float, float]], make: Callable[[float, float], Leg]) -> list[Leg]:
-        """Legs of some pieces of time; those of an autonomous scene that are equally long share their arrays."""
-        known: dict[int, Leg] = {}
-        legs = []
+        Those of an autonomous scene that are equally long share their arrays.
+        """
+        known: dict[int, tuple[Leg, Leg]] = {}
+        legs, pieces = [], list(self._pieces(start, end))
         with stage("flow between nodes", unit="legs", total=len(pieces)):
             for begin, stop, noise_time in pieces:
                 place = stop - begin if self.scene.autonomous else begin
                 key = round(place / (_SAME * self.scene.section_interval))
                 if key not in known:
-                    known[key] = make(begin, stop)
-                legs.append(dataclasses.replace(known[key], noise=noise_time))
+                    known[key] = self._leg(begin, stop)
+                leg, back = known[key]
+                legs.append((dataclasses.replace(leg, noise=noise_time), back))
                 advance()
         return legs
 
@@ -165,8 +136,11 @@ class DensityFlow:
         for begin, stop in itertools.pairwise([start, *times, end]):
             yield begin, stop, 0.5 * step if stop < end else 0.0
 
-    def _into(self, start: float, end: float) -> Leg:
-        """Integrate backwards in time from all nodes, and forwards again for the derivatives."""
+    def _leg(self, start: float, end: float) -> tuple[Leg, Leg]:
+        """Integrate backwards in time from all nodes, and forwards again for the derivatives; and forwards from all.
+
+        In the second leg, what leaves the grid goes on as at its edge.
+        """
         nodes = self.grid.nodes.reshape(-1, 2)
         mirrored, crossed = self._followed(Flow.STATE_REVERSED, nodes * _MIRROR, -end, end - start, _MIRROR)
         feet = mirrored * _MIRROR
@@ -177,28 +151,21 @@ class DensityFlow:
         with np.errstate(invalid="ignore", divide="ignore"):
             growth[inside] = -np.log(np.abs(np.linalg.det(local.derivatives)))
         places[~np.isfinite(growth)] = np.nan
-        shape = self.grid.shape
-        leaving: Array | None = None
-        if self.watches_edge:
-            images, passed = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
-            leaving = (~self.grid.holds(self.grid.places(images))).reshape(shape).astype(float)
-            if self.beyond is not None:
-                leaving *= passed
-        return Leg(places.reshape(*shape, 2), np.nan_to_num(growth).reshape(shape), crossed, leaving=leaving)
-
-    def _from(self, start: float, end: float) -> Leg:
-        """Integrate forwards from all nodes; what leaves the grid goes on as at its edge."""
-        nodes = self.grid.nodes.reshape(-1, 2)
-        images, crossed = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
-        places = np.clip(self.grid.places(images), 0.0, np.array(self.grid.shape) - 1.0)
-        return Leg(places.reshape(*self.grid.shape, 2), np.zeros(self.grid.shape), crossed)
+        images, passed = self._followed(Flow.STATE, nodes, start, end - start, np.ones(2))
+        shape, ahead = self.grid.shape, self.grid.places(images)
+        leaving = np.where(self.grid.holds(ahead).reshape(shape), 0.0, 1.0 if self.beyond is None else passed)
+        kept = np.clip(ahead, 0.0, np.array(shape) - 1.0).reshape(*shape, 2)
+        return (
+            Leg(places.reshape(*shape, 2), np.nan_to_num(growth).reshape(shape), crossed, leaving),
+            Leg(kept, np.zeros(shape), passed, _NOWHERE),
+        )
 
     def _followed(self, flow: Flow, states: Array, start: float, duration: float, sign: Array) -> tuple[Array, Array]:
         """States at the end, NaN if they diverge, and the share of cells that has been at the exit.
 
         Where position decides, motion that ended on its way forwards, as at a pole, is out. `sign` undoes a reflection.
         """
-        checks = 1 if self.beyond is None else _CHECKS
+        checks = 1 if self.beyond is None else 16  # hertz-0.570: a mass that turns back between two went 1e-5 further
         farthest = np.full(len(states), -np.inf) if self.beyond is None else self.beyond(states * sign)
         for number in range(checks):
             begin, interval = start + number * duration / checks, duration / checks
@@ -221,18 +188,19 @@ def steps_for(osc: Oscillator, states: Array) -> int:
     rate is the median over the states, which short contacts do not change.
     """
     rates = np.abs(np.linalg.eigvals(VectorField(osc).jacobian(states))).max(axis=1)
-    return max(2 * math.ceil(_PER_RADIAN * float(np.median(rates)) * osc.section_interval / 2), _FEWEST)
+    return max(2 * math.ceil(_PER_RADIAN * float(np.median(rates)) * osc.section_interval / 2), 8)
 
 
 def check_steps(caller: str, steps: object) -> None:
     """Raise StructureError if noise cannot act so often in a section interval."""
-    whole(f"{caller}: steps", steps, 2, MOST_STEPS)
+    whole(f"{caller}: steps", steps, 2, 4096)
     if isinstance(steps, int) and steps % 2:
         raise StructureError(f"{caller}: steps must be an even number, got {steps}; they come in pairs.")
 
 
-def check_memory(shape: tuple[int, int], needed: float, steps: int, allowed: float) -> None:
-    """Raise StructureError if more memory is needed than allowed, both in GiB."""
+def check_memory(osc: Oscillator, shape: tuple[int, int], steps: int, allowed: float, flows: float = 1.0) -> None:
+    """Raise StructureError if the legs of so many flows, in both directions, need more memory than allowed (GiB)."""
+    needed = flows * 2 * shape[0] * shape[1] * (3 if osc.autonomous else steps + 1) * 3 * 8 / 2**30
     if needed > allowed:
         raise StructureError(
             f"{shape[0]} × {shape[1]} nodes and {steps} steps need {needed:.3g} GiB of memory, and max_memory_gib is "

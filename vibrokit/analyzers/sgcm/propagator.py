@@ -22,9 +22,6 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.noise.noise_model import NoiseModel
 from vibrokit.progress import current
 
-_BLOCKS = 4  # of rows, which threads or processes share
-_NODES_AT_ONCE = 2**14  # between looks at the time limit: a node takes 1 to 10 µs
-
 Array = NDArray[np.float64]
 Marks = NDArray[np.uint8]
 
@@ -33,18 +30,10 @@ _NO_WEIGHT = np.empty((0, 0))
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Propagator:
-    """Carries φ = ln p over section intervals, by turns along the exact flow and by diffusion.
-
-    Attributes
-    ----------
-    flow : DensityFlow
-    intensity : float
-        D (m² s⁻³).
-    executor : Executor, optional
-    """
+    """Carries φ = ln p over section intervals, by turns along the exact flow and by diffusion."""
 
     flow: DensityFlow
-    intensity: float
+    intensity: float  # D (m² s⁻³)
     executor: Executor | None
 
     @property
@@ -73,7 +62,7 @@ class Propagator:
         lost, before, carried = -np.inf, phi, phi
         for leg, carried, taken in self._carried(self.flow.legs, phi, self._weight, floor):
             lost = np.logaddexp(lost, taken)
-            if self.flow.beyond is not None and leg.leaving is not None and leg.leaving.any():
+            if self.flow.beyond is not None and leg.leaving.any():
                 passing = leg.leaving > 0
                 lost = np.logaddexp(lost, self.grid.mass(before + np.log(np.where(passing, leg.leaving, 1.0)), passing))
             before = carried
@@ -88,7 +77,7 @@ class Propagator:
         """
         mass, factor, before = self.grid.mass(phi), 0.0, phi
         for leg, carried, _ in self._carried(legs, phi, self._weight, floor):
-            if leg.leaving is not None and leg.leaving.any():
+            if leg.leaving.any():
                 mass += math.log1p(-min(math.exp(self.grid.mass(before, leg.leaving > 0) - mass), ABSORBED))
             change = self.grid.mass(carried) - mass
             kept = carried > floor
@@ -137,7 +126,7 @@ class Propagator:
         parts = parts_of(float(self.deviation.max()) * spread)
         spreads = self.deviation * (spread / math.sqrt(max(parts, 1)))
         given = (phi, marks, leg.feet, leg.growth, leg.crossed, at_exit, weight, spreads, parts, floor)
-        edges = np.linspace(0, len(phi), _BLOCKS + 1).astype(int).tolist()
+        edges = np.linspace(0, len(phi), 5).astype(int).tolist()  # four tasks for threads or processes
         tasks = [(given, first, last) for first, last in itertools.pairwise(edges)]
         blocks = list(carry(_stepped_rows, tasks, self.executor))
         out, marks, taken = (np.concatenate(some) for some in zip(*blocks, strict=True))
@@ -148,7 +137,7 @@ def _stepped_rows(given: tuple[Any, ...], first: int, last: int) -> tuple[Array,
     """Some rows of φ after a step, their marks, and what the exit takes up; in whatever thread or process."""
     shape = (last - first, given[0].shape[1])
     out, marks, taken = np.empty(shape), np.empty(shape, dtype=np.uint8), np.empty(last - first)
-    rows = max(1, _NODES_AT_ONCE // shape[1])
+    rows = max(1, 16_384 // shape[1])  # between looks at the time limit: a node takes 1 to 10 µs
     for begin in range(first, last, rows):
         end = min(begin + rows, last)
         part = slice(begin - first, end - first)

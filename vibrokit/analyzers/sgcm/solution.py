@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, Unresolved
-from vibrokit.analyzers.sgcm.committor import Committor, committors
+from vibrokit.analyzers.sgcm.at_intensity import AtIntensity
 from vibrokit.analyzers.sgcm.cores import Cores, CoreSets
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
-from vibrokit.analyzers.sgcm.quasi_stationary import Convergence, QuasiStationary, quasi_stationary
+from vibrokit.analyzers.sgcm.quasi_stationary import (
+    Committor,
+    Convergence,
+    QuasiStationary,
+    committors,
+    quasi_stationary,
+)
 from vibrokit.errors import StructureError
-from vibrokit.results.basins import ESCAPED
 from vibrokit.results.region import Region
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -30,7 +34,7 @@ What that changes is once an error of second order, and three times one of fourt
 """
 FEWER = 1.5
 """Factor by which steps are longer in a third solution, at least: they are even."""
-_FLOWS = 2.0 * (1.0 + (1.0 + 1.0 / FEWER) / COARSER**2)  # all flows, both ways, in units of one on the finest grid
+_FLOWS = 1.0 + (1.0 + 1.0 / FEWER) / COARSER**2  # memory of all flows in units of the one on the finest grid
 ACCURACY = 0.1
 """Relative error of rates, as two stated errors, that 5 node spacings in the narrowest deviation reach.
 
@@ -48,26 +52,13 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DensitySolver:
-    """Solves for densities around one attractor.
-
-    Attributes
-    ----------
-    problem : ExitProblem
-    shape : (int, int), optional
-        Nodes in x and in v; by default as many as the narrowest density needs.
-    given_steps : int, optional
-        How often noise acts in a section interval; even. By default as often as the motion needs.
-    max_memory_gib : float
-        Memory that the legs of all flows may take (GiB).
-    accuracy : float
-        Relative error of rates that is wanted.
-    """
+    """Solves for densities around one attractor."""
 
     problem: ExitProblem
-    shape: tuple[int, int] | None = None
-    given_steps: int | None = None
-    max_memory_gib: float = 2.0
-    accuracy: float = ACCURACY
+    shape: tuple[int, int] | None = None  # nodes in x and in v; by default as many as the narrowest density needs
+    given_steps: int | None = None  # how often noise acts in a section interval; by default as the motion needs
+    max_memory_gib: float = 2.0  # that the legs of all flows may take
+    accuracy: float = ACCURACY  # relative error of rates that is wanted
 
     @cached_property
     def steps(self) -> int:
@@ -75,10 +66,10 @@ class DensitySolver:
         orbits = [attractor.orbit[:, :2] for attractor in self.problem.structure.attractors]
         return self.given_steps or steps_for(self.problem.osc, np.concatenate(orbits))
 
-    def solve(self, intensities: Sequence[float]) -> Generator[AtIntensity | Unresolved, None, None]:
-        """Yield what is found at some intensities, which must descend; first those that cannot be resolved.
+    def solve(self, intensities: Sequence[float], refused: dict[float, str]) -> Iterator[AtIntensity]:
+        """Yield what is found at some intensities, which must descend, and add to `refused` why others are left out.
 
-        One cannot if the nodes are too far apart for its density, or need too much memory. Each of the others is solved
+        One is if the nodes are too far apart for its density, or need too much memory. Each of the others is solved
         on a coarser grid and from there on the finest one. What fewer steps and other sets change of the committors is
         found on the coarser grid.
         """
@@ -89,7 +80,7 @@ class DensitySolver:
             try:
                 self._check(grid, left[-1], _FLOWS)
             except StructureError as error:
-                yield Unresolved(left.pop(), str(error))
+                refused[left.pop()] = str(error)
                 grid = None
         if grid is None:
             return
@@ -245,8 +236,7 @@ class DensitySolver:
                 f"{grid.shape[1]} nodes are enough for D = {least:.5g}, and this D needs {nx} × {nv}. "
                 "LeastAction gives the energy in the limit of weak noise."
             )
-        needed = flows * DensityFlow.memory(grid.shape, self.steps, self.problem.scene.autonomous)
-        check_memory(grid.shape, needed, self.steps, self.max_memory_gib)
+        check_memory(self.problem.scene, grid.shape, self.steps, self.max_memory_gib, flows)
 
     @cached_property
     def _cores(self) -> Cores:
@@ -268,5 +258,4 @@ class DensitySolver:
     def _flow(self, grid: DensityGrid, steps: int) -> DensityFlow:
         stepper = self.problem.ensemble_stepper(Flow.STATE_VARIATIONAL)
         beyond = None if self.problem.outlet is None else self.problem.beyond
-        escaping = self.problem.outlet == ESCAPED  # may take motion far beyond the grid in a leg
-        return DensityFlow(self.problem.scene, stepper, grid, steps, beyond, watches_edge=escaping)
+        return DensityFlow(self.problem.scene, stepper, grid, steps, beyond)

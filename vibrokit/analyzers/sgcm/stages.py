@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.committor import relevant_legs
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
+from vibrokit.analyzers.sgcm.quasi_stationary import relevant_legs
 from vibrokit.analyzers.sgcm.solution import DensitySolver
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
@@ -26,23 +26,12 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CommittorStages:
-    """ln of the committor through a section interval.
-
-    Attributes
-    ----------
-    flow : DensityFlow
-    intensity : float
-        D (m² s⁻³).
-    times : array (stages,)
-        Since the section (s), ascending from 0 to the next section.
-    log_values : array (stages, nx, nv)
-        Where they are not known, the nearest known one.
-    """
+    """ln of the committor through a section interval."""
 
     flow: DensityFlow
-    intensity: float
-    times: Array
-    log_values: Array
+    intensity: float  # D (m² s⁻³)
+    times: Array  # (stages,): since the section (s), ascending from 0 to the next section
+    log_values: Array  # (stages, nx, nv); where they are not known, the nearest known one
 
     @property
     def grid(self) -> DensityGrid:
