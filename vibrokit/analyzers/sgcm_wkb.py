@@ -18,7 +18,7 @@ from vibrokit.analyzers.sgcm.at_intensity import AtIntensity, limit_of
 from vibrokit.analyzers.sgcm.density_flow import check_steps
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import checked_noise
-from vibrokit.analyzers.sgcm.solution import ACCURACY, DensitySolver
+from vibrokit.analyzers.sgcm.solution import ACCURACY, EDGE, DensitySolver
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
@@ -31,7 +31,6 @@ from vibrokit.structure.validation import gibibytes, share
 
 METHOD = "SGCM-WKB"
 _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
-_EDGE = 0.01  # of the probability that leaves: more than that at the edge of the grid may be missing elsewhere
 
 
 class SGCM(RateAnalyzer):
@@ -240,7 +239,7 @@ def _findings(problem: ExitProblem, solved: list[AtIntensity], refused: dict[flo
                     change=max([one.density.change, *(c.change for c in one.committors.values())]),
                 )
             )
-        if one.at_edge > max(one.density.log_rates.values(), default=0.0) + math.log(_EDGE):
+        if one.at_edge > max(one.density.log_rates.values(), default=0.0) + math.log(EDGE):
             found.append(
                 Finding.of(Code.DENSITY_AT_EDGE, problem.source, intensity=one.intensity, share=math.exp(one.at_edge))
             )

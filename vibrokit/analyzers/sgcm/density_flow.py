@@ -31,7 +31,8 @@ _PER_RADIAN = 2.0  # of the fastest oscillation or decay: 24 in a forcing period
 _GAUSS = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
 ABSORBED = 1 - 1e-9
 """Share of the probability that a set takes up where it covers a cell."""
-_SAME = 1e-9  # of a section interval: times that differ by less are equal
+SAME = 1e-9
+"""Of a section interval: times that differ by less are equal."""
 
 Array = NDArray[np.float64]
 Beyond = Callable[[Array], Array]
@@ -119,7 +120,7 @@ class DensityFlow:
         with stage("flow between nodes", unit="legs", total=len(pieces)):
             for begin, stop, noise_time in pieces:
                 place = stop - begin if self.scene.autonomous else begin
-                key = round(place / (_SAME * self.scene.section_interval))
+                key = round(place / (SAME * self.scene.section_interval))
                 if key not in known:
                     known[key] = self._leg(begin, stop)
                 leg, back = known[key]
@@ -130,7 +131,7 @@ class DensityFlow:
     def _pieces(self, start: float, end: float) -> Iterator[tuple[float, float, float]]:
         """When each leg begins and ends, and for how long noise acts then."""
         share = (end - start) / self.scene.section_interval
-        count = max(1, math.ceil(self.steps // 2 * share - _SAME))
+        count = max(1, math.ceil(self.steps // 2 * share - SAME))
         step = (end - start) / count
         times = [start + (number + place) * step for number in range(count) for place in _GAUSS]
         for begin, stop in itertools.pairwise([start, *times, end]):

@@ -44,8 +44,8 @@ in 9, 15, 27 and 45 CPU seconds. A double well (ζ = 0.2, ΔU/D = 4 to 12): 0.1 
 _WANTED, _EXPLORED, _NARROWEST = 5.0, 3.0, 2.0  # such spacings: by default, in exploration, and at least
 _ENOUGH = 1.05 * _NARROWEST  # and a little to spare
 _FEWEST, _MOST, _LARGEST = 120, 400, 640  # nodes along each side, by default; the last one for the least spacings
-_SMALLER = 0.7  # factor of the area by which a region must shrink at least, or exploration ends
-_EDGE = 0.01  # of the density that leaves: with less on its edge a region is wide enough
+EDGE = 0.01
+"""Of the density that leaves: with less on its edge a region is wide enough."""
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,8 @@ class DensitySolver:
     def explored(self, intensity: float) -> tuple[AtIntensity, DensityGrid]:
         """The solution on a coarse grid, and a grid around what has probability enough to matter.
 
-        Where the nodes of the whole region are too far apart for the density, a stronger noise is used.
+        Where the nodes of the whole region are too far apart for the density, a stronger noise is used, and again on a
+        smaller region, as long as that has 0.7 times the area or less.
         """
         nx, nv = self.shape or (_LARGEST, _LARGEST)
         shape = min(nx, 140), min(nv, 140)
@@ -135,7 +136,7 @@ class DensitySolver:
             found = quasi_stationary(propagator, self._cores.start(grid, stronger), cores, self._exploring)
             wanted = self._wanted(found, intensity)
             closer = self._grid(grid.around(wanted, 3), shape)
-            smaller = closer.areas.sum() * closer.shape[1] < _SMALLER * grid.areas.sum() * grid.shape[1]
+            smaller = closer.areas.sum() * closer.shape[1] < 0.7 * grid.areas.sum() * grid.shape[1]
             wider = self._widened(found, intensity / stronger)
             if stronger > intensity and smaller:
                 grid = closer
@@ -167,7 +168,7 @@ class DensitySolver:
         What leaves there is lost, although it would come back. Where motion escapes or position decides it is not.
         `weaker` is the noise that is wanted over that of the density: depths grow as it falls.
         """
-        matters, grid = found.highest > found.top + weaker * math.log(_EDGE), found.grid
+        matters, grid = found.highest > found.top + weaker * math.log(EDGE), found.grid
         sides = np.array([[matters[0].any(), matters[-1].any()], [matters[:, 0].any(), matters[:, -1].any()]])
         if grid.turn:
             sides[0] = False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from vibrokit.analyzers.problem import ExitProblem
-from vibrokit.analyzers.sgcm.density_flow import DensityFlow
+from vibrokit.analyzers.sgcm.density_flow import SAME, DensityFlow
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.quasi_stationary import relevant_legs
 from vibrokit.analyzers.sgcm.solution import DensitySolver
@@ -18,7 +18,6 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAME = 1e-9  # of a section interval
 _BELOW = 20.0  # in ln: values so far below the least of the core are not computed
 
 Array = NDArray[np.float64]
@@ -48,10 +47,10 @@ class CommittorStages:
         nodes = grid.nodes.reshape(-1, 2)
         found = np.empty((count, *grid.shape))
         for number, time in enumerate(np.arange(count) * interval / count):
-            stage = int(np.searchsorted(self.times, time - _SAME * interval))
+            stage = int(np.searchsorted(self.times, time - SAME * interval))
             rest = max(self.times[stage] - time, 0.0)
             states = nodes
-            if rest > _SAME * interval:
+            if rest > SAME * interval:
                 states = run_ensemble(
                     self.flow.scene, Flow.STATE, self.flow.stepper, nodes, start_time=float(time), interval=float(rest)
                 ).states
