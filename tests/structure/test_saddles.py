@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 import vibrokit as vk
 from tests.scenes import Coloured, double_well, scene
+from tests.structure.stable import stable_orbits
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.results.basins import ESCAPED, Basins
 from vibrokit.results.codes import Code
@@ -19,7 +20,6 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import classify_grid
 from vibrokit.structure.boundaries.meetings import meeting_cells
 from vibrokit.structure.boundaries.saddles import SaddleSearch
-from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.trade.reference import reference_map
 
@@ -30,13 +30,6 @@ def settled(osc, attractors, bounds, cells=(80, 80), budget=1000, stepper=None):
     chosen = stepper or ensemble_stepper(osc, Flow.STATE)
     classifier = BasinClassifier(osc, attractors, region, 1e-3, budget, chosen)
     return classifier, classify_grid(classifier, cells)
-
-
-def orbits(osc, *starts, period=1):
-    """Describe the stable orbits that some starts come to."""
-    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    ends = osc.section_map(starts, 300, stepper=stepper)
-    return tuple(describe_orbit(osc, refine_orbit(osc, end, period, stepper), stepper) for end in ends)
 
 
 def searched(classifier, basins, rng=0, **limits):
@@ -60,7 +53,7 @@ def hilltop(damping, slope):
 
 def test_the_double_well_has_one_saddle_at_its_top():
     osc = double_well()
-    (saddle,), findings = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS)
+    (saddle,), findings = saddles_of(osc, stable_orbits(osc, (-1, 0.1), (1, -0.1)), WELLS)
     rates = hilltop(0.05, 1.0)
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
     np.testing.assert_allclose(saddle.exponents, rates, rtol=1e-9)
@@ -75,7 +68,7 @@ def test_the_double_well_has_one_saddle_at_its_top():
 def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
     # Deviations grow by exp(2π · 4.5) = 2e12 in 2π/ω_n: what is 1e-10 apart is wells apart after it.
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.5, spring=vk.CubicSpring(linear=-25.0, cubic=25.0))
-    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), ((-2, 2), (-10, 10)), cells=(40, 40))
+    (saddle,), _ = saddles_of(osc, stable_orbits(osc, (-1, 0.1), (1, -0.1)), ((-2, 2), (-10, 10)), cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-10)
     np.testing.assert_allclose(saddle.exponents, hilltop(0.5, 25.0), rtol=1e-9)
     assert saddle.leads_to == (0, 1)
@@ -90,7 +83,7 @@ def test_a_saddle_that_presses_on_a_stop():
         spring=vk.CubicSpring(linear=1.0, cubic=-1.0),
         barriers=(vk.Barrier(vk.Hertz(stiffness=1.0), position=0.9, side="right"),),
     )
-    found, findings = saddles_of(osc, orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
+    found, findings = saddles_of(osc, stable_orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
     top = brentq(lambda x: x - x**3 + (x - 0.9) ** 1.5, 1.0, 1.3, xtol=1e-15)
     slope = 3 * top**2 - 1 - 1.5 * np.sqrt(top - 0.9)
     assert len(found) == 2, findings
@@ -106,7 +99,7 @@ def test_stops_whose_force_jumps():
     law = vk.CustomLaw("stiffness*depth + loss*rate", stiffness=20.0, loss=0.5)
     stops = tuple(vk.Barrier(law, position=side * 1.2, side=name) for side, name in ((-1, "left"), (1, "right")))
     osc = double_well(barriers=stops)
-    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1), (1, -0.1)), WELLS, cells=(40, 40))
+    (saddle,), _ = saddles_of(osc, stable_orbits(osc, (-1, 0.1), (1, -0.1)), WELLS, cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-12)
     assert saddle.leads_to == (0, 1)
 
@@ -162,7 +155,7 @@ def check_against_scipy(osc, saddle, force, stop=None):
 
 def test_the_duffing_oscillator_has_one_boundary_saddle():
     osc = vk.load_scene("duffing")
-    found, findings = saddles_of(osc, orbits(osc, (0, 0), (2, 1)), ((-3, 3), (-3, 3)))
+    found, findings = saddles_of(osc, stable_orbits(osc, (0, 0), (2, 1)), ((-3, 3), (-3, 3)))
     assert len(found) == 1, findings
     assert (found[0].kind, found[0].period, set(found[0].leads_to)) == ("saddle", 1, {0, 1})
     check_against_scipy(osc, found[0], lambda t, x, v: 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3)
@@ -206,7 +199,7 @@ def paper_force(t, x, v):
 def stops():
     """hertz-0.570, its two attractors, and the boundary between them."""
     osc = vk.load_scene("hertz-0.570")
-    attractors = orbits(osc, (0.466551, 0.002566), (0.023582, -0.049071))
+    attractors = stable_orbits(osc, (0.466551, 0.002566), (0.023582, -0.049071))
     return osc, attractors, *settled(osc, attractors, ((-0.7, 0.8), (-1.0, 1.0)), cells=(120, 120))
 
 
@@ -236,7 +229,7 @@ def test_an_unstable_limit_cycle_parts_rest_from_motion():
     inner, outer = np.sort(np.sqrt(np.roots([0.04 / 16, -0.08 / 8, 0.005])))
     exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
     cycle = find_cycle(osc, osc.section_map([[outer, 0.0]], 200)[0], exact, longest=20.0)
-    attractors = (*orbits(osc, (0.0, 0.0)), describe_orbit(osc, cycle, exact))
+    attractors = (*stable_orbits(osc, (0.0, 0.0)), describe_orbit(osc, cycle, exact))
     (saddle,), findings = saddles_of(osc, attractors, ((-2.5, 2.5), (-2.5, 2.5)), cells=(40, 40))
     assert (saddle.kind, saddle.period, saddle.leads_to) == ("repeller", 1, (0, 1)), findings
     assert np.abs(saddle.points[0, 0]) == pytest.approx(inner, rel=1e-3)  # averaging is right to second order
@@ -257,7 +250,7 @@ def test_cells_that_did_not_settle_are_passed_over():
 
 def test_one_basin_has_no_boundary():
     osc = double_well()
-    found, (finding,) = saddles_of(osc, orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
+    found, (finding,) = saddles_of(osc, stable_orbits(osc, (1, 0)), ((0.9, 1.1), (-0.05, 0.05)), cells=(8, 8))
     assert found == ()
     assert (finding.code, finding.values["count"]) == (Code.SADDLES, 0)
 
@@ -270,7 +263,7 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
     critical = 4 * delta * np.cosh(np.pi * omega / 2) / (3 * np.sqrt(2) * np.pi * omega)
     assert (amplitude > 1.3 * critical) if wound else (amplitude < critical / 1.3)
     osc = double_well(excitations=(vk.Harmonic(amplitude=amplitude, frequency=omega),))
-    found, findings = saddles_of(osc, orbits(osc, (-0.95, 0), (1.05, 0)), ((-1.8, 1.8), (-1.5, 1.5)))
+    found, findings = saddles_of(osc, stable_orbits(osc, (-0.95, 0), (1.05, 0)), ((-1.8, 1.8), (-1.5, 1.5)))
     chaotic = [finding for finding in findings if finding.code is Code.CHAOTIC_EDGE]
     assert [(finding.source, finding.target) for finding in chaotic] == [(0, 1)] * wound
     assert any(saddle.kind == "chaotic" for saddle in found) == wound
@@ -357,7 +350,7 @@ def test_basins_that_a_saddle_connects_count_as_one_where_a_saddle_to_others_is_
 @pytest.mark.slow
 def test_a_third_state_of_the_noise():
     osc = double_well(noise=Coloured(intensity=0.01, rate=0.3))
-    (saddle,), _ = saddles_of(osc, orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
+    (saddle,), _ = saddles_of(osc, stable_orbits(osc, (-1, 0.1, 0), (1, -0.1, 0)), WELLS, cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0, 0]], atol=1e-12)
     grows, falls = hilltop(0.05, 1.0)
     np.testing.assert_allclose(saddle.exponents, [grows, -0.3, falls], rtol=1e-9)

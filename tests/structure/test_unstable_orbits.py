@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.structure.stable import stable_orbits
 from vibrokit.errors import StructureError
-from vibrokit.kernels.choice import ensemble_stepper, single_stepper
+from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.results.region import Region
-from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.basins.classifier import BasinClassifier
-from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.unstable_orbits import unstable_orbits
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -19,12 +18,6 @@ STOPS = ((-0.7, 0.8), (-1.0, 1.0))
 def index(multipliers):
     """Index of a fixed point of a map: the sign of det(1 − DF)."""
     return int(np.sign(np.prod(1 - np.asarray(multipliers)).real))
-
-
-def attractors(osc, *starts, period=1):
-    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    ends = osc.section_map(starts, 400, stepper=stepper)
-    return tuple(describe_orbit(osc, refine_orbit(osc, end, period, stepper), stepper) for end in ends)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +32,7 @@ def test_indices_of_all_fixed_points_add_up_to_one(name, starts, bounds):
     # A map that takes a disc into itself: Lefschetz.
     osc = vk.load_scene(name)
     unstable = unstable_orbits(osc, 1, region=bounds)
-    stable = attractors(osc, *starts)
+    stable = stable_orbits(osc, *starts)
     assert sum(index(orbit.multipliers) for orbit in (*stable, *unstable)) == 1
     assert any(index(orbit.multipliers) == -1 for orbit in unstable)
 
@@ -50,7 +43,7 @@ def test_orbits_of_longer_period_are_born_in_pairs_or_by_doubling(period):
     # The index of the map's power is 1 too, so that those of all its fixed points that are no fixed points of the map
     # add up to 1 less what the fixed points of the map have under its power.
     osc = vk.load_scene("hertz-0.525")
-    fixed = [attractors(osc, (0.448438, 0.001891))[0], *unstable_orbits(osc, 1, region=STOPS)]
+    fixed = [stable_orbits(osc, (0.448438, 0.001891))[0], *unstable_orbits(osc, 1, region=STOPS)]
     found = unstable_orbits(osc, period, region=STOPS, starts=(16, 16))
     assert found
     total = sum(index(orbit.multipliers**period) for orbit in fixed)
@@ -79,7 +72,7 @@ def test_flip_saddles_are_named_and_do_not_depend_on_the_starts():
 
 def test_a_classifier_finds_where_the_branches_lead():
     osc = vk.load_scene("hertz-0.570")
-    both = attractors(osc, (0.466551, 0.002566), (0.023582, -0.049071))
+    both = stable_orbits(osc, (0.466551, 0.002566), (0.023582, -0.049071))
     classifier = BasinClassifier(osc, both, Region.of(STOPS), 1e-3, 1000, ensemble_stepper(osc, Flow.STATE))
     (saddle,) = unstable_orbits(osc, 1, region=STOPS, classifier=classifier)
     assert set(saddle.leads_to) == {0, 1}

@@ -37,7 +37,7 @@ from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_
 from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
 from vibrokit.structure.rest import in_front_of_stops, tops_around
 from vibrokit.structure.scales import length_of, states_at
-from vibrokit.structure.search import LONGEST_PERIOD, Search
+from vibrokit.structure.search import Search
 from vibrokit.structure.validation import Request
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -94,7 +94,7 @@ class Finder:
         starts = [_starts(self.osc, region, self.request.starts, self.rng) for region in regions]
         self.search.run(np.concatenate(starts), self.budget, self.budget >= self.wait)
         if not self.search.attractors:
-            raise StructureError(_nothing_found(self.search, self.searched, self.budget, self.wait))
+            raise StructureError(self.search.failure(self.budget, self.wait))
         self._add_rests()
         self._order()
         if self.region is not None and not any(lies_in(self.region, found) for found in self.attractors):
@@ -280,21 +280,6 @@ def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.ra
     low, high = region.bounds.T
     shift = (rng.random(2) - 0.5) * (high - low) / np.array(counts)
     return states_at(osc, region.cell_centres(counts) + shift)
-
-
-def _nothing_found(search: Search, region: Region, budget: int, wait: int) -> str:
-    """Return why there is no structure, and what to change; `wait` is the budget that the damping requires."""
-    advice = "raise budget" if budget < wait else "widen the region or raise budget"
-    if search.diverged > search.starts / 2:
-        ended = f"end where the forces do ({where})" if (where := search.osc.model.conditions) else "grow without bound"
-        advice = f"most motions {ended}; narrow the region, or check the signs of the forces"
-    if search.stalled > search.starts / 2:
-        advice = f"{search.stalled} need too many steps; take softer laws, or friction that is smoother"
-    return (
-        f"no steady state was found from {search.starts} starts in x ∈ {region.x}, v ∈ {region.v}: within {budget} "
-        f"periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "
-        f"{search.diverged} diverged; {advice}."
-    )
 
 
 def _none_inside(region: Region, attractors: Sequence[Attractor]) -> str:

@@ -120,6 +120,21 @@ class Search:
             left=len(self.unsettled) - moving, diverged=self.diverged,
         )  # fmt: skip
 
+    def failure(self, budget: int, wait: int) -> str:
+        """Return why nothing was found, and what to change; `wait` is the budget that the damping requires."""
+        advice = "raise budget" if budget < wait else "widen the region or raise budget"
+        if self.diverged > self.starts / 2:
+            where = self.osc.model.conditions
+            ended = f"end where the forces do ({where})" if where else "grow without bound"
+            advice = f"most motions {ended}; narrow the region, or check the signs of the forces"
+        if self.stalled > self.starts / 2:
+            advice = f"{self.stalled} need too many steps; take softer laws, or friction that is smoother"
+        return (
+            f"no steady state was found from {self.starts} starts in x ∈ {self.region.x}, v ∈ {self.region.v}: within "
+            f"{budget} periods no start reached an orbit of period up to {LONGEST_PERIOD} or a set that persists, and "
+            f"{self.diverged} diverged; {advice}."
+        )
+
     def _arrival(self) -> Stop:
         """The test for having reached a known attractor, or a state from which motion cannot leave the well of one."""
         copies = [known.points for known in self.attractors]

@@ -16,7 +16,6 @@ from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.codes import Code
@@ -28,8 +27,8 @@ from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, Strip
 from vibrokit.structure.boundaries.meetings import Pair, first_few, groups_of, meeting_cells, pairs_apart
 from vibrokit.structure.boundaries.motions import NEAR, almost_repeats, chaotic_set, closing, recurrence, same_place
-from vibrokit.structure.boundaries.unstable import RESIDUAL, branch_limits, describe_unstable, refine_unstable
-from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.boundaries.unstable import RESIDUAL, branch_limits, describe_unstable, in_turn, refine_unstable
+from vibrokit.structure.circle import wrapped
 from vibrokit.structure.orbits import EQUAL, Orbit
 from vibrokit.structure.orbits_inside import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
@@ -252,7 +251,7 @@ class SaddleSearch:
         if embedded and not saddle.residual <= RESIDUAL:
             return False
         saddle = dataclasses.replace(saddle, embedded=embedded)
-        self._found.append(_in_turn(self.osc, saddle, self.plain.landings.middle) if self.plain.circle else saddle)
+        self._found.append(in_turn(self.osc, saddle, self.plain.landings.middle) if self.plain.circle else saddle)
         self._places.append(self.region.scaled(self._found[-1].points))
         return True
 
@@ -288,15 +287,6 @@ class SaddleSearch:
             if len(set(limits)) > 1 and not self._known(self.region.scaled(orbit.point[None]), EQUAL):
                 self._add(orbit, limits, embedded=True)
         return len(self._found) - before
-
-
-def _in_turn(osc: Oscillator, saddle: Saddle, middle: float) -> Saddle:
-    """Return a saddle moved along x by whole turns, its points to the turn around a place."""
-    away = -turn_of(osc) * float(turns_to(osc, saddle.points[:1], middle)[0])
-    points = wrapped(osc, saddle.points, middle)
-    return dataclasses.replace(
-        saddle, points=points, nodes=shifted(saddle.nodes, away), orbit=shifted(saddle.orbit, away)
-    )
 
 
 def _on_boundary(code: Code, pair: Pair, **values: float) -> Finding:

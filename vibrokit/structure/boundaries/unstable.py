@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.meetings import settled
+from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import SAMPLES, Orbit, least_period, nodes_from, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -96,6 +98,15 @@ def _kind_of(multipliers: NDArray[np.complex128]) -> str:
     if len(growing) > 1:
         return "repeller"
     return "flip saddle" if growing[0].real < 0 else "saddle"
+
+
+def in_turn(osc: Oscillator, saddle: Saddle, middle: float) -> Saddle:
+    """Return a saddle moved along x by whole turns, its points to the turn around a place."""
+    away = -turn_of(osc) * float(turns_to(osc, saddle.points[:1], middle)[0])
+    points = wrapped(osc, saddle.points, middle)
+    return dataclasses.replace(
+        saddle, points=points, nodes=shifted(saddle.nodes, away), orbit=shifted(saddle.orbit, away)
+    )
 
 
 def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
