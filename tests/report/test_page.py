@@ -70,11 +70,7 @@ def test_the_page_is_well_formed_and_needs_nothing_else(report):
         assert chapter.title in page.words
 
 
-def test_its_numbers_are_those_of_the_assessment(assessment, report):  # noqa: F811
-    cells = Page(report.html).cells
-    for name in assessment.names:
-        assert assessment.mean_time(name).number in cells
-        assert f"{assessment.energy(name).value:.6g}" in cells
+def test_units_of_the_inputs_and_numbers_of_the_answer(assessment, report):  # noqa: F811
     (inputs,) = [table for table in report.tables if table.name == "inputs"]
     units = {row[0]: row[2:4] for row in inputs.rows}
     assert units["noise.intensity"] == ("1.5e-05", "m² s⁻³")

@@ -120,15 +120,8 @@ class AllowedIntensity(Answer):
 def probability_within(time: float, leaving: LogTime, goal: LogTime, relaxation: float) -> tuple[float, float, float]:
     """Return the probability that a state is left for a target within a time (s), and its interval.
 
-    Parameters
-    ----------
-    time : float
-    leaving : LogTime
-        Until the state is left at all.
-    goal : LogTime
-        The inverse of the rate to the target; the same as `leaving` if that is the only one, or any.
-    relaxation : float
-        Relaxation time of the state (s); NaN where it is not known.
+    `leaving` is the time until the state is left at all, `goal` the inverse of the rate to the target: the same if that
+    is the only one, or any. The relaxation time (s) is NaN where it is not known.
     """
     delay = METASTABLE * relaxation if relaxation > 0 else 0.0
 

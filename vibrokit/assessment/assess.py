@@ -7,21 +7,22 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
-from vibrokit.arguments import members
+from vibrokit.arguments import members, real
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.known import Known, Part
 from vibrokit.assessment.ladder import barrier, ladder
-from vibrokit.assessment.request import Request
 from vibrokit.construction import called
-from vibrokit.errors import StructureError, VibrokitError
+from vibrokit.errors import ParameterError, SceneError, StructureError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, Work, stage, working
+from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
+from vibrokit.registry import Group, load
 from vibrokit.results.atomic import checked_target
 from vibrokit.results.codes import Code
 from vibrokit.results.files import load_result
@@ -33,8 +34,10 @@ from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
-from vibrokit.structure.validation import check_belongs
+from vibrokit.structure.validation import check_belongs, check_means, seed_of
 
+METHODS = ("least-action", "mfet", "sgcm")
+"""Analyzers that an assessment runs, in this order, by their registered names."""
 TIME_LIMIT = 300.0
 """Default budget (s)."""
 
@@ -103,25 +106,10 @@ def assess(
     OutOfTime
         The time limit was reached before the steady states were found.
     """
-    request = Request.of(
-        osc, accuracy=accuracy, time_limit=time_limit, methods=methods, source=source, exit=exit or LeaveBasin(),
-        rng=rng, executor=executor,
-    )  # fmt: skip
-    with working(progress, request.time_limit) as work:
-        return assessed(osc, request, work, known, checkpoint)
-
-
-def assessed(
-    osc: Oscillator,
-    request: Request,
-    work: Work,
-    known: Any = (),
-    checkpoint: str | os.PathLike[str] | None = None,
-) -> Assessment:
-    """Return the last assessment that was reached, and save it after each stage.
-
-    `work` is the work under way. If it is stopped before there is an assessment, its KeyboardInterrupt is raised.
-    """
+    check_means(osc, None, executor)
+    _check(accuracy, source)
+    analyzers, seed = _analyzers(osc, methods, exit or LeaveBasin(), real(accuracy)), seed_of(rng)
+    limit = checked_time_limit(time_limit)
     kept = None if checkpoint is None else checked_target(checkpoint)
     listed = members(known)
     given = (known,) if listed is None else listed
@@ -134,56 +122,90 @@ def assessed(
             )
         given = (*given, before)
     last: Assessment | None = None
-    with Stoppable("the assessment") as road:
-        for assessment in _Road(osc, request, work, given).stages():
-            if kept is not None:
-                assessment.save(kept)
-            last = assessment
-    if last is None:  # the first stage yields one, or is stopped
-        work.stop_again()
+    with working(progress, limit) as work:
+        road = _Road(osc, real(accuracy), limit, source, analyzers, seed, executor, work)
+        road.take(Known.of(given, real(accuracy)))
+        with Stoppable("the assessment") as stages:
+            for assessment in road.stages():
+                if kept is not None:
+                    assessment.save(kept)
+                last = assessment
+        if last is None:  # the first stage yields one, or is stopped
+            work.stop_again()
     assert last is not None
     return dataclasses.replace(
-        last, complete=last.complete and not road.stopped, findings=(*last.findings, *road.findings)
+        last, complete=last.complete and not stages.stopped, findings=(*last.findings, *stages.findings)
     )
 
 
+def _check(accuracy: Any, source: Any) -> None:
+    if not 0 < real(accuracy) < 1:
+        raise ParameterError(f"accuracy must be above 0 and below 1, got {shown(accuracy)}.")
+    if source is not None and (not isinstance(source, str | Integral) or isinstance(source, bool) or source == ""):
+        raise ParameterError(f"source must be the label or the name of a state, got {shown(source)}.")
+
+
+def _analyzers(osc: Oscillator, methods: Any, exit: Exit, accuracy: float) -> dict[str, Analyzer]:  # noqa: A002
+    """Return analyzers that are fitted to an accuracy, by their registered names."""
+    names = METHODS if methods is None else members(methods)
+    if not names:
+        raise ParameterError(f"methods must be names of analyzers, such as {METHODS!r}, got {shown(methods)}.")
+    if osc.noise is not None and not osc.noise.intensity > 0:
+        raise SceneError("the noise of the scene has the intensity 0, so nothing is left; give it a positive one.")
+    found = {name: load(Group.ANALYZERS, name, Analyzer)(exit=exit).for_accuracy(accuracy) for name in names}
+    for one in found.values():
+        one.check(osc)
+    return found
+
+
+@dataclasses.dataclass(eq=False)
 class _Road:
     """Runs the stages of one assessment and keeps their results."""
 
-    def __init__(self, osc: Oscillator, request: Request, work: Work, known: Sequence[Any]) -> None:
-        self.osc, self.request, self.work = osc, request, work
-        self.structure: Structure | None = None
-        self.parts: dict[tuple[str, int], Part] = {}  # by analyzer and by source
-        self.left: list[Finding] = []
-        self.complete = False
-        self.known = Known.of(known, request.accuracy)
-        self.known.check(osc, next(iter(request.analyzers.values())).exit)
-        for one in self.known.structures:
-            check_belongs(osc, one)
+    osc: Oscillator
+    accuracy: float
+    time_limit: float | None
+    source: int | str | None
+    analyzers: dict[str, Analyzer]
+    seed: int
+    executor: Executor | None
+    work: Work
+    structure: Structure | None = None
+    parts: dict[tuple[str, int], Part] = dataclasses.field(default_factory=dict)  # by analyzer and by source
+    left: list[Finding] = dataclasses.field(default_factory=list)
+    complete: bool = False
+
+    def take(self, known: Known) -> None:
+        """Take what is known; raises StructureError if that is of another scene or another exit."""
+        self.known = known
+        known.check(self.osc, self._exit)
+        for one in known.structures:
+            check_belongs(self.osc, one)
             self.structure = one
+
+    @property
+    def _exit(self) -> Exit:
+        return next(iter(self.analyzers.values())).exit
 
     def stages(self) -> Iterator[Assessment]:
         """Run what is wanted and not known, and yield the assessment after each stage."""
-        wanted = self.request
         if self.structure is None or not self.structure.complete:
             with stage("which states are there"):
-                self.structure = find_structure(self.osc, rng=wanted.rng)
+                self.structure = find_structure(self.osc, rng=self.seed)
         structure = self.structure
         if not structure.complete or not structure.attractors:
             yield self._assessment()
             return
-        self.parts = self.known.parts(self.osc, structure, next(iter(wanted.analyzers.values())).exit)
+        self.parts = self.known.parts(self.osc, structure)
         yield self._assessment()
-        for analyzer in wanted.analyzers.values():
+        for analyzer in self.analyzers.values():
             analyzer.exit.check(self.osc, structure)
-        labels = (
-            range(len(structure.attractors)) if wanted.source is None else [structure.attractor(wanted.source).label]
-        )
-        rated = {name: one for name, one in wanted.analyzers.items() if one.takes_intensities}
-        others = [name for name in wanted.analyzers if name not in rated]
+        labels = range(len(structure.attractors)) if self.source is None else [structure.attractor(self.source).label]
+        rated = {name: one for name, one in self.analyzers.items() if one.takes_intensities}
+        others = [name for name in self.analyzers if name not in rated]
         ran = True
         for number, name in enumerate(others):
-            paths = dataclasses.replace(wanted.analyzers[name], source=wanted.source)
+            paths = dataclasses.replace(self.analyzers[name], source=self.source)
             ran &= self._run(name, paths, labels, _PATHS if rated else 1.0 / (len(others) - number))
             yield self._assessment()
         order = sorted(labels, key=self._energy)
@@ -197,15 +219,15 @@ class _Road:
             if not (waiting or repeated or self.work.over):
                 waiting, repeated = self._open(runs), True
             yield self._assessment()
-        asked = ((name, label) for name, label in self.parts if name in wanted.analyzers and label in labels)
+        asked = ((name, label) for name, label in self.parts if name in self.analyzers and label in labels)
         self.complete = ran and all(self._is_known(name, label) for name, label in asked)
         yield self._assessment()
 
     def _open(self, runs: Sequence[tuple[str, int]]) -> list[tuple[str, int]]:
         """Runs that the limit ended, if each can now have more time than it had."""
-        if self.request.time_limit is None:
+        if self.time_limit is None:
             return []
-        left = self.request.time_limit - self.work.seconds
+        left = self.time_limit - self.work.seconds
         ended = [run for run in runs if run in self.parts and not self.parts[run][0].complete]
         return [run for run in ended if self.parts[run][0].seconds < left / len(ended)]
 
@@ -218,24 +240,24 @@ class _Road:
         if self.work.over:
             self._leave(name, subject, "the work was stopped before.")
             return False
-        limit = None if self.request.time_limit is None else share * (self.request.time_limit - self.work.seconds)
+        limit = None if self.time_limit is None else share * (self.time_limit - self.work.seconds)
         try:
             with stage("how it is left" if not subject else "how long it lasts", subject=subject):
-                found = analyzer.run(self.osc, self.structure, executor=self.request.executor, time_limit=limit)
+                found = analyzer.run(self.osc, self.structure, executor=self.executor, time_limit=limit)
         except VibrokitError as error:
             self._leave(name, subject, str(error))
             return True
         for label in labels:
             known, part = self.parts.get((name, label)), part_of(found, label)
             if part.complete:
-                self.parts[name, label] = part, self.request.accuracy
+                self.parts[name, label] = part, self.accuracy
             elif known is None or (math.isinf(known[1]) and _content(part) > _content(known[0])):
                 self.parts[name, label] = part, math.inf
         return True
 
     def _is_known(self, name: str, label: int) -> bool:
-        """Whether an analysis came to its end for the accuracy that is wanted."""
-        return (name, label) in self.parts and self.parts[name, label][1] <= self.request.accuracy
+        """Whether an analysis came to its end for the accuracy that is self."""
+        return (name, label) in self.parts and self.parts[name, label][1] <= self.accuracy
 
     def _leave(self, name: str, subject: str, reason: str) -> None:
         which = f"{name} of {subject}" if subject else name
@@ -244,10 +266,8 @@ class _Road:
     def _intensities(self, label: int) -> tuple[float, ...] | None:
         """Noise intensities for one state; without an energy None, for those that analyzers have by default."""
         assert self.osc.noise is not None
-        energy, own = self._energy(label), self.osc.noise.intensity
-        if math.isinf(energy) or not energy > 0:
-            return None
-        return ladder(energy, own)
+        energy = self._energy(label)
+        return ladder(energy, self.osc.noise.intensity) if 0 < energy < math.inf else None
 
     def _energy(self, label: int) -> float:
         """ΔU of the exit that decides how long a state lasts, by methods without rates; infinite if none is known.
@@ -268,18 +288,13 @@ class _Road:
             results[name] = merged([part for part, _ in own.values()])
             reached[name] = np.full(len(self.structure.names), np.inf)
             reached[name][list(own)] = [accuracy for _, accuracy in own.values()]
-        wanted = self.request
         return Assessment(
             scene=scene_data(self.osc),
-            settings={
-                "accuracy": wanted.accuracy,
-                "time_limit": wanted.time_limit,
-                "methods": list(wanted.analyzers),
-            },
+            settings={"accuracy": self.accuracy, "time_limit": self.time_limit, "methods": list(self.analyzers)},
             findings=tuple(self.left),
             stats=self.work.stats,
             complete=self.complete,
-            seed=wanted.rng,
+            seed=self.seed,
             seconds=self.work.seconds,
             structure=self.structure,
             results=results,

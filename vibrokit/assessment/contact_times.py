@@ -18,12 +18,8 @@ def contact_time(osc: Oscillator, index: int, speed: float) -> float:
     """Return the time from touch to release at one stop for an impact at some speed (m s⁻¹).
 
     The force is that at rate 0, which conserves energy. The largest depth d follows from ∫₀ᵈ F dδ = v²/2, and the time
-    is 2 ∫₀ᵈ dδ/√(v² − 2∫F). For kδ that is π/√k; for kδ^(3/2) it is 2.94 d/v.
-
-    Returns
-    -------
-    float
-        In s; NaN if the force does not turn the mass back.
+    is 2 ∫₀ᵈ dδ/√(v² − 2∫F). For kδ that is π/√k; for kδ^(3/2) it is 2.94 d/v. NaN if the force does not turn the mass
+    back.
     """
     force = contact_force_of(osc.model, index)
     length = speed / osc.natural_frequency

@@ -27,19 +27,9 @@ _SHOWN = (("years", _YEAR, 2.0), ("days", _DAY, 2.0), ("hours", _HOUR, 2.0), ("m
 
 
 def seconds_in(text: object, period: float | None = None) -> float:
-    """Return a duration in seconds.
+    """Return a duration in seconds: a number, or a number with a unit, such as ``"8 h"`` or ``"12 periods"``.
 
-    Parameters
-    ----------
-    text : str or float
-        A number of seconds, or a number with a unit: ``"8 h"``, ``"1yr"``, ``"30 min"``, ``"12 periods"``.
-    period : float, optional
-        Section interval (s), for numbers of periods.
-
-    Raises
-    ------
-    ParameterError
-        It is not a positive finite duration, the unit is unknown, or periods are given and there is no section.
+    `period` is the section interval (s). Raises ParameterError for what is no positive finite duration.
     """
     example = "give a number of seconds, or a number with a unit, such as '8 h' or '1 yr'"
     if isinstance(text, Real) and not isinstance(text, bool):

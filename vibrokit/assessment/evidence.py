@@ -24,16 +24,9 @@ _TRUST = (Bound.EXACT, Bound.CERTIFIED, Bound.UPPER, Bound.BRACKET, Bound.ESTIMA
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evidence:
-    """Energies and mean times of each exit by all methods; an end that is None stands for all exits of a state.
+    """Energies and mean times of each exit by all methods; an end that is None stands for all exits of a state."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the attractors, in the order of their labels.
-    results : dict of str to Result
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the attractors
     results: Mapping[str, Result]
 
     @property

@@ -29,17 +29,10 @@ Part = tuple[Result, float]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Known:
-    """What is known before an assessment.
-
-    Attributes
-    ----------
-    structures : tuple of Structure
-    results : tuple of (Result, float)
-        With the accuracy for which each came to its end; infinite if it did not.
-    """
+    """What is known before an assessment."""
 
     structures: tuple[Structure, ...]
-    results: tuple[tuple[Result, float], ...]
+    results: tuple[Part, ...]
 
     @classmethod
     def of(cls, given: Iterable[Any], accuracy: float) -> Known:
@@ -71,35 +64,29 @@ class Known:
             check_scene("the known structure", structure, scene_data(osc))
         for known, _ in self.results:
             check_scene(f"the known result of {known.made_by}", known, scene_data(osc))
-            _check_exit(known.made_by, known, exit)
+            counted = known.settings.get("exit")
+            if counted is not None and (changed := differences(exit_data(exit), counted, "exit")):
+                raise StructureError(
+                    f"the known result of {known.made_by} counts other exits than those that are asked for: {changed}. "
+                    "Ask for the same exit, or leave the result out."
+                )
 
-    def parts(self, osc: Oscillator, structure: Structure, exit: Exit) -> dict[tuple[str, int], Part]:  # noqa: A002
+    def parts(self, osc: Oscillator, structure: Structure) -> dict[tuple[str, int], Part]:
         """Return the results by analyzer and label, and the accuracy of each.
 
         A second result of the same analyzer and attractor is beside the first, with a number in its name. Raises
-        StructureError for results of another scene, of other states or of another exit.
+        StructureError for results of other states.
         """
         parts: dict[tuple[str, int], Part] = {}
         for known, accuracy in self.results:
             name = known.made_by
             check_comparable(f"the known result of {name}", known, scene_data(osc), Section.of(structure))
-            _check_exit(name, known, exit)
             for label in analyzed_labels(known):
                 part = part_of(known, label)
                 keys = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
                 key = next(one for one in keys if (one, label) not in parts or _same(parts[one, label][0], part))
                 parts.setdefault((key, label), (part, accuracy))
         return parts
-
-
-def _check_exit(name: str, known: Result, exit: Exit) -> None:  # noqa: A002 - the name that analyzers use
-    counted = known.settings.get("exit")
-    changed = "" if counted is None else differences(exit_data(exit), counted, "exit")
-    if changed:
-        raise StructureError(
-            f"the known result of {name} counts other exits than those that are asked for: {changed}. Ask for the same "
-            "exit, or leave the result out."
-        )
 
 
 def _same(one: Result, other: Result) -> bool:

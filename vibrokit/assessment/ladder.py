@@ -24,15 +24,7 @@ def barrier(energies: Sequence[float], intensity: float) -> float:
 
 
 def ladder(energy: float, intensity: float) -> tuple[float, ...]:
-    """Return the noise intensities for one state, descending (m² s⁻³).
-
-    Parameters
-    ----------
-    energy : float
-        ΔU of its cheapest exit.
-    intensity : float
-        D of the scene, which is one of them if its ΔU/D is between 0.25 and 25.
-    """
+    """Return the noise intensities for one state, descending (m² s⁻³); that of the scene is one if in their range."""
     ratios: tuple[float, ...] = _RATIOS
     own = energy / intensity
     if _SIMULATED[0] <= own <= _SIMULATED[1]:

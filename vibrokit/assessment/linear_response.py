@@ -27,29 +27,15 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """Free and forced motion of the linearized scene without stops.
+    """Free and forced motion of the linearized scene without stops: x″ + c x′ + κ x about its rest."""
 
-    Attributes
-    ----------
-    rest : float
-        Stable position of rest nearest to x = 0 under the constant forces (m).
-    stiffness, damping : float
-        κ (s⁻²) and c (s⁻¹) of x″ + c x′ + κ x there.
-    left, right : float
-        Largest forced displacements from the rest to the left and to the right (m), not negative.
-    speed : float
-        Largest speed of the forced motion (m s⁻¹).
-    noise : float
-        Standard deviation of the displacement by noise (m); NaN without noise or where it is not bounded.
-    """
-
-    rest: float
-    stiffness: float
-    damping: float
-    left: float
+    rest: float  # stable position of rest nearest to x = 0 under the constant forces (m)
+    stiffness: float  # κ (s⁻²)
+    damping: float  # c (s⁻¹)
+    left: float  # largest forced displacements from the rest (m), not negative
     right: float
-    speed: float
-    noise: float
+    speed: float  # largest of the forced motion (m s⁻¹)
+    noise: float  # standard deviation of x by noise (m); NaN without noise or where it is not bounded
 
 
 def linear_response(osc: Oscillator) -> LinearResponse | None:

@@ -47,12 +47,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser], sc
 
 def assess_scene(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    from vibrokit.analyzers.exits import LeaveBasin
     from vibrokit.analyzers.settings import named_exit
-    from vibrokit.assessment.assess import TIME_LIMIT, assessed
+    from vibrokit.assessment.assess import TIME_LIMIT, assess
     from vibrokit.assessment.durations import required_time, seconds_in
     from vibrokit.assessment.plausibility import plausibility
-    from vibrokit.assessment.request import Request
     from vibrokit.cli.interrupts import Interrupts
     from vibrokit.cli.run import source_of
     from vibrokit.progress import working
@@ -74,17 +72,17 @@ def assess_scene(options: argparse.Namespace) -> int:
     question = Question(options.mean_time, options.within)
     source = None if options.source is None else source_of(options.source)
     limit = TIME_LIMIT if options.time_limit is None else options.time_limit
-    request = Request.of(
-        osc, accuracy=options.accuracy, time_limit=limit or None, methods=options.method, source=source,
-        exit=LeaveBasin() if options.exit is None else named_exit(options.exit), rng=options.seed, executor=None,
-    )  # fmt: skip
     if not options.json:
         print(f"{plausibility(osc)}\n", flush=True)
     with Interrupts() as interrupts:
-        with working(True, request.time_limit) as work:
+        with working(True, limit or None) as work:
             interrupts.stops(work)
             try:
-                last = assessed(osc, request, work, options.known, options.output)
+                last = assess(
+                    osc, accuracy=options.accuracy, time_limit=limit or None, methods=options.method, source=source,
+                    exit=None if options.exit is None else named_exit(options.exit), rng=options.seed,
+                    known=options.known, checkpoint=options.output,
+                )  # fmt: skip
             finally:
                 interrupts.finishing()
         _print(options, last, question)

@@ -29,30 +29,15 @@ _DASHED = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "zorder":
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Branch:
-    """What is drawn of one branch, at each value; NaN where it is not known.
+    """What is drawn of one branch, at each value; NaN where it is not known."""
 
-    Attributes
-    ----------
-    number : int
-        Chooses the colour.
-    name : str
-    low, high : array (values,)
-        Least and largest displacement (m).
-    push : array (values,)
-        Largest force of a stop (m s⁻²).
-    energy : array (values,)
-        Activation energy (m² s⁻³).
-    log_time : array (values,)
-        ln of the mean exit time in s.
-    """
-
-    number: int
+    number: int  # chooses the colour
     name: str
-    low: ArrayLike
+    low: ArrayLike  # displacement (m)
     high: ArrayLike
-    push: ArrayLike
-    energy: ArrayLike
-    log_time: ArrayLike
+    push: ArrayLike  # of the stops (m s⁻²)
+    energy: ArrayLike  # m² s⁻³
+    log_time: ArrayLike  # ln of s
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

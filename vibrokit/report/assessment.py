@@ -23,18 +23,10 @@ from vibrokit.results.labels import goal_name
 
 @dataclasses.dataclass(frozen=True)
 class Question:
-    """What a user asks beside how long each state lasts at the scene's noise.
+    """What a user asks beside how long each state lasts at the scene's noise."""
 
-    Attributes
-    ----------
-    mean_time : str or None
-        A mean time that each state has to last, such as ``"1 yr"``.
-    within : str or None
-        A time within which a state may be left.
-    """
-
-    mean_time: str | None = None
-    within: str | None = None
+    mean_time: str | None = None  # that each state has to last, such as ``"1 yr"``
+    within: str | None = None  # a time within which a state may be left
 
 
 def assessment_text(title: str, one: Assessment, question: Question = Question()) -> str:

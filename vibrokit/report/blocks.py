@@ -12,27 +12,15 @@ from vibrokit.text_table import text_table
 
 @dataclasses.dataclass(frozen=True)
 class Table:
-    """Rows of text under headings.
-
-    Attributes
-    ----------
-    name : str
-        What the file of the table is called.
-    title : str
-    header : tuple of str
-    rows : tuple of tuple of str
-        Each as long as the header.
-    detail : bool
-        Whether it is left out of a brief text.
-    """
+    """Rows of text under headings."""
 
     kind: ClassVar[str] = "table"
 
-    name: str
+    name: str  # of its file
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    detail: bool = False
+    detail: bool = False  # whether it is left out of a brief text
 
     @property
     def lines(self) -> list[str]:

@@ -35,7 +35,6 @@ def verdicts(records: Records) -> list[Verdict]:
 
 def _verdict(one: Published, known: dict[str, Record]) -> Verdict | None:
     least, ring, _, times = (known.get(f"{name}-{one.state}") for name in METHODS)
-    density = of_both(known, "density")
     if not isinstance(least, Result):
         return None
     source, target = STATES[one.state], target_of(one.state)
@@ -43,7 +42,7 @@ def _verdict(one: Published, known: dict[str, Record]) -> Verdict | None:
     match one.method:
         case Method.ACTION_PLOT if isinstance(ring, Result):
             return of_action_plot(one, energy.lower, energy.upper, _value(ring, source, target))
-        case Method.DENSITY if isinstance(density, SGCMResult):
+        case Method.DENSITY if isinstance(density := of_both(known, "density"), SGCMResult):
             intensity = paper()["density"]["intensity"]
             value = float(StationaryDensity.of(density).barrier(energy.source).sel(intensity=intensity))
             error = intensity * max(rate.log_error for rate in density.rates)  # ln p is the sum of both states' parts

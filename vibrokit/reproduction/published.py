@@ -27,24 +27,13 @@ class Method(StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Published:
-    """One published activation energy.
-
-    Attributes
-    ----------
-    scene : str
-        Name of the bundled scene.
-    state : str
-        Key of `STATES`.
-    method : Method
-    value, half_digit : float
-        The number, and half a unit of its last printed digit (m² s⁻³).
-    """
+    """One published activation energy."""
 
     scene: str
-    state: str
+    state: str  # key of `STATES`
     method: Method
-    value: float
-    half_digit: float
+    value: float  # m² s⁻³
+    half_digit: float  # half a unit of its last printed digit
 
 
 @cache

@@ -25,23 +25,12 @@ _FEW_CELLS = (128, 128)
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """One piece of work: the structure of a scene, or an analyzer on it.
-
-    Attributes
-    ----------
-    scene : str
-    name : str
-        Of the piece, unique in its scene.
-    analyzer : Analyzer or None
-        None for the structure.
-    cells : (int, int), optional
-        Of the basins of a structure; by default those of `vibrokit.find_structure`.
-    """
+    """One piece of work: the structure of a scene, or an analyzer on it."""
 
     scene: str
-    name: str
-    analyzer: Analyzer | None = None
-    cells: tuple[int, int] | None = None
+    name: str  # unique in its scene
+    analyzer: Analyzer | None = None  # None for the structure
+    cells: tuple[int, int] | None = None  # of the basins of a structure
 
     @property
     def file(self) -> str:

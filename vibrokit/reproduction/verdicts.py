@@ -36,45 +36,23 @@ class Match(Sentenced):
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """A published number beside our own.
-
-    Attributes
-    ----------
-    published : Published
-    value, lower, upper : float
-        Our number by the same method, and its interval (m² s⁻³).
-    certified : float
-        The activation energy with the strongest bounds.
-    beside : float
-        What explains the difference, see `Match`; NaN if nothing does.
-    match : Match
-    depth : float
-        ΔU/D at the noise of the published number; NaN where it does not matter.
-    missing : str
-        Why there is no number of our own; empty if there is one.
-    """
+    """A published number beside our own (m² s⁻³)."""
 
     published: Published
-    value: float
+    value: float  # our number by the same method, and its interval
     lower: float
     upper: float
-    certified: float
+    certified: float  # activation energy with the strongest bounds
     match: Match
-    beside: float = math.nan
-    depth: float = math.nan
-    missing: str = ""
+    beside: float = math.nan  # what explains the difference, see `Match`
+    depth: float = math.nan  # ΔU/D at the noise of the published number, where it matters
+    missing: str = ""  # why there is no number of our own
 
     @property
     def sentence(self) -> str:
         """Why the number is met or not."""
-        below = 1 - self.certified / self.published.value
         return self.match.sentence.format(
-            below=below,
-            beside=self.beside,
-            depth=self.depth,
-            samples=_SAMPLES,
-            certified=self.certified,
-            missing=self.missing,
+            below=1 - self.certified / self.published.value, samples=_SAMPLES, **vars(self)
         )
 
 

@@ -7,9 +7,8 @@ import math
 import time
 from collections.abc import Sequence
 
-from vibrokit.assessment.assess import assess
+from vibrokit.assessment.assess import METHODS, assess
 from vibrokit.assessment.assessment import Assessment
-from vibrokit.assessment.request import METHODS
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
