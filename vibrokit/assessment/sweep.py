@@ -232,6 +232,8 @@ class _Run:
     def _simulated(self, paths: EnergyContinuation, place: int) -> Iterator[tuple[str, RatedResult]]:
         """Yield the exits from each branch whose energy is known at a value, at a noise that is strong enough."""
         assert self.search is not None
+        if place not in self.search.structures:  # the scene is refused there
+            return
         structure, names = self.search.structures[place]
         left = {branch.source for branch in paths.branches}
         for label, name in enumerate(names):
