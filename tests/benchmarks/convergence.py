@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import vibrokit as vk
-from vibrokit.kernels.ensemble import Stop, run_ensemble
+from vibrokit.kernels.ensemble import Stop, advance_block, run_ensemble
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stopping import STALLED
 from vibrokit.symbolic.flow_kind import Flow
@@ -58,29 +58,14 @@ def steps_taken(osc, stepper, states):
     if isinstance(stepper, vk.RK4):
         return stepper.steps
     interval = osc.section_interval
-    kernel, theta, stop = kernel_for(osc, Flow.STATE, stepper), theta_of(osc), Stop()
+    kernel, theta = kernel_for(osc, Flow.STATE, stepper), theta_of(osc)
     settings = np.array(stepper.settings(osc, interval))
-    tests = (
-        np.zeros(1, dtype=np.int64),
-        1,
-        1,
-        stop.region,
-        False,
-        stop.area,
-        stop.labels,
-        stop.home,
-        stop.points,
-        stop.point_labels,
-        stop.metrics,
-    )
+    none, one = np.empty((1, 0), dtype=np.uint64), np.ones(1, dtype=np.int64)
 
     def stalls(state, limit):
         settings[1] = limit
-        out = np.empty((1, 2)), *(np.zeros(1, dtype=np.int64) for _ in range(3))
-        budget, none = np.ones(1, dtype=np.int64), np.empty((1, 0, 2))
-        noise = np.empty((1, 0), dtype=np.uint64), np.empty((0, 2))
-        kernel.advance(state[None], theta, 0.0, interval, settings, *noise, budget, *tests, *out, none)
-        return out[2][0] == STALLED
+        ended = advance_block(kernel, state[None], one, (theta, 0.0, interval, settings), none, 0 * one, Stop(), 0, 1)
+        return ended.status[0] == STALLED
 
     counts = []
     for state in states:

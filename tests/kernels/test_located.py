@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from vibrokit.kernels.ensemble import Stop, advance_block
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
 from vibrokit.symbolic.flow_kind import Flow
@@ -71,18 +72,12 @@ def outputs(
 ):  # fmt: skip
     states = np.atleast_2d(np.asarray(states, dtype=float))
     count = len(states)
-    out, done, status, label = np.empty_like(states), *(np.zeros(count, dtype=np.int64) for _ in range(3))
-    labels = EVERYWHERE, np.zeros((0, 0), dtype=np.int8), -1
-    points = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2))
-    kept = np.zeros((count, visits, 5))
-    kernel.advance(
-        states, theta() if values is None else values, 0.0, interval,
-        np.array([tolerance, limit, cycle, 1.0, span, np.inf]),
-        np.zeros((count, 0), dtype=np.uint64), np.zeros((0, 2)),
-        np.full(count, intervals), np.zeros(count, dtype=np.int64), 1, 1, region, False, *labels, *points, 0.0,
-        out, done, status, label, kept,
+    settings = np.array([tolerance, limit, cycle, 1.0, span, np.inf])
+    ended = advance_block(
+        kernel, states, np.full(count, intervals), (theta() if values is None else values, 0.0, interval, settings),
+        np.empty((count, 0), dtype=np.uint64), np.zeros(count, dtype=np.int64), Stop(region=region), visits, 1,
     )  # fmt: skip
-    return out, done, status, kept
+    return ended.states, ended.intervals, ended.status, ended.visits
 
 
 def starts(count, momentum=1e-6):

@@ -42,22 +42,17 @@ class TestBarrier:
         assert pickle.loads(pickle.dumps(barrier)) == barrier
         assert barrier.replace(side="left").side == "left"
 
-    @pytest.mark.parametrize("law", [vk.Hertz, 50.0, None, "hertz", vk.WhiteNoise(0.1), [vk.Hertz(1.0)]])
-    def test_law(self, law):
-        with pytest.raises(SceneError, match=r"^Barrier: law must be a ContactLaw.*, got .*\.$"):
-            vk.Barrier(law, 0.5, "right")
-
-    @pytest.mark.parametrize("side", ["Right", "up", "", 1, None, ["right"]])
-    def test_side(self, side):
-        with pytest.raises(ParameterError, match=r"^Barrier: side must be 'right' or 'left', got .*\.$"):
-            vk.Barrier(vk.Hertz(1.0), 0.5, side)
-
-    @pytest.mark.parametrize("position", [math.nan, math.inf, "0.5", None, [0.5], True])
-    def test_position(self, position):
-        with pytest.raises(ParameterError, match=r"^Barrier: position must be a finite number, got .*\.$"):
-            vk.Barrier(vk.Hertz(1.0), position, "right")
-
-    @pytest.mark.parametrize("adhesive", [1, 0.0, "no", None])
-    def test_adhesive(self, adhesive):
-        with pytest.raises(ParameterError, match=r"^Barrier: adhesive must be True or False, got .*\.$"):
-            vk.Barrier(vk.Hertz(1.0), 0.5, "right", adhesive=adhesive)
+    @pytest.mark.parametrize(
+        ("name", "wrong", "allowed"),
+        [
+            ("law", [vk.Hertz, 50.0, None, "hertz", vk.WhiteNoise(0.1), [vk.Hertz(1.0)]], "a ContactLaw.*"),
+            ("side", ["Right", "up", "", 1, None, ["right"]], "'right' or 'left'"),
+            ("position", [math.nan, math.inf, "0.5", None, [0.5], True], "a finite number"),
+            ("adhesive", [1, 0.0, "no", None], "True or False"),
+        ],
+    )
+    def test_wrong_fields_are_refused(self, name, wrong, allowed):
+        given = {"law": vk.Hertz(1.0), "position": 0.5, "side": "right"}
+        for value in wrong:
+            with pytest.raises((SceneError, ParameterError), match=rf"^Barrier: {name} must be {allowed}, got .*\.$"):
+                vk.Barrier(**given | {name: value})

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.choice import warn_of_coarse_steps
 from vibrokit.kernels.kernel import Kernel, kernel_for, theta_of
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.stopping import DIVERGED, STALLED
+from vibrokit.kernels.stopping import DIVERGED, STALLED, StopTest
 from vibrokit.kernels.tasks import carry, processors
 from vibrokit.parts.scene import Scene
 from vibrokit.progress import TRAJECTORIES, advance, count
@@ -223,15 +223,15 @@ def advance_block(
     ended = Ensemble(
         np.empty((count, equations)), intervals, status, label, np.zeros((count, visits, equations)), streams
     )
-    bounds = stop.region, stop.area, stop.points, stop.metrics
-    region, area, points, metrics = (_plain(array, float) for array in bounds)
-    labels, point_labels = _plain(stop.labels, np.int16), _plain(stop.point_labels, np.int64)
-    budget, phases = _plain(budget, np.int64), _plain(phases, np.int64)
+    test = StopTest(
+        stop.every, _plain(stop.region, float), stop.between, _plain(stop.area, float), _plain(stop.labels, np.int16),
+        stop.home, _plain(stop.points, float), _plain(stop.point_labels, np.int64), _plain(stop.metrics, float),
+        float(stop.turn),
+    )  # fmt: skip
     given = np.empty((0, 2)) if normals is None else _plain(normals, float)
     kernel.advance(
-        _plain(starts, float), *common, streams, given, budget, phases,
-        stop.every, keep, region, stop.between, area, labels, stop.home, points, point_labels, metrics,
-        float(stop.turn), ended.states, ended.intervals, ended.status, ended.label, ended.visits,
+        _plain(starts, float), *common, streams, given, _plain(budget, np.int64), _plain(phases, np.int64), keep, test,
+        (ended.states, ended.intervals, ended.status, ended.label, ended.visits),
     )  # fmt: skip
     if kernel.module.BORDERED:  # next to a pole time does not go on: the motion ends there
         status[status == STALLED] = DIVERGED

@@ -90,7 +90,7 @@ class Kernel:
         while True:
             with first_call(function):
                 began = time.perf_counter()
-                used = function(states, given, *rest, *memory, most)
+                used = function(states, given, *rest, memory, most)
             current().check()
             if place[0] == len(states) and place[1] == 0:
                 return

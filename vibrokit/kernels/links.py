@@ -34,14 +34,12 @@ LINKS = len(_SIGNATURES)
 
 def callbacks(functions: dict[str, Any]) -> tuple[Any, ...]:
     """Compile those of the functions of a scene that a driver may call; None for each that the scene lacks."""
-    return tuple(
-        cfunc(signature, **(CONTRACTED if name in _OF_LANES else OPTIONS))(
-            getattr(functions[name], "py_func", functions[name])
-        )
-        if name in functions
-        else None
-        for name, signature in _SIGNATURES.items()
-    )
+    links = []
+    for name, signature in _SIGNATURES.items():
+        function, options = functions.get(name), CONTRACTED if name in _OF_LANES else OPTIONS
+        plain = getattr(function, "py_func", function)  # Python calls some of them too
+        links.append(None if plain is None else cfunc(signature, **options)(plain))
+    return tuple(links)
 
 
 def linked(theta: NDArray[np.float64], links: tuple[Any, ...], facts: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from numba import version_info
 
-TESTED = ((0, 61), (0, 69))
+TESTED = ((0, 62), (0, 69))
 """The oldest version of Numba with which `deferred` was tested, and the first with which it was not."""
 
 _WHOLE: dict[str, Any] = {}

@@ -61,33 +61,15 @@ def advance(
     given,  # (steps, 2): normals that replace those which a single trajectory draws; or (0, 2)
     budget,
     phases,
-    every,
     keep,
-    region,
-    between,
-    area,
-    labels,
-    home,
-    points,
-    point_labels,
-    metrics,
-    turn,
-    out_states,
-    out_intervals,
-    out_status,
-    out_label,
-    visits,
-    z,
-    before,
-    tabulated,
-    stream,
-    drawn,
-    holder,  # (lanes,): the trajectory in each lane, −1 for none
-    done,  # (lanes,): intervals that it has passed
-    outside,  # (lanes,): whether it has been outside in the interval under way
-    place,
+    test,
+    ended,  # (states, intervals, status, label, visits): written here
+    memory,  # of `memory_of`
     most,  # steps before it returns
 ):
+    out_states, out_intervals, out_status, out_label, visits = ended
+    # Trajectory in each lane (−1: none), intervals that it has passed, and whether it was outside in the present one.
+    z, before, tabulated, stream, drawn, holder, done, outside, place = memory
     count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
     forced, noisy, steps = parameters[FORCED] > 0.0, streams.shape[1] > 0, int(settings[0])
     # Intervals after which the forcing repeats; 0 if it never does.
@@ -140,21 +122,21 @@ def advance(
         forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
         end = min(step + MOST_STEPS, steps)
         used += end - step
-        at_once = 1 if noisy or between else end - step
+        at_once = 1 if noisy or test.between else end - step
         for now in range(step, end, at_once):
             if noisy:
                 draw_lanes(stream, drawn, lanes)
                 if given.shape[0] > 0:
                     drawn[0] = given[done[0] * steps + now, 0]
                     drawn[lanes] = given[done[0] * steps + now, 1]
-            if between:
+            if test.between:
                 for lane in range(lanes):
                     begun[0, lane], begun[1, lane] = z[0, lane], z[1, lane]
             step_lanes(block, forces, normals, theta, h, at_once)
-            if between:
+            if test.between:
                 for lane in range(lanes):
                     x, v = z[0, lane], z[1, lane]
-                    outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, region)
+                    outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, test.region)
             forces = offset_by(forces, nodes)
         step = end if end < steps else 0
         if step > 0:
@@ -173,15 +155,13 @@ def advance(
             else:
                 done[lane] += 1
                 passed = phases[index] + done[lane]
-                at_section = passed % every == 0
+                at_section = passed % test.every == 0
                 if visits.shape[1] > 0 and passed % keep == 0:
                     visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
                     for e in range(equations):
                         visits[index, visit, e] = z[e, lane]
                 x, v = z[0, lane], z[1, lane]
-                status, label = stop_status(
-                    x, v, at_section, region, area, labels, home, points, point_labels, metrics, turn
-                )
+                status, label = stop_status(x, v, at_section, test)
                 if status == COMPLETED and outside[lane]:
                     status = LEFT_REGION
                 if status == COMPLETED and done[lane] < budget[index]:
