@@ -68,6 +68,7 @@ def advance(
     most,  # steps before it returns
 ):
     out_states, out_intervals, out_status, out_label, visits = ended
+    every, region, between, area, labels, home, points, point_labels, metrics, turn = test
     # Trajectory in each lane (−1: none), intervals that it has passed, and whether it was outside in the present one.
     z, before, tabulated, stream, drawn, holder, done, outside, place = memory
     count, equations, lanes, nodes = states.shape[0], states.shape[1], int(parameters[LANES]), int(parameters[NODES])
@@ -122,21 +123,21 @@ def advance(
         forces = offset_by(table, ((elapsed % cycle if cycle > 0 else 0) * steps + step) * nodes)
         end = min(step + MOST_STEPS, steps)
         used += end - step
-        at_once = 1 if noisy or test.between else end - step
+        at_once = 1 if noisy or between else end - step
         for now in range(step, end, at_once):
             if noisy:
                 draw_lanes(stream, drawn, lanes)
                 if given.shape[0] > 0:
                     drawn[0] = given[done[0] * steps + now, 0]
                     drawn[lanes] = given[done[0] * steps + now, 1]
-            if test.between:
+            if between:
                 for lane in range(lanes):
                     begun[0, lane], begun[1, lane] = z[0, lane], z[1, lane]
             step_lanes(block, forces, normals, theta, h, at_once)
-            if test.between:
+            if between:
                 for lane in range(lanes):
                     x, v = z[0, lane], z[1, lane]
-                    outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, test.region)
+                    outside[lane] |= left_in_step(begun[0, lane], begun[1, lane], x, v, h, region)
             forces = offset_by(forces, nodes)
         step = end if end < steps else 0
         if step > 0:
@@ -155,13 +156,15 @@ def advance(
             else:
                 done[lane] += 1
                 passed = phases[index] + done[lane]
-                at_section = passed % test.every == 0
+                at_section = passed % every == 0
                 if visits.shape[1] > 0 and passed % keep == 0:
                     visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
                     for e in range(equations):
                         visits[index, visit, e] = z[e, lane]
                 x, v = z[0, lane], z[1, lane]
-                status, label = stop_status(x, v, at_section, test)
+                status, label = stop_status(
+                    x, v, at_section, region, area, labels, home, points, point_labels, metrics, turn
+                )
                 if status == COMPLETED and outside[lane]:
                     status = LEFT_REGION
                 if status == COMPLETED and done[lane] < budget[index]:

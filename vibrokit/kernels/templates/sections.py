@@ -84,6 +84,7 @@ def advance(
     most,  # attempts and intervals before it returns
 ):
     out_states, out_intervals, out_status, out_label, visits = outputs
+    every, region, between, area, labels, home, points, point_labels, metrics, turn = test
     # Trajectory in each lane (−1 for none), intervals that it has passed, and how one ended that is not concluded yet.
     numbers, switches, holder, done, ended, place = memory
     facts, theta = offset_by(pointer_to(parameters), 1), offset_by(pointer_to(parameters), int(parameters[0]))
@@ -116,15 +117,17 @@ def advance(
                             out_states[index, e] = of(STATE, e, lane, lanes)
                         done[lane] += 1
                         passed = phases[index] + done[lane]
-                        at_section = passed % test.every == 0
+                        at_section = passed % every == 0
                         if visits.shape[1] > 0 and passed % keep == 0:
                             visit = (passed // keep - phases[index] // keep - 1) % visits.shape[1]
                             for e in range(equations):
                                 visits[index, visit, e] = out_states[index, e]
                         here = out_states[index, 0], out_states[index, 1]
-                        status, label = stop_status(here[0], here[1], at_section, test)
-                        if test.between and status == COMPLETED:
-                            if turned_outside(x, v, here[0], here[1], interval, test.region):
+                        status, label = stop_status(
+                            *here, at_section, region, area, labels, home, points, point_labels, metrics, turn
+                        )
+                        if between and status == COMPLETED:
+                            if turned_outside(x, v, here[0], here[1], interval, region):
                                 status = LEFT_REGION
                     if status != COMPLETED or done[lane] >= budget[index]:
                         out_intervals[index], out_status[index], out_label[index] = done[lane], status, label
