@@ -61,17 +61,27 @@ def test_where_it_holds(osc, ratio):
     assert balance is None if ratio is None else float(balance) == pytest.approx(ratio, rel=1e-15)
 
 
-def test_two_wells():
-    _, found = least(scene(WELLS))
-    assert found == {1: pytest.approx(4 * ZETA / 4, rel=1e-9)}
+LEFT, TOP, RIGHT = (x**4 / 4 - x**2 / 2 - 0.1 * x for x in np.sort(np.roots([1.0, 0.0, -1.0, -0.1]).real))
+TILTED = scene(WELLS, excitations=(vk.Constant(0.1),))
+STOPS = (vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.8, "left"))
+CLOSED = {
+    "two wells": (scene(WELLS), 0, None, {1: 1 / 4}),
+    "tilted, from the left": (TILTED, 0, None, {1: TOP - LEFT}),
+    "tilted, from the right": (TILTED, 1, None, {0: TOP - RIGHT}),
+    "escape on one side": (scene(vk.CustomSpring("x - x**2")), 0, None, {ESCAPED: 1 / 6}),
+    "first contact": (scene(barriers=STOPS), 0, vk.FirstContact(), {-1: 0.5**3}),
+    "a well behind another": (  # the highest barrier on the way
+        scene(vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")), 0, None, {1: 0.5625, 2: 0.5625},
+    ),
+    "forced": (scene(WELLS, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 0.8),)), 0, None, {}),
+    "nonlinear damping": (scene(vk.CustomSpring("x**3 - x + c*x**2*v", c=0.3)), 0, None, {}),
+}  # fmt: skip
 
 
-def test_a_tilted_well_and_its_neighbour():
-    osc = scene(WELLS, excitations=(vk.Constant(0.1),))
-    places = np.sort(np.roots([1.0, 0.0, -1.0, -0.1]).real)  # x³ − x = 0.1
-    left, saddle, right = places**4 / 4 - places**2 / 2 - 0.1 * places
-    assert least(osc, 0)[1] == {1: pytest.approx(4 * ZETA * (saddle - left), rel=1e-9)}
-    assert least(osc, 1)[1] == {0: pytest.approx(4 * ZETA * (saddle - right), rel=1e-9)}
+@pytest.mark.parametrize(("osc", "source", "exit_", "climbs"), CLOSED.values(), ids=CLOSED)
+def test_closed_forms(osc, source, exit_, climbs):
+    _, found = least(osc, source, exit_)
+    assert found == {target: pytest.approx(4 * ZETA * climb, rel=1e-9) for target, climb in climbs.items()}
 
 
 @pytest.mark.parametrize("stiffness", [20.0, 1e6, pytest.param(1e12, marks=pytest.mark.slow)])
@@ -85,28 +95,6 @@ def test_wells_that_end_in_stiff_stops(stiffness):
     x = 0.9 + depth
     well = x**4 / 4 - x**2 / 2 + 0.4 * stiffness * depth**2.5
     assert found == {1: pytest.approx(-4 * ZETA * well, rel=1e-8)}
-
-
-def test_escape_on_one_side():
-    _, found = least(scene(vk.CustomSpring("x - x**2")))
-    assert found == {ESCAPED: pytest.approx(4 * ZETA / 6, rel=1e-9)}
-
-
-def test_first_contact():
-    osc = scene(barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.8, "left")))
-    _, found = least(osc, exit_=vk.FirstContact())
-    assert list(found.values()) == [pytest.approx(4 * ZETA * 0.5 * 0.5**2, rel=1e-9)]
-
-
-def test_a_well_behind_another_costs_at_least_the_highest_barrier():
-    structure, found = least(scene(vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")))
-    names = {structure.names[label]: value for label, value in found.items()}
-    assert names == {"middle-rest": pytest.approx(0.1125, rel=1e-9), "right-rest": pytest.approx(0.1125, rel=1e-9)}
-
-
-def test_none_without_it():
-    assert least(scene(WELLS, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 0.8),)))[1] == {}
-    assert least(scene(vk.CustomSpring("x**3 - x + c*x**2*v", c=0.3)))[1] == {}
 
 
 def test_least_action_needs_no_other_search():

@@ -281,21 +281,6 @@ def test_a_candidate_with_momenta_follows_hamilton_s_equations_between_its_sampl
 # --- paths that start on the orbit itself and take a finite time
 
 
-@pytest.fixture(scope="module")
-def parts(problem):
-    """The propagator, the well, and the candidate cut at the saddle."""
-    propagator = SegmentPropagator(problem.scene, single_stepper(problem.scene, Flow.HAMILTONIAN_VARIATIONAL))
-    (end,) = problem.path_ends
-    cuts = ending_at(end, problem, propagator).cuts(resampled(propagator, guess(straight())))
-    return propagator, linearized_orbit(propagator, problem.attractor.points[:1], 1, 0.0), cuts
-
-
-@pytest.fixture(scope="module")
-def from_orbit(parts):
-    propagator, source, cuts = parts
-    return propagator, PathSolver(propagator, source.with_start_on_orbit()).solve(cuts)
-
-
 def test_a_failure_keeps_its_misfit_between_processes():
     failure = NotConverged(0.25, 1e-9)
     copied = pickle.loads(pickle.dumps(failure))
@@ -303,23 +288,19 @@ def test_a_failure_keeps_its_misfit_between_processes():
     assert str(copied) == str(failure)
 
 
-def test_less_time_costs_more(from_orbit):
-    propagator, found = from_orbit
-    exact = 4 * DAMPING * BARRIER
+def test_less_time_costs_more_and_the_certificate_says_so(problem):
+    propagator = SegmentPropagator(problem.scene, single_stepper(problem.scene, Flow.HAMILTONIAN_VARIATIONAL))
+    (end,) = problem.path_ends
+    cuts = ending_at(end, problem, propagator).cuts(resampled(propagator, guess(straight())))
+    well = linearized_orbit(propagator, problem.attractor.points[:1], 1, 0.0).with_start_on_orbit()
+    found, exact = PathSolver(propagator, well).solve(cuts), 4 * DAMPING * BARRIER
     assert found.points[0, :2] == pytest.approx([-1.0, 0.0], abs=1e-12)
     costs = [solved_again(propagator, found, added, 0).action for added in (-16, -8, 0, 16, 32)]
     assert np.all(np.diff(costs) < 0)
     assert exact < costs[-1] < (1 + 1e-4) * exact
-
-
-def test_its_certificate_has_the_cost_of_time(from_orbit):
-    proof = certify(*from_orbit)
+    proof = certify(propagator, found)
     assert proof.by_start > 0 > proof.by_length
     assert abs(proof.by_stepper) < 1e-9
-
-
-def test_no_path_is_made_shorter_than_it_is(from_orbit):
-    propagator, found = from_orbit
     with pytest.raises(StructureError, match="cannot be made"):
         solved_again(propagator, found, -len(found.points), 0)
 

@@ -22,24 +22,12 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CyclePotential:
-    """Ψ = ½ (n·δq)²/σ², where n is normal to the motion, so that a shift along the cycle costs nothing.
+    """Ψ = ½ (n·δq)²/σ², where n is normal to the motion, so that a shift along the cycle costs nothing."""
 
-    Attributes
-    ----------
-    nodes : array (count, 2)
-        States of the cycle at equal times.
-    normals : array (count, 2)
-        n at each of them, of length 1.
-    variances : array (count,)
-        σ², the stationary variance of n·δq per unit D there.
-    frequency : float
-        ω_n (s⁻¹), by which x is multiplied to have a distance in (x, v).
-    """
-
-    nodes: Array
-    normals: Array
-    variances: Array
-    frequency: float
+    nodes: Array  # (count, 2): states of the cycle at equal times
+    normals: Array  # (count, 2): n at each of them, of length 1
+    variances: Array  # (count,): σ², the stationary variance of n·δq per unit D there
+    frequency: float  # ω_n (s⁻¹), by which x is multiplied to have a distance in (x, v)
 
     def at(self, states: Array) -> Array:
         """Return Ψ at states (…, 2), from the nearest node."""

@@ -24,21 +24,9 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LocalPotential:
-    """Ψ = ½ δqᵀ Σ⁻¹ δq on the section, near a point of a stable orbit.
+    """Ψ = ½ δqᵀ Σ⁻¹ δq on the section, near a point of a stable orbit."""
 
-    Attributes
-    ----------
-    monodromy : array (n, n)
-        M, derivative of the map over one period of the orbit.
-    gathered : array (n, n)
-        C, covariance per unit D that noise adds in that time.
-    covariance : array (n, n)
-        Σ, the stationary covariance per unit D: Σ = M Σ Mᵀ + C.
-    """
-
-    monodromy: Array
-    gathered: Array
-    covariance: Array
+    covariance: Array  # (n, n): Σ, the stationary covariance per unit D
 
     @property
     def stiffness(self) -> Array:
@@ -66,7 +54,7 @@ def local_potential(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> LocalPot
         The orbit is not stable, so that it has no stationary covariance; or noise does not make it spread.
     """
     found = gaussian_map(osc, orbit.point[None], stepper, intervals=orbit.period)
-    return _stationary(orbit, found.derivatives[0], found.covariances[0])
+    return LocalPotential(_stationary(orbit, found.derivatives[0], found.covariances[0]))
 
 
 def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper, pieces: int = _PIECES) -> tuple[Phase, ...]:
@@ -76,7 +64,7 @@ def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper, pieces: int
     StructureError if the orbit is not stable.
     """
     nodes, linear = gaussian_pieces(osc, orbit.point, stepper, pieces, pieces * orbit.period)
-    covariance = _stationary(orbit, *linear.composed()).covariance
+    covariance = _stationary(orbit, *linear.composed())
     interval, phases = osc.section_interval / pieces, list[Phase]()
     before = np.roll(linear.derivatives, 1, axis=0)
     for number, (step, added) in enumerate(zip(linear.derivatives, linear.covariances, strict=True)):
@@ -85,7 +73,8 @@ def potential_along(osc: Oscillator, orbit: Orbit, stepper: Stepper, pieces: int
     return tuple(phases)
 
 
-def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotential:
+def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> Array:
+    """Σ = M Σ Mᵀ + C at a point of an orbit, from the map over its period."""
     if not (np.isfinite(monodromy).all() and np.isfinite(gathered).all()):
         raise StructureError(
             f"the motion along the orbit at {tuple(orbit.point.tolist())} cannot be linearized; it may rest exactly "
@@ -104,7 +93,7 @@ def _stationary(orbit: Orbit, monodromy: Array, gathered: Array) -> LocalPotenti
             f"the noise is 0 along the orbit at {tuple(orbit.point.tolist())}, or nearly so: it does not spread the "
             "motion around the orbit in all directions, so that leaving it has no activation energy."
         )
-    return LocalPotential(monodromy, gathered, covariance)
+    return covariance
 
 
 def stationary_covariance(slope: Array, added: Array) -> Array:

@@ -44,7 +44,7 @@ class CandidatePolisher:
         self._unsolved: dict[Candidate, Effort] = {}  # the effort with which each led nowhere
         self._failed: defaultdict[PathEnd, list[Candidate]] = defaultdict(list)  # with all effort
 
-    def polish(self, candidate: Candidate, effort: Effort = Effort.FROM_ORBIT) -> None:
+    def polish(self, candidate: Candidate, effort: Effort) -> None:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
 
         Without momenta it is at least brought to descend. A candidate of a grid may pass an orbit on its way to an end.
@@ -94,12 +94,12 @@ class CandidatePolisher:
     def polish_the_rest(self, effort: Effort) -> None:
         """Polish what led nowhere with less effort.
 
-        A shot costs more than the path near it, a candidate of a grid may cost less: of these, only those that cost
-        less than a known path.
+        Only those that cost less than a known path are; a shot may cost more, as it does than the path near it, but
+        with all effort it may not either.
         """
         for candidate in sorted(self._unsolved, key=lambda each: each.action):
-            shot = candidate.momenta is not None
-            if self._unsolved[candidate] < effort and (shot or candidate.action < self._known(candidate)):
+            dearer = candidate.momenta is not None and effort < Effort.FROM_ORBIT
+            if self._unsolved[candidate] < effort and (dearer or candidate.action < self._known(candidate)):
                 self.polish(candidate, effort)
 
     def reach(self, end: PathEnd, effort: Effort) -> None:

@@ -84,9 +84,9 @@ class Ending(ABC):
     def derivatives(self, point: Array, time: float, scale: Array) -> tuple[Array, Array]:
         """Return the derivatives of the misfits in the last point over `scale`, and in the time if that is free."""
 
-    @abstractmethod
     def carried_by(self, propagator: SegmentPropagator) -> Self:
         """Return the same ending, prepared with another propagator."""
+        return dataclasses.replace(self, propagator=propagator)
 
     def through(self, point: Array) -> Self:
         """Return the ending at an orbit so shifted in time, if it may be, that it is nearest to a last point (2n,)."""

@@ -76,9 +76,6 @@ class FaceEnding(Ending):
             in_time = np.vstack([in_time, [[change / (2 * short) / self._energy(scale)]]])
         return in_point, in_time
 
-    def carried_by(self, propagator: SegmentPropagator) -> Self:
-        return dataclasses.replace(self, propagator=propagator)
-
     def moved_to(self, end: PathEnd) -> Self:
         assert isinstance(end, AtFace)
         return dataclasses.replace(self, face=end)

@@ -10,13 +10,14 @@ from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.same_action import POLISHED, same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.completion import completed
 from vibrokit.analyzers.polishing.ends import Nodes
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import extremal_path
+from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
@@ -47,12 +48,11 @@ class FollowedPath:
         ends = [
             end for end in problem.path_ends if end.saddle == energy.saddle and energy.target in end.targets
         ]  # fmt: skip
-        polisher = CandidatePolisher(Nodes(problem), ends)
-        polisher.polish(Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method))
-        if not polisher.solved:
-            raise StructureError(str(polisher.findings[0].values["reason"]))
-        (leg,) = polisher.solved[0].legs  # a single end is polished to, so that there is none to pass before
-        return cls(problem, problem.path_ends.index(leg.end), leg.propagator, leg.found)
+        nodes = Nodes(problem)
+        guess = Candidate(energy.source, energy.target, path.t, path.q, energy.value, energy.method)
+        end = min(ends, key=lambda each: nodes.distance(each, guess))
+        leg = LegSolver(nodes, Departure.from_attractor(attractor)).solve(end, guess, Effort.FROM_ORBIT)
+        return cls(problem, problem.path_ends.index(end), leg.propagator, leg.found)
 
     @property
     def end(self) -> PathEnd:

@@ -21,7 +21,7 @@ from vibrokit.analyzers.polishing.linear_spaces import (
     scale_of,
 )
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
+from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, adjoint_weights
 from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map
 from vibrokit.structure.orbits import multipliers_of, refine_orbit, states_along
@@ -98,7 +98,7 @@ class LinearizedAtNodes(LinearizedOrbit):
 
     def displacement(self, phase: int, momentum: Array) -> OrbitDisplacement:
         phases = (phase + np.arange(len(self.states))) % len(self.states)
-        weights = pulls(self.linear.derivatives[phases], momentum)
+        weights = adjoint_weights(self.linear.derivatives[phases], momentum)
         return OrbitDisplacement(self.states[phases], np.roll(self.states, -1, axis=0)[phases], weights, phases, None)
 
 

@@ -19,7 +19,7 @@ from vibrokit.analyzers.polishing.linear_spaces import (
     scale_of,
 )
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, pulls
+from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, adjoint_weights
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.structure.autonomous import Cycle, refine_cycle
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map, gaussian_pieces
@@ -142,7 +142,7 @@ class LinearizedCycle(LinearizedOrbit):
         states, linear = gaussian_pieces(
             self.propagator.osc, state, self.propagator.stepper, _NODES, _NODES, self.cycle.duration
         )
-        weights = pulls(linear.derivatives, momentum, VectorField(self.propagator.osc).rate(state))
+        weights = adjoint_weights(linear.derivatives, momentum, VectorField(self.propagator.osc).rate(state))
         still = np.zeros(_NODES, dtype=np.int64)
         return OrbitDisplacement(states[:-1], states[1:], weights, still, self.cycle.duration / _NODES)
 

@@ -15,7 +15,7 @@ from vibrokit.analyzers.polishing.ending import Ending
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
-from vibrokit.analyzers.polishing.undetermined import Pin, Soft
+from vibrokit.analyzers.polishing.undetermined import NearNullDirection, TimeGauge
 from vibrokit.errors import StructureError
 from vibrokit.progress import count
 from vibrokit.structure.linear_map import HamiltonianMap
@@ -107,17 +107,17 @@ class _Matching:
         last: float,
     ) -> None:
         self.propagator, self.source, self.first, self.ending, self.last = propagator, source, first, ending, last
-        self.pin: Pin | None = None
+        self.gauge: TimeGauge | None = None
         self.scale = _sizes(guess[self._unknown(guess)], source.point(first))
         if propagator.osc.autonomous and ending.period_nodes > 0:
-            self.pin = Pin(propagator, guess, self.scale)
+            self.gauge = TimeGauge(propagator, guess, self.scale)
         self.start_of_last = float((first + len(guess) - 2) % propagator.pieces) * propagator.piece
 
     def _unknown(self, points: Array) -> NDArray[np.intp]:
         """Return the nodes whose points are unknown: all but those in a short contact."""
         short = self.propagator.in_short_contact(points)
-        if self.pin is not None:
-            short[self.pin.node] = False
+        if self.gauge is not None:
+            short[self.gauge.node] = False
         return np.flatnonzero(~short)
 
     def _joined(self, points: Array, unknown: NDArray[np.intp]) -> Array:
@@ -147,9 +147,9 @@ class _Matching:
             ((points[1:] - carried.images) / self.scale)[unknown[1:] - 1].ravel(),
             ending.misfit(points[-1], self.start_of_last + last, self.scale),
         ]
-        if self.pin is not None:
-            parts[1][self._jump(unknown)] -= number[0] * self.pin.normal
-            parts.append(np.array([self.pin.rate @ (points[self.pin.node] / self.scale - self.pin.point)]))
+        if self.gauge is not None:
+            parts[1][self._jump(unknown)] -= number[0] * self.gauge.normal
+            parts.append(np.array([self.gauge.rate @ (points[self.gauge.node] / self.scale - self.gauge.point)]))
         misfits = np.concatenate(parts)
         largest = float(np.abs(misfits).max())
         largest = largest if math.isfinite(largest) else math.inf
@@ -177,10 +177,10 @@ class _Matching:
         if self.ending.free_time:
             rate = self.propagator.rate(current.carried.images[-1], end) / self.scale
             table += [(in_time, below, size), (-rate[:, None], below - double, size)]
-        if self.pin is not None:
+        if self.gauge is not None:
             jump = self._jump(unknown).start
-            table.append((self.pin.rate[None], below + len(at_end), jump + double))
-            table.append((-self.pin.normal[:, None], ahead + jump, size))
+            table.append((self.gauge.rate[None], below + len(at_end), jump + double))
+            table.append((-self.gauge.normal[:, None], ahead + jump, size))
         side = size + len(number)
         return sparse_blocks(table, (side, side))
 
@@ -191,7 +191,7 @@ class _Matching:
         direction is nearly undetermined. A long step in that direction waits until all else is matched; then the misfit
         may be small enough already. If not, the path moves along the family, a short step at a time.
         """
-        number = np.array([self.last] if self.ending.free_time else [0.0] if self.pin is not None else [])
+        number = np.array([self.last] if self.ending.free_time else [0.0] if self.gauge is not None else [])
         (points, current), flat, before = self._arranged(points, number), False, math.inf
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
@@ -200,16 +200,16 @@ class _Matching:
             except RuntimeError:  # singular: the guess is far from any path
                 break
             step = -factors.solve(current.misfits)
-            soft = Soft.of(factors, step)
-            rest = soft.without(step)
-            if soft.flat or soft.most < np.abs(soft.direction @ step):
-                if np.linalg.norm(rest) > _MATCHED * soft.most or accepted < current.largest < before / _GAINING:
+            null = NearNullDirection.of(factors, step)
+            rest = null.without(step)
+            if null.flat or null.most < np.abs(null.direction @ step):
+                if np.linalg.norm(rest) > _MATCHED * null.most or accepted < current.largest < before / _GAINING:
                     step, before = rest, current.largest
                 elif current.largest <= accepted:
                     flat = True
                     break
                 else:
-                    step = rest + soft.limited(step) * soft.direction
+                    step = rest + null.limited(step) * null.direction
             length = float(np.linalg.norm(step))
             share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), _SMALL))
             while share > _SHORTEST_STEP:
@@ -217,7 +217,7 @@ class _Matching:
                 tried = self.evaluate(*moved, current.unknown)
                 evaluations -= 1
                 if math.isfinite(tried.largest):
-                    ahead = float(np.linalg.norm(soft.without(factors.solve(tried.misfits))))
+                    ahead = float(np.linalg.norm(null.without(factors.solve(tried.misfits))))
                     if ahead <= (1 - share / 4) * length or tried.largest < _EXACT:
                         break
                 share /= 2
@@ -228,7 +228,7 @@ class _Matching:
                 break
             if not np.array_equal(self._unknown(points), current.unknown):
                 points, current = self._arranged(points, number)
-        slack = 0.0 if self.pin is None else abs(float(number[0]))
+        slack = 0.0 if self.gauge is None else abs(float(number[0]))
         return ExtremalPath(
             current.source, self.first, current.ending, points, self._last(number),
             current.carried.derivatives, current.carried.actions, _over_jumps(points, current.carried.images),
@@ -245,8 +245,8 @@ class _Matching:
 
     def _jump(self, unknown: NDArray[np.intp]) -> slice:
         """The misfits at the node where H may jump."""
-        assert self.pin is not None
-        place, double = int(np.searchsorted(unknown, self.pin.node)), len(self.scale)
+        assert self.gauge is not None
+        place, double = int(np.searchsorted(unknown, self.gauge.node)), len(self.scale)
         return slice((place - 1) * double, place * double)
 
 

@@ -19,7 +19,7 @@ class OrbitDisplacement:
 
     states: Array  # (pieces, n): where the pieces begin
     images: Array  # (pieces, n): where they end
-    pulls: Array  # (pieces, n): derivatives of p·q in the images of the pieces
+    weights: Array  # (pieces, n): derivatives of p·q in the images of the pieces
     phases: NDArray[np.int64]  # (pieces,): since the section
     interval: float | None  # duration of a piece (s); None: that of the propagator
 
@@ -34,7 +34,7 @@ class OrbitDisplacement:
         return found.images[:, :n] - self.images
 
 
-def pulls(steps: Array, momentum: Array, rate: Array | None = None) -> Array:
+def adjoint_weights(steps: Array, momentum: Array, rate: Array | None = None) -> Array:
     """Return the derivatives (pieces, n) of p·q, q the start of a closed orbit, in the images of its pieces.
 
     The orbit moves by δ at each node, δ′ = M δ + g with the change g of the image, and closes after its period. A limit

@@ -70,11 +70,12 @@ class PathSolver:
         if effort <= Effort.SHOOT:
             evaluations = TOLERANCES.evaluations // 16 if effort is Effort.JOIN else _FROM_NEAR
             return self._once(self._shot(self._as_given(cuts[0]), evaluations))
-        guess = min((self._fitted(cut) for cut in cuts), key=lambda each: each.action)
-        for _, known in self._known:
-            if isinstance(known, ExtremalPath) and known.flat and same_action(known.action, guess.action, _FITTED):
-                return known
+        fitted = (self._fitted(*_begun(self.propagator, self.source, cut), cut) for cut in cuts)
+        guess = min(fitted, key=lambda each: each.action)
         action = guess.action
+        for _, known in self._known:
+            if isinstance(known, ExtremalPath) and known.flat and same_action(known.action, action, _FITTED):
+                return known
         try:
             found = self._descended(guess)
             action = found.action
@@ -91,14 +92,10 @@ class PathSolver:
         source, first = self.source.starting(self.source.closest(cut.states[:1])[2])
         return _Guess(source, first, np.hstack([cut.states, cut.momenta]), cut)
 
-    def _fitted(self, cut: Cut) -> _Guess:
+    def _fitted(self, source: LinearizedOrbit, first: int, states: Array, cut: Cut) -> _Guess:
         """A candidate after the Gauss–Newton method."""
-        source, first, states = _begun(self.propagator, self.source, cut)
-        return _Guess(source, first, *self._minimized(first, states, cut))
-
-    def _minimized(self, first: int, states: Array, cut: Cut) -> tuple[Array, Cut, float]:
         points, action = gauss_newton(self.propagator, first, states, cut.last, cut.ending.free)
-        return points, cut, action
+        return _Guess(source, first, points, cut, action)
 
     def _descended(self, guess: _Guess, evaluations: int = TOLERANCES.evaluations) -> ExtremalPath:
         cut = guess.cut
@@ -141,7 +138,7 @@ class PathSolver:
             first = guess.first - added
             states = np.concatenate([source.along(first, added), guess.points[:, : propagator.size]])
             try:
-                longer = _Guess(source, first, *self._minimized(first, states, cut))
+                longer = self._fitted(source, first, states, cut)
                 found = self._descended(longer, TOLERANCES.evaluations if best is None else _FROM_NEAR)
                 found = within(propagator, found, TOLERANCES.radius * found.extent)
                 solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)

@@ -88,7 +88,7 @@ class _ActionChange:
         largest = float(np.abs(offsets / scale).max())
         for orbit in self.orbits:
             offsets = orbit.offsets(moved)
-            change += float(np.sum(orbit.pulls * offsets))
+            change += float(np.sum(orbit.weights * offsets))
             largest = max(largest, float(np.abs(offsets / scale).max()))
         end = dataclasses.replace(self.problem, osc=osc).path_ends[self.place]
         change += found.ending.displaced(points[-1], end)

@@ -1,4 +1,4 @@
-"""What the equations of a path leave undetermined: the time without forcing (`Pin`), and nearly a family (`Soft`)."""
+"""What the equations of a path leave undetermined: the time without forcing, and nearly a family of paths."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.errors import StructureError
 
-_SOFT = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
+_NULL = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
 _FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
 _INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
 _LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
@@ -20,7 +20,7 @@ _LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one ste
 Array = NDArray[np.float64]
 
 
-class Pin:
+class TimeGauge:
     """The node where the time is fixed and H may jump; both are determined best where the path is fastest."""
 
     def __init__(self, propagator: SegmentPropagator, points: Array, scale: Array) -> None:
@@ -34,14 +34,14 @@ class Pin:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Soft:
+class NearNullDirection:
     """The direction in which the misfits change least, of length 1, if it is nearly undetermined; else 0."""
 
     direction: Array
     value: float  # the singular value
 
     @classmethod
-    def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> Soft:
+    def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> NearNullDirection:
         """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value."""
         direction, value = guess, math.inf
         if not np.any(guess):
@@ -50,7 +50,7 @@ class Soft:
             left = factors.solve(direction / np.linalg.norm(direction), trans="T")
             direction = factors.solve(left / np.linalg.norm(left))
             value = 1 / float(np.linalg.norm(direction))
-        return cls(direction * value if value < _SOFT else 0.0 * direction, value)
+        return cls(direction * value if value < _NULL else 0.0 * direction, value)
 
     @property
     def flat(self) -> bool:
