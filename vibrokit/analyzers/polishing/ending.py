@@ -113,7 +113,7 @@ class Ending(ABC):
     @property
     def period_nodes(self) -> int:
         """Nodes in a period of the orbit that the path approaches; 0 if it ends after a finite time."""
-        return 0
+        return sum(orbit.period_nodes for orbit, _ in self.approached)
 
     @property
     def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:

@@ -170,10 +170,6 @@ class SaddleEnding(Ending):
         return dataclasses.replace(self, orbit=self.orbit.through(point, self.phase, leaving=False))
 
     @property
-    def period_nodes(self) -> int:
-        return self.orbit.period_nodes
-
-    @property
     def approached(self) -> tuple[tuple[LinearizedOrbit, int], ...]:
         return ((self.orbit, self.phase),)
 

@@ -40,7 +40,6 @@ class LinearizedAtNodes(LinearizedOrbit):
     linear: GaussianMap  # M and C of the pieces that begin at the nodes
     unstable: Array  # (nodes, 2n, n)
     stable: Array  # (nodes, 2n, n)
-    left_from_itself: bool = False
 
     @property
     def period_nodes(self) -> int:
@@ -50,14 +49,10 @@ class LinearizedAtNodes(LinearizedOrbit):
     def slowest_rate(self) -> float:
         return float(np.abs(np.log(np.abs(self.multipliers))).min()) / len(self.states)
 
-    @property
-    def start_on_orbit(self) -> bool:
-        return self.left_from_itself
-
     def with_start_on_orbit(self) -> Self:
         size = self.states.shape[1]
         free = np.vstack([np.zeros((size, size)), np.eye(size)])
-        return dataclasses.replace(self, unstable=np.broadcast_to(free, self.unstable.shape), left_from_itself=True)
+        return dataclasses.replace(self, unstable=np.broadcast_to(free, self.unstable.shape), start_on_orbit=True)
 
     def node(self, phase: int) -> int:
         return phase % len(self.states)
@@ -94,7 +89,7 @@ class LinearizedAtNodes(LinearizedOrbit):
 
     def again(self, propagator: SegmentPropagator) -> LinearizedAtNodes:
         found = orbit_at_nodes(propagator, self.states, len(self.states) // propagator.pieces)
-        return found.with_start_on_orbit() if self.left_from_itself else found
+        return found.with_start_on_orbit() if self.start_on_orbit else found
 
     def displacement(self, phase: int, momentum: Array) -> OrbitDisplacement:
         phases = (phase + np.arange(len(self.states))) % len(self.states)

@@ -35,6 +35,8 @@ class LinearizedOrbit(ABC):
 
     propagator: SegmentPropagator
     multipliers: NDArray[np.complex128]  # (n,), of a period
+    start_on_orbit: bool = dataclasses.field(default=False, kw_only=True)
+    """Whether paths start on the orbit itself, at p ≠ 0, instead of in the unstable space."""
 
     @property
     @abstractmethod
@@ -45,11 +47,6 @@ class LinearizedOrbit(ABC):
     @abstractmethod
     def slowest_rate(self) -> float:
         """Slowest rate, per piece, at which paths leave or approach."""
-
-    @property
-    def start_on_orbit(self) -> bool:
-        """Whether paths start on the orbit itself, at p ≠ 0, instead of in the unstable space."""
-        return False
 
     def with_start_on_orbit(self) -> Self | None:
         """Return the same orbit, left by paths that start on it; None if none do.
