@@ -5,9 +5,9 @@
 
 The scenes are the gallery and the paper's with default settings, and the extremes with smaller ones. Each runs in a
 process of its own, and its rows are appended together, so that a run that was cut goes on with the scenes that are
-missing. Words choose among names such as "gallery: pendulum". A row is one exit. The seconds are processor time of all
-threads, of the whole call that found the exit; the limits are on the clock, so that a busy machine finds less. An exact
-energy outside its bounds is WRONG.
+missing. Given words, only scenes with at least one of them in their names run; a name is such as "gallery: pendulum".
+A row is one exit. The seconds are processor time of all threads, of the whole call that found the exit; the limits are
+on the clock, so that a busy machine finds less. An exact energy outside its bounds is WRONG.
 """
 
 import argparse
@@ -120,7 +120,7 @@ def run(table, words, limit):
         if not known:
             writer.writeheader()
         for name in all_scenes():
-            if name in known or not all(word in name for word in words):
+            if name in known or (words and not any(word in name for word in words)):
                 continue
             rows = [{"scene": name, **row} for row in alone(name, limit)]
             writer.writerows(rows)
