@@ -2,9 +2,9 @@
 
     python tests/benchmarks/size.py [--list constants | wide | long]
 
-A constant is a name that a module gives one or several numbers. Tables of coefficients, statuses, and the layout of
-pictures, pages and printed text are counted apart. Wide functions have seven parameters or more, long ones more than
-60 lines.
+Code is every line outside of docstrings and imports that is not blank. A constant is a name that a module gives one or
+several numbers. Tables of coefficients, statuses, and the layout of pictures, pages and printed text are counted apart.
+Wide functions have seven parameters or more, long ones more than 60 lines.
 """
 
 import argparse
@@ -63,6 +63,24 @@ def counted(path):
     return found
 
 
+def lines_by_kind(path):
+    """Lines of a file: all, docstrings, blank ones outside of these, imports, and the rest, which is code."""
+    text = path.read_text()
+    tree, kinds = ast.parse(text), collections.Counter()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            kinds["imports"] += node.end_lineno - node.lineno + 1
+        documents = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        if documents and ast.get_docstring(node, clean=False) is not None:
+            first = node.body[0]
+            kinds["docstrings"] += first.end_lineno - first.lineno + 1
+            kinds["blank"] -= sum(not line.strip() for line in text.splitlines()[first.lineno - 1 : first.end_lineno])
+    kinds["lines"] = len(text.splitlines())
+    kinds["blank"] += sum(not line.strip() for line in text.splitlines())
+    kinds["code"] = kinds["lines"] - kinds["blank"] - kinds["docstrings"] - kinds["imports"]
+    return kinds
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--list", choices=("constants", "wide", "long"))
@@ -73,17 +91,18 @@ def main():
         apart = parts[0] in LAYOUT or "/".join(parts).startswith(TABLES)
         found = counted(path)
         room = rooms[f"vibrokit/{parts[0]}/" if len(parts) > 1 else "vibrokit/*.py"]
-        room["lines"] += len(path.read_text().splitlines())
+        room += lines_by_kind(path)
         for kind, some in found.items():
             kind = "apart" if kind == "constants" and apart else kind
             room[kind] += len(some)
             lists += some if kind == wanted else []
     for name in OTHERS:
-        rooms[f"{name}/"]["lines"] = sum(len(path.read_text().splitlines()) for path in sources(name))
+        for path in sources(name):
+            rooms[f"{name}/"] += lines_by_kind(path)
     if wanted:
         print("\n".join(lists))
         return
-    columns = ("lines", "constants", "apart", "wide", "long")
+    columns = ("lines", "code", "docstrings", "blank", "imports", "constants", "apart", "wide", "long")
     print(f"{'':28s}" + "".join(f"{column:>11s}" for column in columns))
     for name, counts in rooms.items():
         print(f"{name:28s}" + "".join(f"{counts[column]:11d}" for column in columns))
