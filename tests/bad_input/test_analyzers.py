@@ -53,23 +53,72 @@ def refused(kind, make, words):
     assert len(text) < 600
 
 
+NO_SEARCHES = (3, "none", True, vk.LeaveBasin(), vk.GraphSearch, vk.Shooting, vk.ActionGraph(), vk.ActionPlot())
+BAD_GRAPHS = [
+    ({"steps_per_period": 7}, "even number"),
+    *(({"steps_per_period": given}, "steps_per_period") for given in (0, 8.0, True, 10**6, "8")),
+    ({"nodes": (31, 320)}, "32 or more"),
+    *(({"nodes": given}, "nodes") for given in ((0, 0), 320, (320,), (320.5, 320), None)),
+    *(({"max_memory_gib": given}, "positive number of GiB") for given in (0.0, -1, np.nan, "4", True)),
+]
+SETTINGS = [
+    *((vk.FirstContact, {"side": given}, "side must be") for given in ("up", 1, [], True)),
+    *((vk.LeaveBasin, {"for_good": given}, "for_good must be True or False") for given in ("no", 1, None)),
+    *((vk.LeastAction, {"graph": given}, "graph must be a .*None to do without") for given in NO_SEARCHES),
+    *((vk.LeastAction, {"shooting": given}, "shooting must be a .*None to do without") for given in NO_SEARCHES),
+    (vk.LeastAction, {"shooting": vk.GraphSearch()}, "shooting must be a Shooting"),
+    (vk.LeastAction, {"graph": vk.Shooting()}, "graph must be a GraphSearch"),
+    (vk.LeastAction, {"shooting": None, "graph": None}, "at least one"),
+    *((vk.LeastAction, {"orbits": given}, "orbits") for given in (-1, 1.5, "4", None, True, 10**9)),
+    *((kind, *bad) for kind in (vk.GraphSearch, vk.ActionGraph) for bad in BAD_GRAPHS),
+    (vk.LeaveBounds, {}, "no bound"),
+    *((vk.LeaveBounds, {"x": given}, "least and the largest") for given in (1.0, ("a", 1.0))),
+    *((vk.LeaveBounds, {"x": given}, "lower bound first") for given in ((1.0, 1.0), (2.0, -2.0), (np.nan, 1.0))),
+    (vk.LeaveBounds, {"v": (2.0, -2.0)}, "lower bound first"),
+]
+
+
+@pytest.mark.parametrize(("kind", "settings", "words"), SETTINGS)
+def test_settings(kind, settings, words):
+    refused(StructureError, lambda: kind(**settings), words)
+
+
+RUNS = [
+    (SceneError, {}, {"osc": dataclasses.replace(WELL, noise=None)}, "no noise"),
+    (StructureError, {"exit": vk.FirstContact()}, {}, "no stop"),
+    (StructureError, {"exit": vk.FirstContact("left")}, {}, "no left stop"),
+    *(
+        (StructureError, {"source": given}, {}, "there is no attractor")
+        for given in (7, -1, "up", "", 0.5, True, [0], np.nan)
+    ),
+    (StructureError, {}, {"osc": WELL.replace({"damping_ratio": 0.06})}, "another scene"),
+    *((StructureError, {}, {"structure": given}, "structure") for given in (None, "double-well", 3, WELL)),
+    *((SceneError, {}, {"osc": given}, "[Oo]scillator") for given in (None, "double-well", 3)),
+    *(
+        (StructureError, {"exit": given}, {}, r"exit must be an Exit.*LeaveBasin\(\)")
+        for given in ("x", None, 3, vk.LeaveBasin, vk.WhiteNoise(1.0))
+    ),
+    *((StepperError, {"stepper": given}, {}, "stepper must be a Stepper") for given in ("rk4", 3, vk.RK4)),
+    (StructureError, {}, {"progress": 3}, "progress must be"),
+    *(
+        (StructureError, {}, {"time_limit": given}, "time_limit must be")
+        for given in (0, -1.0, "1", np.nan, np.inf, True)
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "settings", "given", "words"), RUNS)
+def test_runs(analyzer, structure, kind, settings, given, words):
+    refused(kind, lambda: analyzer(**settings).run(**({"osc": WELL, "structure": structure} | given)), words)
+
+
 # --- scenes
-
-
-def test_a_scene_without_noise(analyzer, structure):
-    quiet = dataclasses.replace(WELL, noise=None)
-    refused(SceneError, lambda: analyzer().run(quiet, structure), "no noise")
 
 
 def test_only_one_attractor_and_no_other_basin(analyzer):
     one = vk.find_structure(WELL, region=((0.5, 1.5), (-0.1, 0.1)), starts=(3, 3), cells=(4, 4))
     assert len(one.attractors) == 1
     refused(StructureError, lambda: analyzer().run(WELL, one), r"only one attractor.*LeaveBounds\(x=\(")
-
-
-@pytest.mark.parametrize(("side", "words"), [(None, "no stop"), ("left", "no left stop")])
-def test_first_contact_without_a_stop(analyzer, structure, side, words):
-    refused(StructureError, lambda: analyzer(exit=vk.FirstContact(side)).run(WELL, structure), words)
 
 
 def test_first_contact_without_a_stop_on_that_side(analyzer):
@@ -81,16 +130,6 @@ def test_first_contact_without_a_stop_on_that_side(analyzer):
     )
     structure = vk.find_structure(osc, saddles=False, **QUICK)
     refused(StructureError, lambda: analyzer(exit=vk.FirstContact("left")).run(osc, structure), "no left stop")
-
-
-@pytest.mark.parametrize("side", ["up", 1, [], True])
-def test_unknown_sides(side):
-    refused(StructureError, lambda: vk.FirstContact(side), "side must be")
-
-
-@pytest.mark.parametrize("given", ["no", 1, None])
-def test_what_is_not_for_good(given):
-    refused(StructureError, lambda: vk.LeaveBasin(for_good=given), "for_good must be True or False")
 
 
 @pytest.fixture(scope="module")
@@ -163,103 +202,6 @@ def test_a_structure_without_the_states_that_the_noise_has(name):
     assert done.stdout.endswith(".\n")
 
 
-# --- structures
-
-
-@pytest.mark.parametrize("source", [7, -1, "up", "", 0.5, True, [0], np.nan], ids=repr)
-def test_unknown_attractors(analyzer, structure, source):
-    refused(StructureError, lambda: analyzer(source=source).run(WELL, structure), "there is no attractor")
-
-
-def test_a_structure_of_another_scene(analyzer, structure):
-    other = WELL.replace({"damping_ratio": 0.06})
-    refused(StructureError, lambda: analyzer().run(other, structure), "another scene")
-
-
-@pytest.mark.parametrize("given", [None, "double-well", 3, WELL], ids=lambda given: type(given).__name__)
-def test_what_is_not_a_structure(analyzer, given):
-    refused(StructureError, lambda: analyzer().run(WELL, given), "structure")
-
-
-@pytest.mark.parametrize("given", [None, "double-well", 3], ids=repr)
-def test_what_is_not_a_scene(analyzer, structure, given):
-    refused(SceneError, lambda: analyzer().run(given, structure), "[Oo]scillator")
-
-
-# --- settings
-
-
-@pytest.mark.parametrize("given", ["x", None, 3, vk.LeaveBasin, vk.WhiteNoise(1.0)], ids=str)
-def test_what_is_not_an_exit(analyzer, structure, given):
-    refused(StructureError, lambda: analyzer(exit=given).run(WELL, structure), r"exit must be an Exit.*LeaveBasin\(\)")
-
-
-@pytest.mark.parametrize("given", ["rk4", 3, vk.RK4], ids=str)
-def test_what_is_not_a_stepper(analyzer, structure, given):
-    refused(StepperError, lambda: analyzer(stepper=given).run(WELL, structure), "stepper must be a Stepper")
-
-
-def test_what_is_not_a_listener(analyzer, structure):
-    refused(StructureError, lambda: analyzer().run(WELL, structure, progress=3), "progress must be")
-
-
-@pytest.mark.parametrize("limit", [0, -1.0, "1", np.nan, np.inf, True], ids=repr)
-def test_what_is_not_a_time_limit(analyzer, structure, limit):
-    refused(StructureError, lambda: analyzer().run(WELL, structure, time_limit=limit), "time_limit must be")
-
-
-NO_SEARCHES = [3, "none", True, vk.LeaveBasin(), vk.GraphSearch, vk.Shooting, vk.ActionGraph(), vk.ActionPlot()]
-
-
-@pytest.mark.parametrize("name", ["graph", "shooting"])
-@pytest.mark.parametrize("given", NO_SEARCHES, ids=str)
-def test_what_is_not_a_search(name, given):
-    """A whole analyzer is none either: it has its own source, exit and stepper."""
-    refused(StructureError, lambda: vk.LeastAction(**{name: given}), f"{name} must be a .*None to do without")
-
-
-def test_searches_are_not_exchanged():
-    refused(StructureError, lambda: vk.LeastAction(shooting=vk.GraphSearch()), r"shooting must be a Shooting")
-    refused(StructureError, lambda: vk.LeastAction(graph=vk.Shooting()), r"graph must be a GraphSearch")
-
-
-def test_without_any_search():
-    refused(StructureError, lambda: vk.LeastAction(shooting=None, graph=None), "at least one")
-
-
-@pytest.mark.parametrize("orbits", [-1, 1.5, "4", None, True, 10**9], ids=repr)
-def test_numbers_of_orbits(orbits):
-    refused(StructureError, lambda: vk.LeastAction(orbits=orbits), "orbits")
-
-
-@pytest.mark.parametrize(
-    ("bad", "words"),
-    [
-        ({"steps_per_period": 7}, "even number"),
-        ({"steps_per_period": 0}, "steps_per_period"),
-        ({"steps_per_period": 8.0}, "steps_per_period"),
-        ({"steps_per_period": True}, "steps_per_period"),
-        ({"steps_per_period": 10**6}, "steps_per_period"),
-        ({"steps_per_period": "8"}, "steps_per_period"),
-        ({"nodes": (31, 320)}, "32 or more"),
-        ({"nodes": (0, 0)}, "nodes"),
-        ({"nodes": 320}, "nodes"),
-        ({"nodes": (320,)}, "nodes"),
-        ({"nodes": (320.5, 320)}, "nodes"),
-        ({"nodes": None}, "nodes"),
-        ({"max_memory_gib": 0.0}, "positive number of GiB"),
-        ({"max_memory_gib": -1}, "positive number of GiB"),
-        ({"max_memory_gib": float("nan")}, "positive number of GiB"),
-        ({"max_memory_gib": "4"}, "positive number of GiB"),
-        ({"max_memory_gib": True}, "positive number of GiB"),
-    ],
-    ids=str,
-)
-@pytest.mark.parametrize("graph", [vk.GraphSearch, vk.ActionGraph])
-def test_settings_of_the_graph(graph, bad, words):
-    refused(StructureError, lambda: graph(**bad), words)
-
-
 # --- memory
 
 
@@ -300,18 +242,3 @@ def test_noise_without_a_value_or_without_effect_at_the_attractor(structure, ana
     found = analyzer.run(osc, structure)
     assert found.energies == ()
     assert len(found.found(Code.SOURCE_FAILED)) == 2
-
-
-@pytest.mark.parametrize(
-    ("bounds", "words"),
-    [
-        ({}, "no bound"),
-        ({"x": (1.0, 1.0)}, "lower bound first"),
-        ({"v": (2.0, -2.0)}, "lower bound first"),
-        ({"x": 1.0}, "least and the largest"),
-        ({"x": ("a", 1.0)}, "least and the largest"),
-        ({"x": (float("nan"), 1.0)}, "lower bound first"),
-    ],
-)
-def test_bounds_that_are_none(bounds, words):
-    refused(StructureError, lambda: vk.LeaveBounds(**bounds), words)
