@@ -10,6 +10,7 @@ import pytest
 import vibrokit as vk
 from vibrokit.errors import ArgumentError, DerivationError, VibrokitError
 from vibrokit.parts.functions import sin
+from vibrokit.results.trajectory import Trajectory
 
 SCENE = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
 
@@ -140,7 +141,7 @@ WRONG_TYPES = [
     lambda: SCENE.trajectory((0.0, 0.0), 1, stepper=np.array([])),
     lambda: SCENE.section_map([[0.0, 0.0]], HUGE),
     lambda: SCENE.section_map([[0.0, 0.0]], executor="threads"),
-    lambda: SCENE.trajectory((0.0, 0.0), 1, samples=1).plot(ax="here"),
+    lambda: Trajectory(np.arange(2.0), np.zeros((2, 2)), ()).plot(ax="here"),
     lambda: vk.save_scene(SCENE, 3),
     lambda: vk.save_scene(SCENE, "a\0b"),
     lambda: vk.load_result(3),
