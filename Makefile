@@ -1,5 +1,5 @@
 # make demo   the main job on a bundled scene, in a virtual environment of its own
-# make test   style, types, layers and the tests of seconds
+# make test   style, types and layers (alone: make lint), and the tests of seconds (alone: make test-fast)
 # make test-slow   the tests that take longer; CI runs them too
 # make test-long   slow tests of half a minute each that CI leaves out: before a release, and after changes near to them
 # make docs   the manual, in docs/_build/html
@@ -11,16 +11,22 @@ PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-slow test-long docs clean
+.PHONY: demo test lint test-fast test-slow test-long docs clean
 
 demo: .venv/demo.stamp
 	$(BIN)/vibrokit run hertz-0.570
 
+# Types need one processor: beside the tests they take less time than before them.
 test: .venv/test.stamp
+	$(MAKE) --jobs=2 lint test-fast
+
+lint: .venv/test.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+test-fast: .venv/test.stamp
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not slow'
 
 test-slow: .venv/test.stamp
