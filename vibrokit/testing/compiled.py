@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from vibrokit.errors import VibrokitError
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stepper import Emitter
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.symbols import code_name
-from vibrokit.testing.report import ConformanceError
 
 if TYPE_CHECKING:
     from vibrokit.symbolic.source import SceneText
@@ -37,7 +34,7 @@ class Compiled:
     """Compiled pieces of one flow of one scene."""
 
     def __init__(self, scene: Oscillator, flow: Flow) -> None:
-        self._module = _guarded(lambda: kernel_for(scene, flow, Pieces()).module)
+        self._module = kernel_for(scene, flow, Pieces()).module
         self.theta = theta_of(scene)
         self.size = self._module.EQUATIONS
         self._named = dict(zip(map(code_name, scene.model.symbols.values()), self.theta, strict=True))
@@ -48,20 +45,20 @@ class Compiled:
 
     def call(self, name: str, *arguments: Any) -> float:
         """Call `forcing`, `law`, `amplitude` or `slope` with the parameters of the scene."""
-        return _guarded(lambda: float(getattr(self._module, name)(*arguments, self.theta)))
+        return float(getattr(self._module, name)(*arguments, self.theta))
 
     def derivative(self, z: Any, forcing: float = 0.0) -> Any:
         """Rates as computed by steppers that pack lanes."""
         function = self._module.derivative
         names = list(inspect.signature(function.py_func).parameters)[self.size :]
         rest = [forcing if name == "f" else self._named[name] for name in names]
-        return _guarded(lambda: np.array(function(*map(float, z), *map(float, rest))))
+        return np.array(function(*map(float, z), *map(float, rest)))
 
     def rhs(self, z: Any, pushing: tuple[bool, ...] = (), time: float = 0.0) -> Any:
         """Rates as computed by steppers that locate contacts."""
         out = np.empty(self.size)
         switches = np.array(pushing, dtype=bool)
-        _guarded(lambda: self._module.rhs(time, np.array(z, dtype=float), switches, self.theta, out))
+        self._module.rhs(time, np.array(z, dtype=float), switches, self.theta, out)
         return out
 
 
@@ -85,17 +82,3 @@ def hamiltonian_start(states: tuple[float, ...], momentum: float) -> Any:
     n = len(states)
     momenta = [0.0] * (n - 1) + [momentum]
     return np.concatenate([states, momenta, [0.0], np.eye(2 * n).ravel()])
-
-
-def _guarded(work: Callable[[], Any]) -> Any:
-    try:
-        return work()
-    except VibrokitError:
-        raise
-    except Exception as error:
-        lines = [line for line in str(error).splitlines() if line and not line.startswith("Failed in")]
-        reason = lines[0] if lines else ""
-        raise ConformanceError(
-            f"The formula does not compile ({type(error).__name__}: {reason}); use only arithmetic and functions of "
-            "vibrokit.parts.functions."
-        ) from error

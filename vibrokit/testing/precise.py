@@ -36,9 +36,6 @@ def function(formula: sympy.Expr, arguments: Sequence[sympy.Symbol], values: Map
                 value = mpmath.mpmathify(raw(*map(mpmath.mpf, point), *map(mpmath.mpf, values.values())))
             except (ArithmeticError, ValueError):
                 value = mpmath.nan
-            except (NameError, TypeError, AttributeError) as error:
-                problem = f"{type(error).__name__}: {error}"
-                raise ConformanceError(f"The formula {formula} cannot be evaluated ({problem}).") from error
             if not (mpmath.isfinite(value) and mpmath.im(value) == 0):
                 place = ", ".join(f"{a} = {mpmath.nstr(p, 6)}" for a, p in zip(arguments, point, strict=True))
                 shown = {str(symbol): number for symbol, number in values.items()}
