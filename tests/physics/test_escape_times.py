@@ -59,7 +59,7 @@ def agree(found, right, deviations=3.0, formula=0.0):
     return abs(math.log(time / right)) <= deviations * error + formula
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.slow)])
 def test_escape_from_the_only_well_is_that_of_kramers(sign):
     osc = softening(0.1, 6.0, sign)
     right = kramers_time(0.2, 1.0, 1.0, 1 / 6, 1 / 36, 0.2 * 6 / 5)
