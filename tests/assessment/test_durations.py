@@ -47,7 +47,8 @@ def test_durations_beyond_floats_and_intervals():
     assert [duration_text(end) for end in (-math.inf, math.inf, math.nan)] == ["0 s", "infinite", "unknown"]
     assert interval_text(*map(math.log, (0.24, 0.22, 0.27))) == "0.24 s (0.22 to 0.27)"
     assert interval_text(*map(math.log, (86400.0, 3600.0, 864000.0))) == "24 hours (1 to 240)"
-    assert interval_text(0.0, -math.inf, math.inf) == "1 s (0 to infinite)"
+    assert interval_text(0.0, -math.inf, math.inf) == "1 s (0 s to infinite)"
+    assert interval_text(*map(math.log, (300 * YEAR, 0.5, 1e12 * YEAR))) == "300 years (0.5 s to 1e+12 years)"
 
 
 @given(st.floats(1e-300, 1e300))

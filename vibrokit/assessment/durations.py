@@ -74,9 +74,15 @@ def duration_text(log_seconds: float) -> str:
 
 
 def interval_text(log_seconds: float, log_lower: float, log_upper: float) -> str:
-    """Return a duration with its interval in one unit, such as ``"0.24 s (0.22 to 0.27)"``, from ln of each (s)."""
+    """Return a duration with its interval, such as ``"0.24 s (0.22 to 0.27)"``, from ln of each (s).
+
+    All are in one unit, unless the interval spans more than six decades.
+    """
     if not math.isfinite(log_seconds):
         return duration_text(log_seconds)
+    if log_upper - log_lower > math.log(1e6):
+        value, lower, upper = map(duration_text, (log_seconds, log_lower, log_upper))
+        return f"{value} ({lower} to {upper})"
     name, scale = _unit_of(log_seconds)
     value, lower, upper = (power_text(each - math.log(scale)) for each in (log_seconds, log_lower, log_upper))
     return f"{value} {name} ({lower} to {upper})"
