@@ -10,7 +10,12 @@ import pytest
 import vibrokit as vk
 from vibrokit.analyzers.evidence import Evidence, reached_through_others
 from vibrokit.analyzers.exits import LeaveRegion
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.road import ExitRoad
+from vibrokit.analyzers.sources import Source
+from vibrokit.errors import StructureError
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 
@@ -201,6 +206,52 @@ def test_the_graph_is_refined_as_far_as_the_accuracy_asks(structure):
         return used.values["nodes_x"]
 
     assert [nodes_used(accuracy) for accuracy in (0.5, 1e-6)] == [100, 200]
+
+
+class StraightLine(Source):
+    """A source of a user: from the attractor to beyond each saddle, at constant velocity."""
+
+    name = "straight lines"
+    searches = True
+    effort = Effort.FROM_ORBIT
+
+    def propose(self, problem, polished):
+        """Return one line for each saddle and each attractor that it leads to."""
+        start, step = problem.attractor.points[0, :2], problem.scene.section_interval / 8
+        times = step * np.arange(17)
+        for end in problem.path_ends:
+            goal = 1.1 * problem.structure.saddles[end.saddle].points[0, :2] - 0.1 * start
+            line = start + (goal - start) * np.linspace(0, 1, 17)[:, None]
+            states = np.column_stack([line[:, 0], np.full(17, (goal - start)[0] / times[-1])])
+            for target in end.targets:
+                yield Candidate(problem.source, target, times, states, 1.0, self.name)
+
+
+class Failing(StraightLine):
+    """A source that raises, after others."""
+
+    def propose(self, problem, polished):
+        raise StructureError("it cannot.")
+
+
+class Silent(StraightLine):
+    """A source that has nothing to say."""
+
+    def propose(self, problem, polished):
+        return ()
+
+
+def test_a_source_of_a_user_proposes_and_is_polished(structure):
+    problem = ExitProblem(OSC, structure, structure.attractors[0], vk.LeaveBasin())
+    found = ExitRoad(problem, [Silent(), StraightLine(), Failing()]).run()
+    (energy,) = found.estimates
+    assert energy.value == pytest.approx(EXACT, rel=1e-6)
+    assert energy.certificate is not None
+    assert (energy.bound, energy.lower) == (Bound.UPPER, 0.0)  # nothing has excluded a cheaper path
+    (failed,) = (finding for finding in found.findings if finding.code is Code.METHOD_FAILED)
+    assert failed.values == {"method": "straight lines", "reason": "it cannot."}
+    with pytest.raises(StructureError, match="it cannot"):
+        ExitRoad(problem, [Failing()]).run()
 
 
 class LeaveLeft(LeaveRegion):

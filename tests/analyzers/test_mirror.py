@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
@@ -98,7 +97,7 @@ def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
 def test_what_is_found_later_of_the_mirror_image_is_polished_too():
     osc, structure = wells("forced")
     first, second = both("forced").energies
-    search = ExitSearch(LEAST, ExitProblem(osc, structure, structure.attractor(first.source), vk.LeaveBasin()))
+    search = LEAST.road(ExitProblem(osc, structure, structure.attractor(first.source), vk.LeaveBasin()))
     (found,) = search.revisit((second,)).estimates
     assert (found.source, found.target, found.bound) == (first.source, first.target, second.bound)
     assert found.value == pytest.approx(first.value, rel=1e-9)

@@ -160,7 +160,7 @@ def test_least_action_names_each_method_that_fails(centres):
     result = vk.LeastAction(source=0, **SMALL).run(*centres)
     assert result.energies == ()
     failed = result.found(Code.METHOD_FAILED)
-    assert [finding.values["method"] for finding in failed] == ["graph search", "action plot"]
+    assert [finding.values["method"] for finding in failed] == ["graph", "action plot"]
     assert all("multiplier" in finding.values["reason"] for finding in failed)
     assert [finding.source for finding in result.found(Code.NO_EXIT_FOUND)] == [0]
     alone = vk.LeastAction(source=0, graph=None, shooting=SMALL_SHOOTING).run(*centres)
@@ -178,7 +178,7 @@ def test_noise_with_its_own_states():
     refused(SceneError, lambda: alone.run(SLOW, structure), "shooting alone")
     result = vk.LeastAction(source=0, **SMALL).run(SLOW, structure)
     (failed,) = result.found(Code.METHOD_FAILED)
-    assert failed.values["method"] == "graph search"
+    assert failed.values["method"] == "graph"
     assert "the noise has" in failed.values["reason"]
     assert [finding.code for finding in result.findings if finding.code is Code.NOT_SEARCHED] or not result.energies
 

@@ -6,11 +6,13 @@ import dataclasses
 from typing import Any, ClassVar, Self
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
-from vibrokit.analyzers.exit_search import ExitSearch
 from vibrokit.analyzers.graph.search import GraphSearch
+from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.polishing.certified import METHOD
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.road import ExitRoad
 from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.analyzers.sources import ClosestApproach, Graph, MirrorImages, Relaxations, Shots
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import Bound
@@ -101,7 +103,18 @@ class LeastAction(Analyzer):
         problem.check_path_begins()
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.CERTIFIED)
-        return ExitSearch(self, problem).run()
+        return self.road(problem).run()
+
+    def road(self, problem: ExitProblem) -> ExitRoad:
+        """Return the road that it takes, before anything is done."""
+        mirror = Mirror(problem)
+        shoots = self.shooting is not None and problem.attractor.is_fixed
+        images = MirrorImages(mirror)
+        graph = None if self.graph is None else Graph(self.graph, shots_follow=shoots)
+        shots = None if self.shooting is None else Shots(self.shooting, mirror)
+        sources = (images, Relaxations(), graph, shots, images, ClosestApproach(graph))
+        proposing = [source for source in sources if source is not None]
+        return ExitRoad(problem, proposing, accuracy=self.accuracy, orbits=self.orbits)
 
 
 def _check_part(name: str, value: Any, kind: type) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -111,14 +111,16 @@ class GraphSearch(metaclass=Constructed):
         *_, best = self.solutions(problem)
         return best.bounded(problem)
 
-    def solutions(self, problem: ExitProblem, known: Callable[[], KnownPaths] | None = None) -> Iterator[GraphSolution]:
+    def solutions(
+        self, problem: ExitProblem, known: KnownPaths | None = None
+    ) -> Generator[GraphSolution, KnownPaths | None, None]:
         """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
         exit has few nodes for one that costs far less. So those that do are solved again without the others, or before
-        them if paths to them are known; what is known by then is yielded in between. `known` is called before each
-        number of nodes. If it is given, the last solution has twice the `nodes`, around the paths to exits that are not
-        settled then.
+        them if paths to them are known; what is known by then is yielded in between. If `known` is given, the last
+        solution has twice the `nodes`, around the paths to exits that are not settled then. What was found since is
+        sent in return for a solution that is the last one on its nodes.
         """
         attractor = problem.attractor
         self.check_noise(problem.osc)
@@ -135,7 +137,7 @@ class GraphSearch(metaclass=Constructed):
         shapes = [nodes for nodes in steps if known is not None or nodes[0] <= self.nodes[0]]
         costs = ExitCosts(search, self._findings(problem, shapes))
         for number, nodes in enumerate(shapes, start=1):
-            costs.finer, paths = len(shapes) - number, KnownPaths() if known is None else known()
+            costs.finer, paths = len(shapes) - number, known or KnownPaths()
             costs.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
             unsettled = [target for target in (*targets, *search.embedded_targets(paths)) if paths.needs(target)]
             # Grids for targets that are no farther than the own basin cover that basin alone.
@@ -150,7 +152,7 @@ class GraphSearch(metaclass=Constructed):
                     if costs.last_for_all and not costs.estimates:
                         raise
             if groups and costs.estimates:
-                yield costs.solution(nodes, last=True)
+                known = (yield costs.solution(nodes, last=True)) or known
 
     def beginnings(
         self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution

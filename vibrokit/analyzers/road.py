@@ -1,0 +1,254 @@
+"""ExitRoad: how the exits of one attractor are solved. Sources propose, polishing solves, the graph bounds."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+
+import xarray
+
+from vibrokit.analyzers.analyzer import Analysis
+from vibrokit.analyzers.evidence import Evidence, reached_through_others
+from vibrokit.analyzers.graph.known_paths import KnownPaths
+from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.paths import detailed_balance
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.mirror import Mirror
+from vibrokit.analyzers.polishing.path_solver import Effort
+from vibrokit.analyzers.polishing.polish import Polishing, Shared
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.search import Search
+from vibrokit.analyzers.sources import Graph, Shots, Source
+from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
+from vibrokit.progress import stage
+from vibrokit.results.codes import Code
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Finding
+from vibrokit.results.stoppable import Stoppable
+from vibrokit.structure.orbits import Orbit
+from vibrokit.structure.orbits_inside import orbits_inside
+from vibrokit.symbolic.flow_kind import Flow
+
+_LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
+
+
+class ExitRoad:
+    """The exits of one attractor: what is found by all sources, polished, and bounded by the graph among them.
+
+    Parameters
+    ----------
+    problem : ExitProblem
+    sources : sequence of Source
+        In the order in which they propose.
+    accuracy : float
+        The relative error of the graph that suffices.
+    orbits : int
+        Number of orbits inside a chaotic attractor that paths are polished from.
+    """
+
+    def __init__(
+        self, problem: ExitProblem, sources: Sequence[Source], *, accuracy: float = 0.1, orbits: int = 4
+    ) -> None:
+        self.problem, self.sources, self._accuracy, self._orbits = problem, sources, accuracy, orbits
+        self._graph = next((source for source in sources if isinstance(source, Graph)), None)
+        self._shots = next((source for source in sources if isinstance(source, Shots)), None)
+        self._mirror = Mirror(problem)
+        self._least = detailed_balance.least_actions(problem)
+        self._minima_sought = False  # whether paths that may attain the proven minima were proposed
+        self._polishings: list[Polishing] | None = None  # one for each orbit that paths leave; None before the first
+        self._cut = False  # whether a step was stopped
+        self._findings: list[Finding] = []
+
+    def run(self) -> Analysis:
+        """Propose, polish and bound, until the end, until all exits are proven, or until the work is stopped."""
+        first = [(source.name, self._taking(source)) for source in self.sources if not source.last_resort]
+        last = [(source.name, self._taking(source)) for source in self.sources if source.last_resort]
+        for name, step in (*first, ("graph", self._refine), *last, ("graph", self._begin_otherwise)):
+            with Stoppable(name, self.problem.source) as work:
+                step()
+            self._findings += work.findings
+            self._cut |= work.stopped
+            if self.stopped or (self._minima_sought and self._is_exact):
+                break
+        return self.analysis()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the work was stopped anywhere before its end."""
+        parts = (self._solution, self._search, *(self._polishings or ()))
+        return self._cut or not all(part.complete for part in parts if part is not None)
+
+    def revisit(self, known: tuple[ActivationEnergy, ...]) -> Analysis | None:
+        """Polish mirror images of paths that were found later, where they cost less than the own ones."""
+        self.problem = dataclasses.replace(self.problem, known=known)
+        self._mirror = Mirror(self.problem)
+        images = self._mirror.candidates(self._polished[0], cheaper=True)
+        if not images:
+            return None
+        self._polish(images, Effort.SHOOT)
+        return self.analysis()
+
+    def analysis(self) -> Analysis:
+        """Combine what was found."""
+        branches, polished = self._polished
+        if self._graph is not None and self._graph.solution is not None:
+            self._graph.solution = self._graph.solution.bounded(self.problem, self._evidence.cheapest.keys())
+        solution, evidence = self._solution, self._evidence
+        exits = evidence.compared(self._unpolished(evidence))
+        every = (*self._findings, *(() if solution is None else solution.findings), *polished)
+        findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
+        findings += (one.finding for one in exits)
+        if not exits and not self.stopped:
+            findings.append(Finding.of(Code.NO_EXIT_FOUND, self.problem.source))
+        return Analysis(
+            tuple(one.energy for one in exits),
+            xarray.Dataset() if solution is None else solution.dataset(),
+            tuple(finding for number, finding in enumerate(findings) if finding not in findings[:number]),
+            branches,
+            complete=not self.stopped,
+            revisit=self.revisit,
+        )
+
+    # --- propose and solve
+
+    def _taking(self, source: Source) -> Callable[[], None]:
+        """A step that polishes what a source proposes."""
+
+        def take() -> None:
+            found = self._asked(source, lambda: source.propose(self.problem, self._polished[0]))
+            self._findings += source.findings
+            if source.attains:
+                self._least = detailed_balance.with_paths(self.problem, self._least, found)
+                self._minima_sought = True
+            waiting = self._polishings is not None and source.effort > Effort.SHOOT  # candidates of sources before
+            if found or waiting:
+                self._polish(found, source.effort)
+
+        return take
+
+    def _asked(self, source: Source, propose: Callable[[], Iterable[Candidate]]) -> Sequence[Candidate]:
+        """What a source proposes; its error is a finding, unless nothing else searches and nothing is known."""
+        try:
+            return tuple(propose())
+        except (SceneError, StructureError, StepperError) as error:
+            alone = source.searches and not any(other.searches for other in self.sources if other is not source)
+            if alone and self._solution is None:
+                raise
+            self._failed(source.name, error)
+            return ()
+
+    def _polish(self, candidates: Sequence[Candidate], effort: Effort = Effort.FROM_ORBIT) -> None:
+        if self._polishings is None:
+            self._polishings = self._begun()
+        for polishing in self._polishings:
+            polishing.add(candidates, effort)
+            if self.stopped:
+                break
+
+    def _begun(self) -> list[Polishing]:
+        """A polishing from each orbit; none where that is impossible, for which a finding has the reason."""
+        found = list[Polishing]()
+        shared = Shared()
+        for orbit in (None,) if self.problem.attractor.repeats else self._orbits_inside():
+            try:
+                found.append(Polishing(self.problem, orbit, shared))
+            except (StructureError, StepperError) as error:
+                self._failed("polishing", error)
+        return found
+
+    def _orbits_inside(self) -> tuple[Orbit, ...]:
+        problem, attractor = self.problem, self.problem.attractor
+        if attractor.kind != "chaotic":
+            self._findings.append(Finding.of(Code.GRAPH_ONLY_SOURCE, problem.source, kind=attractor.kind))
+            return ()
+        stepper = problem.single_stepper(Flow.STATE_VARIATIONAL)
+        with stage("orbits inside the attractor"):
+            found = orbits_inside(problem.scene, attractor.points, stepper, self._orbits, _LONGEST_ORBIT)
+        periods = [orbit.period for orbit in found]
+        self._findings.append(Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods))
+        return found
+
+    # --- bound
+
+    def _refine(self) -> None:
+        """Solve the graph on more nodes until its error is as small as wanted."""
+        graph = self._graph
+        while graph is not None and not graph.searched and not self.stopped:
+            evidence = self._evidence
+            if graph.solution is not None and evidence.graph_error <= self._accuracy:
+                break
+            known = KnownPaths(self._polished[0], evidence.settled(self._accuracy))
+            before = graph.solution
+            found = self._asked(graph, lambda known=known: graph.finer(known))  # type: ignore[misc]
+            if graph.solution is not before:
+                self._polish(found)
+
+    def _begin_otherwise(self) -> None:
+        """Polish other beginnings of the cheapest path to each attractor, where paths compete that differ little."""
+        if self._graph is None or self._solution is None or not self.problem.attractor.repeats:
+            return
+        evidence = self._evidence
+        for target in sorted(evidence.cheapest.keys() - evidence.unresolvable - evidence.images.keys()):
+            with contextlib.suppress(StructureError):  # too close to the attractor for any grid
+                self._polish(self._graph.beginnings(self.problem, evidence.cheapest[target]))
+
+    # --- what is known
+
+    @cached_property
+    def _beyond(self) -> frozenset[int]:
+        return reached_through_others(self.problem)
+
+    @property
+    def _solution(self) -> GraphSolution | None:
+        return None if self._graph is None else self._graph.solution
+
+    @property
+    def _search(self) -> Search | None:
+        return None if self._shots is None else self._shots.search
+
+    @property
+    def _polished(self) -> tuple[tuple[ActivationEnergy, ...], tuple[Finding, ...]]:
+        """Branches, the cheapest first, and findings of all orbits."""
+        found = [polishing.polished() for polishing in self._polishings or ()]
+        branches = sorted((branch for each in found for branch in each.branches), key=lambda branch: branch.value)
+        return tuple(branches), tuple(finding for each in found for finding in each.findings)
+
+    @property
+    def _evidence(self) -> Evidence:
+        attractor, images, beyond = self.problem.attractor, self._mirror.energies, frozenset[int]()
+        rougher = None if self._graph is None else self._graph.rougher
+        if self._solution is not None:
+            beyond = self._beyond
+        return Evidence(attractor, self._polished[0], self._solution, rougher, images, tuple(self._least), beyond)
+
+    @property
+    def _is_exact(self) -> bool:
+        """Whether all exits attain the proven minimum."""
+        least = {each.target for each in self._least}
+        return bool(least) and least <= self._evidence.exact
+
+    def _unpolished(self, evidence: Evidence) -> tuple[ActivationEnergy, ...]:
+        """The action plot's energies of exits without a polished path; their errors take time, which may be over."""
+        wanted = {label for end in self.problem.path_ends for label in end.targets}
+        wanted |= {estimate.target for estimate in evidence.estimates}
+        wanted -= evidence.cheapest.keys()
+        wanted -= {each.target for each in self._least if each.bound is Bound.EXACT}
+        search = self._search
+        kept = () if search is None else tuple(one for one in search.branches if one.candidate.target in wanted)
+        if search is None or not kept:
+            return ()
+        shots = dataclasses.replace(search, branches=kept, complete=search.complete and not self.stopped)
+        try:
+            estimates, errors = shots.rated
+        except (StructureError, StepperError) as error:
+            self._failed("errors of the action plot", error)
+            return dataclasses.replace(shots, complete=False).estimates
+        self._findings += errors.findings
+        self._cut |= errors.stopped
+        return estimates
+
+    def _failed(self, method: str, error: VibrokitError) -> None:
+        """Note that a method could not be used."""
+        self._findings.append(Finding.of(Code.METHOD_FAILED, self.problem.source, method=method, reason=str(error)))

@@ -1,0 +1,195 @@
+"""Sources: what proposes exit paths of one attractor. Another one is a class with `propose`, in the list of a road."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Generator, Iterable, Sequence
+from typing import ClassVar
+
+from vibrokit.analyzers.graph.known_paths import KnownPaths
+from vibrokit.analyzers.graph.search import GraphSearch
+from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.paths import closest_approach, detailed_balance, reversed_relaxation, slow_relaxation
+from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.mirror import FINDER as MIRROR
+from vibrokit.analyzers.paths.mirror import Mirror
+from vibrokit.analyzers.paths.same_action import same_action
+from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.polishing.ends import pieces_of
+from vibrokit.analyzers.polishing.path_solver import Effort
+from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.shooting.search import Search
+from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.energy import ActivationEnergy, Bound
+from vibrokit.results.finding import Finding
+from vibrokit.symbolic.flow_kind import Flow
+
+
+class Source(ABC):
+    """Proposes exit paths. Abstract.
+
+    Attributes
+    ----------
+    name : str
+        Of the work, in findings.
+    searches : bool
+        Whether it looks everywhere. The error of the only source that does is an error of the road.
+    attains : bool
+        Whether its paths attain the proven minimum where detailed balance holds.
+    last_resort : bool
+        Whether it proposes after the graph was refined.
+    effort : Effort
+        The most effort of polishing, for its candidates and for all that led to no path so far.
+    findings : tuple of Finding
+        What else it has to say.
+    """
+
+    name: ClassVar[str]
+    searches: ClassVar[bool] = False
+    attains: ClassVar[bool] = False
+    last_resort: ClassVar[bool] = False
+    effort: Effort = Effort.SHOOT
+    findings: tuple[Finding, ...] = ()
+
+    @abstractmethod
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
+        """Return guesses of exit paths; `polished` are the paths that are known, the cheapest first."""
+
+
+class MirrorImages(Source):
+    """The mirror images of known paths, also of other attractors, in a scene whose forces are odd."""
+
+    name = MIRROR
+
+    def __init__(self, mirror: Mirror) -> None:
+        self._mirror = mirror
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
+        """Return those that are new."""
+        return self._mirror.candidates(polished)
+
+
+class Relaxations(Source):
+    """Relaxations run backwards, to an equilibrium or under slow forcing."""
+
+    name = reversed_relaxation.FINDER
+    attains = True
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
+        """Return those to an equilibrium, exact where detailed balance holds, or those under slow forcing."""
+        with stage(self.name, subject=problem.attractor.name, unit=TRAJECTORIES):
+            stepper = problem.single_stepper(Flow.STATE)
+            propagator = SegmentPropagator(problem.scene, stepper, max(pieces_of(problem.scene)))
+            found = reversed_relaxation.reversed_relaxations(problem, propagator)
+            slow = slow_relaxation.slow_relaxations(problem, propagator)
+        if found:
+            least = detailed_balance.least_actions(problem)
+            exact = bool(least) and all(each.bound is Bound.EXACT for each in least)
+            self.effort = Effort.JOIN if exact else Effort.FROM_ORBIT
+        return [*found, *slow]
+
+
+class Graph(Source):
+    """The graph, on the fewest nodes first. It bounds the energies as well.
+
+    Attributes
+    ----------
+    solution : GraphSolution or None
+        What is known so far.
+    rougher : GraphSolution or None
+        The last solution on half as many nodes along each side.
+    searched : bool
+        Whether there are no more nodes to take.
+    """
+
+    name = "graph"
+    searches = True
+
+    def __init__(self, settings: GraphSearch, *, shots_follow: bool) -> None:
+        self._settings = settings
+        self.effort = Effort.SHOOT if shots_follow else Effort.FROM_ORBIT
+        self._solutions: Generator[GraphSolution, KnownPaths | None, None] | None = None
+        self.solution: GraphSolution | None = None
+        self.rougher: GraphSolution | None = None
+        self.searched = False
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
+        """Return paths on the fewest nodes."""
+        self._solutions = self._settings.solutions(problem, KnownPaths(polished))
+        return self.finer(None)
+
+    def finer(self, known: KnownPaths | None) -> Sequence[Candidate]:
+        """Return paths on the next number of nodes; `known` is what was found since the last.
+
+        Raises
+        ------
+        StructureError
+            No exit was reached so far on any number of nodes.
+        """
+        assert self._solutions is not None
+        before, solved = self.solution, False
+        try:
+            while not solved:
+                found = next(self._solutions) if known is None else self._solutions.send(known)
+                known = None
+                if before is not None and before.finer > found.finer:
+                    self.rougher = before
+                self.solution, solved = found, found.last
+        except StopIteration:
+            self.searched = True
+        except Exception:
+            self.searched = True
+            raise
+        return () if self.solution is None or self.solution is before else self.solution.candidates
+
+    def beginnings(self, problem: ExitProblem, path: ActivationEnergy) -> Sequence[Candidate]:
+        """Return other beginnings of a path; raises StructureError where it is too short for any grid."""
+        return () if self.solution is None else self._settings.beginnings(problem, path, self.solution)
+
+
+class Shots(Source):
+    """Shooting; not where mirror images of known paths were polished.
+
+    Attributes
+    ----------
+    search : Search or None
+        What was found.
+    """
+
+    name = "action plot"
+    searches = True
+    effort = Effort.FROM_ORBIT
+
+    def __init__(self, settings: Shooting, mirror: Mirror) -> None:
+        self._settings, self._mirror = settings, mirror
+        self.search: Search | None = None
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
+        """Shoot from an orbit or an equilibrium; from other motion there is nothing to shoot from."""
+        images = self._mirror.energies
+        mirrored = (each.target in images and same_action(each.value, images[each.target].value) for each in polished)
+        if not problem.attractor.is_fixed or any(mirrored):
+            return ()
+        self.search = self._settings.search(problem)
+        self.findings = self.search.findings
+        self.effort = Effort.FROM_ORBIT if self.search.complete else Effort.SHOOT
+        return self.search.candidates
+
+
+class ClosestApproach(Source):
+    """Where a chaotic attractor comes nearest to a saddle, for exits that the graph gives no path to."""
+
+    name = closest_approach.FINDER
+    last_resort = True
+    effort = Effort.FROM_ORBIT
+
+    def __init__(self, graph: Graph | None) -> None:
+        self._graph = graph
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
+        """Return one for each saddle at most."""
+        solution = None if self._graph is None else self._graph.solution
+        reached = set() if solution is None else {candidate.target for candidate in solution.candidates}
+        with stage(self.name, subject=problem.attractor.name):
+            return [each for each in closest_approach.closest_approaches(problem) if each.target not in reached]
