@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 import vibrokit as vk
 from vibrokit.errors import StructureError
+from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import equilibrium_exponents, find_cycle, refine_cycle
 
 VAN_DER_POL = vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=1.0)
@@ -129,6 +130,13 @@ def test_exponents_of_the_linear_oscillator(damping_ratio, frequency):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 
+def test_exponents_at_critical_damping():
+    # A double eigenvalue is known to the root of the rounding error; sum and product of both as well as ever.
+    found = equilibrium_exponents(vk.Oscillator(natural_frequency=2.0, damping_ratio=1.0), np.zeros(2))
+    np.testing.assert_allclose(found, [-2.0, -2.0], atol=1e-5)
+    assert (found.sum(), found.prod()) == (pytest.approx(-4.0, rel=1e-11), pytest.approx(4.0, rel=1e-11))
+
+
 def test_exponents_at_rest_on_a_very_stiff_stop():
     stiffness = 1e12
     stop = vk.Barrier(vk.Linear(stiffness=stiffness), position=0.0, side="right")
@@ -158,6 +166,14 @@ def test_what_is_no_cycle_is_refused():
         find_cycle(van_der_pol(), np.array([0.5, 0.0]), vk.RK4(256), longest=3.0)
     with pytest.raises(StructureError, match="not an equilibrium"):
         equilibrium_exponents(van_der_pol(), np.array([0.5, 0.0]))
+
+
+def test_a_cycle_that_finer_steps_do_not_have_is_described_with_an_infinite_error():
+    """x″ + v(0.08 x² − 0.04 x⁴ − 2ζ) + x = 0 has cycles for ζ < 0.01; eight steps a turn damp by θ⁵/144 = 0.002."""
+    spring = vk.CustomSpring("x + v*(0.08*x**2 - 0.04*x**4 - 2*z)", z=0.011)
+    osc, coarse = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=spring), vk.RK4(8)
+    described = describe_orbit(osc, cycle := find_cycle(osc, np.array([1.2, 0.0]), coarse, longest=20.0), coarse)
+    assert (described.kind, described.error, described.residual) == ("limit cycle", np.inf, cycle.residual)
 
 
 def test_forced_scenes_are_refused():
