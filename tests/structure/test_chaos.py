@@ -199,6 +199,11 @@ def test_starts_that_converge_slowly_do_not_count():
     assert abs(lifetime - 500) < 3 * error
 
 
+def test_no_decay_is_seen_where_none_settled():
+    for settled_after in (np.full(10, -1), np.array([], dtype=np.int64)):
+        assert fit_decay(settled_after, 1000) == (np.inf, np.inf)
+
+
 def arrival(orbits):
     return arrival_at(dict(enumerate(orbits)), np.array([1e-3, 1e-3]))
 
