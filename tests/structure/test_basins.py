@@ -281,6 +281,19 @@ def test_attractors_own_their_places_on_any_grid(scene, cells, request):
     assert Code.ATTRACTOR_LOST not in {finding.code for finding in grid.findings}
 
 
+def test_an_attractor_in_a_large_grid_is_found_by_splitting_few_cells():
+    """A well at x = 1 that is narrower than a cell: those around it are split, and the others keep their labels."""
+    spring = vk.CustomSpring("x + 500*(x - 1)*exp(-((x - 1)/w)**2)", w=0.01)
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=spring)
+    places = [(0.0, 0.0), (0.9979155389726735, 0.0)]  # the second by Brent's method
+    grid = BasinGrid(classifier(osc, places, ((-2, 2), (-2, 2)), settling=1e-4, stepper=vk.RK4(512)), (80, 80))
+    labels, seen = interrupted(grid, math.inf)
+    assert [finding.code for finding in grid.findings] == [Code.GRID_REFINED]
+    assert (labels.shape, grid.basins.at(np.array(places)).tolist()) == ((160, 160), [0, 1])
+    kept = next(update.done for update in seen if update.stage == "basins of lost attractors" and update.done)
+    assert 0.9 * labels.size < kept < labels.size
+
+
 def test_executors_carry_the_work_to_the_same_labels(duffing):
     points = [a.points for a in duffing.attractors]
     expected = classify_grid(duffing, (70, 70)).labels
