@@ -168,6 +168,17 @@ def test_the_stable_manifold_is_the_boundary_of_the_basins(scene):
 
 
 @SCENES
+def test_images_of_a_branch_lie_on_it(scene):
+    """By the stepper that grew it, to what chords of this length and bend are off: chord · angle/8."""
+    osc, _, _, branches = scene()
+    width = np.diff(np.array(WIDE if scene is duffing else SQUARE))[0, 0]
+    for branch in branches[2:]:
+        nodes = branch.curve[: len(branch.curve) // 2 : 20]
+        images = run_ensemble(osc, Flow.STATE, vk.RK4(1024), nodes).states
+        assert distances(images, branch.curve).max() < 0.01 * 0.2 / 8 * width
+
+
+@SCENES
 def test_chords_and_angles_keep_their_bounds(scene):
     width = np.diff(np.array(WIDE if scene is duffing else SQUARE))[0, 0]
     for branch in scene()[3]:
@@ -186,6 +197,24 @@ def test_the_arc_length_asked_for(length):
     osc, point, _, _ = duffing()
     for branch in grow_manifolds(osc, 0, saddle(point), region=WIDE, arc_length=length, stable=(True,)):
         assert branch.arc_length == pytest.approx(length, rel=1e-9)
+
+
+def test_a_finer_curve_lies_within_what_the_coarser_one_claims():
+    osc, point, _, coarse = duffing()
+    fine = list(grow_manifolds(osc, 0, saddle(point), region=WIDE, spacing=0.005, bend=0.1))
+    for one, other in zip(coarse, fine, strict=True):
+        assert len(other.curve) > 1.3 * len(one.curve)
+        assert distances(one.curve[:-1:7], other.curve).max() < 0.005 * 0.1 / 8 * 6.0
+        middles = 0.5 * (one.curve[1:] + one.curve[:-1])[::7]
+        assert distances(middles, other.curve).max() < (0.01 * 0.2 + 0.005 * 0.1) / 8 * 6.0
+
+
+@pytest.mark.slow
+def test_another_stepper_finds_the_same_curve():
+    osc, point, _, branches = paper()
+    exact = list(grow_manifolds(osc, 0, saddle(point), region=SQUARE, stepper=vk.FreeFlight(1e-8), arc_length=3.0))
+    for one, other in zip(exact, branches, strict=True):
+        assert np.quantile(distances(one.curve[::5], other.curve), 0.95) < 5e-4
 
 
 @pytest.mark.slow
