@@ -261,6 +261,22 @@ def test_the_chaotic_attractor_lasts(hammered, steps):
     assert len(separate(samples, 1e-3)) == 1
 
 
+def test_too_coarse_a_stepper_loses_it(hammered):
+    osc, states = hammered
+    survival, _ = watch(osc, states, arrival([CLEAR, HAMMERING]), vk.RK4(256), longest=30000)
+    assert survival.survivors == 0
+
+
+def test_exact_flight_and_fixed_steps_agree_on_its_exponent(hammered):
+    osc, states = hammered
+    stepper = vk.RK4(2048)
+    _, left = watch(osc, states, arrival([CLEAR, HAMMERING]), stepper, longest=3000)
+    fixed = lyapunov_exponent(osc, left, stepper, periods=300)
+    exact = lyapunov_exponent(osc, left[:8], vk.FreeFlight(1e-9), periods=500)
+    assert kind_of(fixed) == kind_of(exact) == "chaotic"
+    assert abs(fixed.value - exact.value) < 3 * np.hypot(fixed.error, exact.error)
+
+
 # --- groups ---
 
 
