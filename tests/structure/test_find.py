@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import vibrokit as vk
+from tests.scenes import double_well
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
 from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
@@ -124,6 +125,13 @@ def test_a_limit_cycle():
     assert cycle.points[0, 0] == pytest.approx(2.0086198608748431, abs=1e-9)
     assert cycle.basin_fraction == 1.0
     assert np.sort(np.abs(cycle.multipliers))[-1] == pytest.approx(1.0, abs=1e-8)
+
+
+@pytest.mark.slow
+def test_a_scene_whose_noise_depends_on_the_state():
+    osc = double_well(noise=vk.StateDependentNoise(0.01, "1 + c*x**2", c=0.5))
+    wells = vk.find_structure(osc, cells=(20, 20), starts=(8, 8)).attractors
+    assert sorted(well.points[0, 0] for well in wells) == pytest.approx([-1, 1], abs=1e-9)
 
 
 def test_what_escapes_is_said_to_have_left():
