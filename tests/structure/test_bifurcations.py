@@ -11,6 +11,7 @@ from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.parameter_values import parameter_line
+from vibrokit.structure.tracing.branches import Tracing
 from vibrokit.structure.tracing.following import follow
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -195,6 +196,28 @@ def test_at_a_period_doubling_a_multiplier_is_minus_one():
     multipliers = np.linalg.eigvals(hertz_map(state, found.value)[1])
     assert multipliers.real.min() == pytest.approx(-1.0, abs=1e-6)
     assert np.prod(multipliers) == pytest.approx(math.exp(-0.02 * 2 * math.pi / found.value), rel=1e-7)
+
+
+def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
+    osc = vk.load_scene("hertz-0.570")
+    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
+    found = []
+    for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
+        there = osc.replace({FREQUENCY: frequency})
+        found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
+    tracing = Tracing(osc, parameter_line("test", osc, FREQUENCY), [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
+    tracing.run()
+    assert tracing.numbered == [[0], [0]]
+    doublings = {one.period: one for _, one in tracing.located if one.kind == "period doubling"}
+    assert set(doublings) == {1, 2}
+    assert 0.525 < doublings[2].value < doublings[1].value < 0.57
+    # That the orbit of period 2 has a multiplier −1 where it doubles, SciPy says.
+    state, derivative = doublings[2].point, np.eye(2)
+    for _ in range(2):
+        state, over_one = hertz_map(state, doublings[2].value)
+        derivative = over_one @ derivative
+    np.testing.assert_allclose(state, doublings[2].point, atol=1e-8)
+    assert np.linalg.eigvals(derivative).real.min() == pytest.approx(-1.0, abs=1e-6)
 
 
 def duffing_fold(frequency, sines):

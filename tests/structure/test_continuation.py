@@ -10,15 +10,9 @@ from scipy import stats
 
 import vibrokit as vk
 from vibrokit.errors import ParameterError, StructureError
-from vibrokit.kernels.choice import single_stepper
 from vibrokit.results.codes import Code
 from vibrokit.structure import searched_value as module
-from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.continuation import continuation
-from vibrokit.structure.orbits import refine_orbit
-from vibrokit.structure.parameter_values import parameter_line
-from vibrokit.structure.tracing.branches import Tracing
-from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
 
@@ -116,21 +110,6 @@ def test_an_attractor_that_the_search_missed_is_found_from_its_neighbour(monkeyp
     assert finding.values["count"] == 1
     # Both codes that the basin fractions of this case are known from say 0.571 and 0.429 on this region.
     assert sorted([kept.basin_fraction, added.basin_fraction]) == pytest.approx([0.429, 0.571], abs=0.02)
-
-
-def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
-    osc = vk.load_scene("hertz-0.570")
-    stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    found = []
-    for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
-        there = osc.replace({FREQUENCY: frequency})
-        found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
-    tracing = Tracing(osc, parameter_line("test", osc, FREQUENCY), [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
-    tracing.run()
-    assert tracing.numbered == [[0], [0]]
-    doublings = {one.period: one for _, one in tracing.located if one.kind == "period doubling"}
-    assert set(doublings) == {1, 2}
-    assert 0.525 < doublings[2].value < doublings[1].value < 0.57
 
 
 def test_wells_meet_in_a_pitchfork():
