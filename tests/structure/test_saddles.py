@@ -281,6 +281,10 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
         assert (set_.period, set_.leads_to) == (0, (0, 1))
         assert len(set_.points) > 50
         assert set_.exponents[0].real == chaotic[0].values["exponent"] > 0.1  # a factor e in less than 1.5 periods
+        # Motions on it follow the map, to what 60 · 1e-10 widths grow to on the hilltop in a period, but for the joins.
+        images = osc.section_map(set_.points[:-1], stepper=ensemble_stepper(osc, Flow.STATE))
+        jumps = np.linalg.norm(images - set_.points[1:], axis=1) > 1e-4
+        assert jumps.sum() < chaotic[0].values["count"]
         # The scene is its own mirror image half a period later: so are its saddles.
         np.testing.assert_allclose(named[0].multipliers, named[1].multipliers, rtol=1e-8)
     else:
