@@ -8,8 +8,8 @@ import scipy.linalg
 
 import vibrokit as vk
 from vibrokit.analyzers.paths.local_potential import Phase, local_potential, potential_along
-from vibrokit.analyzers.shooting.boxes import Boxes
-from vibrokit.analyzers.shooting.domain import FundamentalDomain, on_sphere, shells_of
+from vibrokit.analyzers.shooting.boxes import Boxes, nearest
+from vibrokit.analyzers.shooting.starts import FundamentalDomain, on_sphere, shells_of
 from vibrokit.structure.orbits import refine_orbit
 
 PERIOD, PHASES, RADIUS = 2 * math.pi / 0.57, 16, 1e-3
@@ -29,6 +29,13 @@ def domain(damping):
     step = PERIOD / PHASES
     phases = [Phase(step * k, np.array([0.3, -0.2]), covariance(damping), flow(damping, step)) for k in range(PHASES)]
     return FundamentalDomain(shells_of(phases), RADIUS, 0.01, 1.0)
+
+
+def fractions_of(shell, states):
+    """Where states lie between the edges, in fractions of their logarithmic distance; in [0, 1) inside the shell."""
+    place = np.linalg.solve(shell.root, (states[:, :2] - shell.point).T)
+    length, before = np.linalg.norm(place, axis=0), np.linalg.norm(shell.back @ place, axis=0)
+    return np.log(length / RADIUS) / np.log(length / before)
 
 
 def growth(damping, duration):
@@ -60,7 +67,7 @@ def test_each_orbit_enters_once(damping):
     entered = np.zeros(200, dtype=int)
     for k in range(-back, ahead):
         shell = made.shells[k % count]
-        fractions = shell.fractions(shell.point + (growth(damping, k * step) @ paths).T, RADIUS)
+        fractions = fractions_of(shell, shell.point + (growth(damping, k * step) @ paths).T)
         entered += (fractions >= 0) & (fractions < 1)
     np.testing.assert_array_equal(entered, 1)
 
@@ -72,7 +79,7 @@ def test_the_outer_edge_is_the_image_of_the_inner(damping):
     angle = np.linspace(0, 2 * np.pi, 50)
     inner = RADIUS * np.stack([np.cos(angle), np.sin(angle)]).T @ root.T
     image = inner @ growth(damping, PERIOD / len(made.shells)).T
-    fractions = made.shells[0].fractions(made.shells[0].point + image, RADIUS)
+    fractions = fractions_of(made.shells[0], made.shells[0].point + image)
     np.testing.assert_allclose(fractions, 1.0, rtol=1e-9)
     stiffness = np.linalg.inv(covariance(damping))
     assert np.all(np.einsum("ij,jk,ik->i", image, stiffness, image) > RADIUS**2)
@@ -88,7 +95,7 @@ def test_starts_lie_where_their_places_say(damping):
     np.testing.assert_allclose(states[:, 4], 2 * damping * np.sum(offset**2, axis=1), rtol=1e-9)
     for number, shell in enumerate(made.shells):
         here = times == shell.time
-        fractions = (number + shell.fractions(states[here], RADIUS)) / len(made.shells)
+        fractions = (number + fractions_of(shell, states[here])) / len(made.shells)
         np.testing.assert_allclose(fractions, places[here, 1], atol=1e-9)
 
 
@@ -146,5 +153,5 @@ def test_boxes_cover_the_cube_and_close_in_on_a_least_value():
 def test_neighbours_meet_across_the_start_of_the_circle():
     boxes = Boxes.grid((12, 3))
     first = int(np.argmin(np.abs(boxes.centres - [0.5 / 12, 0.5]).sum(axis=1)))
-    near = boxes.centres[boxes.neighbours()[first]]
+    near = boxes.centres[nearest(boxes.centres, boxes.first)[first]]
     assert np.isclose(near[:, 0], 11.5 / 12).any()

@@ -8,8 +8,6 @@ import pytest
 from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN
 
-COUNT = 5000
-
 
 class Knowing(Shooter):
     """Settles paths by what is known of them, and counts them."""
@@ -23,17 +21,17 @@ class Knowing(Shooter):
         outcomes.status[which[~self.exits[which]]] = COMPLETED
 
 
-def confirmed(share, seed, factor):
-    """Actions from 1 to 10; a share of the paths, chosen at random, are no exits."""
-    generator = np.random.default_rng(seed)
-    states = np.zeros((COUNT, 5))
-    states[:, -1] = generator.uniform(1.0, 10.0, COUNT)
-    whole = np.zeros(COUNT, dtype=np.int64)
-    unknown = np.zeros(COUNT, dtype=bool)
+def confirmed(actions, exits, factor):
+    """Confirm paths, of which some are exits."""
+    count = len(exits)
+    states = np.zeros((count, 5))
+    states[:, -1] = actions
+    whole = np.zeros(count, dtype=np.int64)
+    unknown = np.zeros(count, dtype=bool)
     outcomes = Outcomes(states, whole, states, whole + LEFT_BASIN, whole, whole, unknown, whole.copy())
     problem = SimpleNamespace(exit=SimpleNamespace(by_position=False), structure=SimpleNamespace(attractors=[None]))
     shooter = Knowing(problem, None, 0)
-    object.__setattr__(shooter, "exits", generator.random(COUNT) > share)
+    object.__setattr__(shooter, "exits", exits)
     shooter.confirm(outcomes, factor)
     return shooter, outcomes
 
@@ -41,9 +39,18 @@ def confirmed(share, seed, factor):
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 @pytest.mark.parametrize("factor", [1.0, 1.5])
 def test_exits_up_to_a_factor_are_confirmed_and_few_others_settle(share, factor):
-    shooter, outcomes = confirmed(share, 0, factor)
-    least = outcomes.actions[shooter.exits].min()
-    wanted = shooter.exits & ((outcomes.actions < factor * least) | (outcomes.actions == least))
+    generator = np.random.default_rng(0)
+    actions, exits = generator.uniform(1.0, 10.0, 5000), generator.random(5000) > share
+    shooter, outcomes = confirmed(actions, exits, factor)
+    least = actions[exits].min()
+    wanted = exits & ((actions < factor * least) | (actions == least))
     assert outcomes.confirmed[wanted].all()
-    assert shooter.exits[outcomes.confirmed].all()
-    assert shooter.settled < COUNT / 2
+    assert exits[outcomes.confirmed].all()
+    assert shooter.settled < len(exits) / 2
+
+
+def test_an_exit_is_found_behind_many_cheaper_paths_that_are_none():
+    actions = np.linspace(1.0, 10.0, 200_000)
+    exits = actions == 10.0
+    _, outcomes = confirmed(actions, exits, 1.0)
+    np.testing.assert_array_equal(outcomes.confirmed, exits)

@@ -43,7 +43,7 @@ from hamiltonian_ensemble import (
 
 import vibrokit as vk
 from vibrokit.analyzers.paths.local_potential import local_potential
-from vibrokit.analyzers.shooting.outcomes import default_budget, growing_time
+from vibrokit.analyzers.shooting.shooting import default_effort
 from vibrokit.analyzers.shooting.starts import Ring
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.structure.orbits import refine_orbit
@@ -211,8 +211,7 @@ def main() -> None:
             ring = Ring(orbit.point, local_potential(SCENE, orbit, vk.RK4(STEPS)), RADIUS)
             starts, _ = ring.states(np.arange(options.points)[:, None] / options.points)
             stop = vk.LeaveBasin().stop(SCENE, structure, source)
-            slowest = float(np.abs(attractor.multipliers).max())
-            budget = default_budget(growing_time(slowest, attractor.period, 1 / RADIUS))
+            budget, _ = default_effort(attractor, 1 / RADIUS)
             ours = {OURS: generated(stop, budget, pool)}
             scalars = {
                 f"{SCALAR}, {slopes.__name__}": scalar(slopes, stop, budget)

@@ -35,6 +35,11 @@ class ActionPlot(Shooting, Analyzer):
         if problem.at_exit:
             return at_exit(problem, FINDER, Bound.UPPER)
         found = self.search(problem)
-        estimates, errors = found.rated
-        findings, complete = (*found.findings, *errors.findings), found.complete and not errors.stopped
-        return Analysis(estimates, found.shots.dataset(), findings, found.energies, complete)
+        energies, errors = found.energies()
+        return Analysis(
+            tuple(energies[branch] for branch in found.best),
+            found.shots.dataset(),
+            (*found.findings, *errors.findings),
+            tuple(energies.values()),
+            complete=found.complete and not errors.stopped,
+        )

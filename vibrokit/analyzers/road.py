@@ -236,18 +236,18 @@ class ExitRoad:
         wanted -= evidence.cheapest.keys()
         wanted -= {each.target for each in self._least if each.bound is Bound.EXACT}
         search = self._search
-        kept = () if search is None else tuple(one for one in search.branches if one.candidate.target in wanted)
+        kept = () if search is None else tuple(one for one in search.best if one.candidate.target in wanted)
         if search is None or not kept:
             return ()
         shots = dataclasses.replace(search, branches=kept, complete=search.complete and not self.stopped)
         try:
-            estimates, errors = shots.rated
+            energies, errors = shots.energies()
         except (StructureError, StepperError) as error:
             self._failed("errors of the action plot", error)
-            return dataclasses.replace(shots, complete=False).estimates
+            energies, errors = dataclasses.replace(shots, complete=False).energies()
         self._findings += errors.findings
         self._cut |= errors.stopped
-        return estimates
+        return tuple(energies.values())
 
     def _failed(self, method: str, error: VibrokitError) -> None:
         """Note that a method could not be used."""

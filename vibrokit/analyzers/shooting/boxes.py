@@ -11,16 +11,15 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-_FINEST = 26  # splits: 3^−26 of a first box is at the level of rounding
+FINEST = 26
+"""Most splits of a box: 3^−26 of a side is at the level of rounding."""
+
 _ROUNDING = 1e-12
-_JUMP = 1.5  # ratio of neighbouring values that counts as a jump; smooth branches vary less between boxes
-_ACROSS = 3  # boxes: one and its neighbours
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -41,18 +40,14 @@ class Boxes:
         centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(counts))
         return cls(centres, np.zeros(len(centres), dtype=np.int64), 1 / np.array(counts))
 
-    def around(self, index: int, counts: Sequence[int]) -> Boxes:
-        """Return unsplit boxes that cover the first-grid box that contains a given box, and its neighbours.
-
-        `counts` are their numbers along each side in 1, 2, … dimensions; the last one holds for all higher dimensions.
-        """
+    def around(self, index: int) -> Boxes:
+        """Return some hundred unsplit boxes that cover the first grid's box around a centre, and its neighbours."""
         size = len(self.first)
-        count = counts[min(size, len(counts)) - 1]
-        offsets = Boxes.grid((count,) * size).centres - 0.5
-        centres = self.centres[index] + _ACROSS * self.first * offsets
+        count = {1: 200, 2: 25}.get(size, 7)  # along each side, so that few dimensions are resolved well
+        centres = self.centres[index] + 3 * self.first * (Boxes.grid((count,) * size).centres - 0.5)
         centres[:, 0] %= 1.0
         centres[:, 1:] = np.clip(centres[:, 1:], 0.0, 1.0 - _ROUNDING)
-        return Boxes(centres, np.zeros(len(centres), dtype=np.int64), _ACROSS * self.first / count)
+        return Boxes(centres, np.zeros(len(centres), dtype=np.int64), 3 * self.first / count)
 
     def split(self, which: Whole) -> Boxes:
         """Split some boxes; each keeps its place with a third of its sides, and the new ones come last."""
@@ -67,20 +62,17 @@ class Boxes:
             np.concatenate([self.centres, new]), np.append(splits, splits[which].repeat(len(steps))), self.first
         )
 
-    def neighbours(self) -> Whole:
-        """Return each box's neighbours, itself included: as many as in a regular grid."""
-        return nearest(self.centres, self.first)
-
     def promising(self, values: Array, kinds: Whole, count: int) -> Whole:
         """Return about `count` boxes to split: of each size, those with the least values in their neighbourhoods.
 
         Half of them are taken where neighbours differ in kind or by a jump in value, because nothing else reveals a
-        narrow exit path between two plateaus. Values (boxes,) are infinite where nothing is known.
+        narrow exit path between two plateaus. A jump is a ratio above 1.5: smooth branches vary less between boxes.
+        Values (boxes,) are infinite where nothing is known.
         """
-        near = self.neighbours()
+        near = nearest(self.centres, self.first)
         reachable, highest = values[near].min(axis=1), values[near].max(axis=1)
-        jumps = (highest > _JUMP * reachable) | (kinds[near] != kinds[:, None]).any(axis=1)
-        eligible = np.isfinite(reachable) & (self.splits < _FINEST)
+        jumps = (highest > 1.5 * reachable) | (kinds[near] != kinds[:, None]).any(axis=1)
+        eligible = np.isfinite(reachable) & (self.splits < FINEST)
         sizes = np.unique(self.splits[eligible])
         chosen = []
         for splits in sizes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from functools import cached_property
 
 import numpy as np
@@ -17,14 +16,6 @@ from vibrokit.progress import stage
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.symbolic.flow_kind import Flow
-
-# Exits are confirmed from the cheapest on, in batches: most are never needed, and one at a time would be slow.
-_BATCHES = 40
-_BATCH = 256
-_PARTS = 8
-_PATIENCE = 4.0  # times the time in which linear growth takes a path to the exit
-_LEAST_BUDGET = 100
-_SHORT = 512  # part of a path's tests that is left out before it is tested again
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -41,7 +32,7 @@ class Outcomes:
     checks: Whole  # (count,): exit tests from the first section to the end
     targets: Whole  # (count,): label of the exit's cell, or once confirmed what is reached; −1 if unknown
     confirmed: NDArray[np.bool_]  # (count,): whether the path certainly exits
-    returns: Whole  # (count,): how often the motion without noise settled on no target from where it seemed to exit
+    returns: Whole  # (count,): how many apparent exits led, without noise, to an attractor that is no target
 
     @property
     def actions(self) -> Array:
@@ -49,9 +40,9 @@ class Outcomes:
         return self.states[:, -1]
 
     def least(self, targets: int) -> Array:
-        """Return the least confirmed action of each of some targets, escape and the unknown one last; infinite if none.
+        """Return the least confirmed action by target, infinite without one.
 
-        So the labels of these two, −2 and −1, are indices too.
+        The last two are those of escape and of unknown targets, so that their labels, −2 and −1, are indices too.
         """
         least = np.full(targets + 2, np.inf)
         np.minimum.at(least, self.targets[self.confirmed], self.actions[self.confirmed])
@@ -82,24 +73,20 @@ class Shooter:
         )
 
     def confirm(self, outcomes: Outcomes, factor: float = 1.0) -> None:
-        """Confirm exits, in place: the cheapest ones until the best one to each target is certain, then all others.
+        """Confirm exits, in place, until all below `factor` times the least action of their target are certain.
 
-        These are the exits up to `factor` times the least action of their target; they settle all at once, because a
-        few take as long as many.
+        First the cheapest ones settle in batches until the best one to each target is certain, because most of them
+        are never needed; then all others up to `factor` settle at once, because a few take as long as many. This ends:
+        each exit settles for good, or goes on and spends its budget.
         """
         for up_to in sorted({1.0, factor}):
-            for _ in range(_BATCHES):
-                doubtful = self._doubtful(outcomes, up_to)
-                if not len(doubtful):
-                    break
+            while len(doubtful := self._doubtful(outcomes, up_to)):
                 ranked = doubtful[np.argsort(outcomes.actions[doubtful], kind="stable")]
-                some = max(_BATCH, len(ranked) // _PARTS) if up_to == 1.0 else len(ranked)
+                some = max(256, len(ranked) // 8) if up_to == 1.0 else len(ranked)
                 self._settle(outcomes, ranked[:some])
 
     def _doubtful(self, outcomes: Outcomes, factor: float) -> Whole:
         """Return the exits below `factor` times the least action of their target that are not confirmed."""
-        if self.problem.exit.by_position:
-            return np.empty(0, dtype=np.int64)
         open_ = np.flatnonzero(np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION)) & ~outcomes.confirmed)
         least = outcomes.least(len(self.problem.structure.attractors))
         ceilings = factor * np.append(least[:-1], least.min())
@@ -124,17 +111,13 @@ class Shooter:
         outcomes.status[which[~exits & (reached == ESCAPED)]] = DIVERGED
         again = which[returned]
         left = np.maximum(self.budget * self.problem.checks - outcomes.checks[again], 0)
-        untested = np.minimum(self._burst * 2 ** outcomes.returns[again] - 1, left)
+        burst = max(1, self.budget * self.problem.checks // 512)  # few tests against all of a path
+        untested = np.minimum(burst * 2 ** outcomes.returns[again] - 1, left)
         beyond = self._integrated(states[returned], untested, Stop())
         more = self._integrated(beyond.states, left - untested, self._stop)
         outcomes.states[again], outcomes.status[again], outcomes.targets[again] = more.states, more.status, more.label
         outcomes.checks[again] += untested + more.intervals
         outcomes.returns[again] += 1
-
-    @property
-    def _burst(self) -> int:
-        """Exit tests that are left out first where a path returns, few against all of its tests."""
-        return max(1, self.budget * self.problem.checks // _SHORT)
 
     @cached_property
     def _classifier(self) -> BasinClassifier:
@@ -173,16 +156,3 @@ class Shooter:
                 osc, Flow.HAMILTONIAN, self.stepper, starts[here], start_time=unit - rest, interval=float(rest)
             ).states
         return begun, section
-
-
-def growing_time(slowest: float, period: int, growth: float) -> float:
-    """Return in how many section intervals deviations grow by a factor.
-
-    `slowest` is the absolute value of the orbit's largest multiplier over its period, in section intervals.
-    """
-    return -max(0.0, math.log(growth)) * period / math.log(max(slowest, 1e-12))
-
-
-def default_budget(intervals: float) -> int:
-    """Return for how many section intervals a path is followed, given the time in which linear growth takes it out."""
-    return _LEAST_BUDGET + math.ceil(_PATIENCE * intervals)

@@ -10,25 +10,17 @@ import numpy as np
 
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.boxes import Boxes
-from vibrokit.analyzers.shooting.domain import fitted_domain
-from vibrokit.analyzers.shooting.outcomes import Shooter, default_budget, growing_time
+from vibrokit.analyzers.shooting.outcomes import Shooter
 from vibrokit.analyzers.shooting.search import FINDER, Search
 from vibrokit.analyzers.shooting.shots import Shots
-from vibrokit.analyzers.shooting.starts import Ring, Starts
+from vibrokit.analyzers.shooting.starts import Ring, Starts, fitted_domain
 from vibrokit.arguments import real, whole
 from vibrokit.construction import Constructed
 from vibrokit.errors import StructureError, shown
-from vibrokit.kernels.stepper import Stepper
 from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.symbolic.flow_kind import Flow
-
-_MOST_PERIODS = 10**8
-_MOST_POINTS = 10**7  # some GiB of starts and outcomes
-_MOST_ROUNDS = 1000
-# On weakly damped scenes a quarter of the starts led to the same paths without stops, and between stops to paths that
-# cost up to a tenth more. All intervals take about 2.5 s on two processors.
-_STARTS, _FEWEST_STARTS, _ALL_INTERVALS = 24_000, 1000, 5e6
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -73,10 +65,10 @@ class Shooting(metaclass=Constructed):
             _check_positive("radius", self.radius, " or None (the whole domain)")
         _check_positive("tolerance", self.tolerance)
         if self.points is not None:
-            whole("points", self.points, 4, _MOST_POINTS)
-        whole("rounds", self.rounds, 0, _MOST_ROUNDS)
+            whole("points", self.points, 4, 10**7)  # some GiB of starts and outcomes
+        whole("rounds", self.rounds, 0, 1000)
         if self.budget is not None:
-            whole("budget", self.budget, 1, _MOST_PERIODS)
+            whole("budget", self.budget, 1, 10**8)
 
     def search(self, problem: ExitProblem) -> Search:
         """Search the exit paths from one attractor.
@@ -95,11 +87,11 @@ class Shooting(metaclass=Constructed):
             )
         with stage("starts of exit paths", subject=problem.attractor.name):
             stepper = problem.ensemble_stepper(Flow.HAMILTONIAN)
-            starts = self._starts(problem, stepper)
-        slowest = float(np.abs(problem.attractor.multipliers).max())
-        intervals = growing_time(slowest, problem.attractor.period, starts.growth)
-        budget, points = self.budget or default_budget(intervals), self.points or _affordable(intervals)
-        rounds = 0 if self.radius is not None else self.rounds
+            ring = None if self.radius is None else Ring.around(problem, stepper, self.radius)
+            starts: Starts = ring or fitted_domain(problem, stepper)
+        default_budget, default_points = default_effort(problem.attractor, starts.growth)
+        budget, points = self.budget or default_budget, self.points or default_points
+        rounds = 0 if ring else self.rounds
         with stage(FINDER, unit=TRAJECTORIES, total=None if rounds else points):
             shots = Shots.over(starts, Shooter(problem, stepper, budget), Boxes.grid(starts.grid(points)))
             with Stoppable(FINDER, problem.source) as refining:
@@ -107,15 +99,17 @@ class Shooting(metaclass=Constructed):
                     shots = refined
             return Search.of(shots, refining)
 
-    def _starts(self, problem: ExitProblem, stepper: Stepper) -> Starts:
-        if self.radius is None:
-            return fitted_domain(problem, stepper)
-        return Ring.around(problem, stepper, self.radius)
 
+def default_effort(attractor: Attractor, growth: float) -> tuple[int, int]:
+    """Return the default budget and the default number of starts of paths that must grow by a factor to leave.
 
-def _affordable(intervals: float) -> int:
-    """The default number of starts, of paths that take so many section intervals to grow."""
-    return int(max(_FEWEST_STARTS, min(_STARTS, _ALL_INTERVALS / max(intervals, 1.0))))
+    Linear growth in the slowest direction takes a number of section intervals; the budget leaves ample time for more.
+    5 million intervals in all take about 2.5 s on two processors. On weakly damped scenes a quarter of the starts led
+    to the same paths without stops, and between stops to paths that cost up to a tenth more.
+    """
+    slowest = max(float(np.abs(attractor.multipliers).max()), 1e-12)
+    intervals = -max(0.0, math.log(growth)) * attractor.period / math.log(slowest)
+    return 100 + math.ceil(4.0 * intervals), int(max(1000, min(24_000, 5e6 / max(intervals, 1.0))))
 
 
 def _check_positive(name: str, value: Any, alternative: str = "") -> None:

@@ -16,22 +16,6 @@ from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.starts import Starts
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, GRAZED, LEFT_BASIN, LEFT_REGION, STALLED
 
-_PART = 4  # a round adds the points of the first grid divided by this
-_CERTAIN = 1.5  # times the least action of a target, up to which all exits are confirmed
-
-_STATUS = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED, GRAZED)
-_MEANINGS = "remaining left_region left_basin diverged stalled grazed"
-_ATTRIBUTES: dict[str, dict[str, object]] = {
-    "angle": {"units": "rad", "long_name": "angle of the start"},
-    "radius": {"units": "1", "long_name": "fraction of the logarithmic distance between the domain's edges"},
-    "polar": {"units": "rad", "long_name": "polar angles of the start in the noise's extra states"},
-    "action": {"units": "m2 s-3", "long_name": "action at the exit"},
-    "exit_status": {"long_name": "how the path ended", "flag_values": _STATUS, "flag_meanings": _MEANINGS},
-    "target": {"long_name": "label of the attractor reached, -1 if unknown"},
-    "exit_x": {"units": "m", "long_name": "position at the path's end"},
-    "exit_v": {"units": "m s-1", "long_name": "velocity at the path's end"},
-}
-
 Array = NDArray[np.float64]
 
 
@@ -77,9 +61,12 @@ class Shots:
         return np.where(self.outcomes.status == self.shooter.problem.exit_status, self.outcomes.actions, np.nan)
 
     def refinements(self, rounds: int, tolerance: float) -> Iterator[Shots]:
-        """Yield the shots after each round, at most `rounds`, until the least actions change by at most `tolerance`."""
+        """Yield the shots after each round, at most `rounds`, until the least actions change by at most `tolerance`.
+
+        A round adds about a quarter of the first starts.
+        """
         shots, depth = self, self.starts.depth(self.boxes.first)
-        count = max(1, len(self.boxes.centres) // _PART // (3 ** len(self.boxes.first) - 1))
+        count = max(1, len(self.boxes.centres) // 4 // (3 ** len(self.boxes.first) - 1))
         for number in range(1, rounds + 1):
             which = shots.boxes.promising(shots._relative_actions(), shots._kinds(), count)
             if not len(which):
@@ -93,40 +80,31 @@ class Shots:
         """Return confirmed exits with no cheaper one next to them, the cheapest first."""
         return self.boxes.minima(np.where(self.outcomes.confirmed, self.outcomes.actions, np.inf))
 
-    def counts(self) -> dict[str, int]:
-        """Return how many paths ended in which way."""
-        status, exit_status = self.outcomes.status, self.shooter.problem.exit_status
-        escaped = status == exit_status
-        return {
-            "paths": len(status),
-            "escaped": int(np.sum(escaped)),
-            "left_region": int(np.sum((status == LEFT_REGION) & ~escaped)),
-            "remaining": int(np.sum(status == COMPLETED)),
-            "diverged": int(np.sum(status == DIVERGED)),
-        }
-
-    @property
-    def unfinished(self) -> int:
-        """Paths that needed too many steps, or grazed a stop whose force jumps."""
-        return int(np.sum(np.isin(self.outcomes.status, (STALLED, GRAZED))))
-
     def dataset(self) -> xarray.Dataset:
         """Return the arrays of `ActionPlotResult.data`."""
         places, outcomes = self.boxes.centres, self.outcomes
-        columns = {
-            "angle": 2 * np.pi * (places[:, 0] % 1.0),
-            "radius": self.starts.fractions(places),
-            "action": self.exit_actions,
-            "exit_status": outcomes.status.astype(np.int32),
-            "target": outcomes.targets.astype(np.int32),
-            "exit_x": outcomes.states[:, 0],
-            "exit_v": outcomes.states[:, 1],
-        }
-        arrays: dict[str, Any] = {name: ("start", column, _ATTRIBUTES[name]) for name, column in columns.items()}
         extra_states = (outcomes.states.shape[1] - 1) // 2 - 2
-        polar = np.pi * places[:, 1 : 1 + extra_states]
+        polar, across = np.split(places[:, 1:], [extra_states], axis=1)
+        radius = across[:, 0].copy() if across.size else np.zeros(len(places))
+        flags = (COMPLETED, LEFT_REGION, LEFT_BASIN, DIVERGED, STALLED, GRAZED)
+        columns: tuple[tuple[str, NDArray[Any], str, dict[str, Any]], ...] = (
+            ("angle", 2 * np.pi * (places[:, 0] % 1.0), "angle of the start", {"units": "rad"}),
+            ("radius", radius, "fraction of the logarithmic distance between the domain's edges", {"units": "1"}),
+            ("action", self.exit_actions, "action at the exit", {"units": "m2 s-3"}),
+            (
+                "exit_status", outcomes.status.astype(np.int32), "how the path ended",
+                {"flag_values": flags, "flag_meanings": "remaining left_region left_basin diverged stalled grazed"},
+            ),
+            ("target", outcomes.targets.astype(np.int32), "label of the attractor reached, -1 if unknown", {}),
+            ("exit_x", outcomes.states[:, 0], "position at the path's end", {"units": "m"}),
+            ("exit_v", outcomes.states[:, 1], "velocity at the path's end", {"units": "m s-1"}),
+        )  # fmt: skip
+        arrays: dict[str, Any] = {
+            name: ("start", values, {"long_name": text, **more}) for name, values, text, more in columns
+        }
         if polar.size:
-            arrays["polar"] = (("start", "polar_number"), polar, _ATTRIBUTES["polar"])
+            attributes = {"units": "rad", "long_name": "polar angles of the start in the noise's extra states"}
+            arrays["polar"] = (("start", "polar_number"), np.pi * polar, attributes)
         return xarray.Dataset(arrays)
 
     def _relative_actions(self) -> Array:
@@ -153,6 +131,6 @@ class Shots:
         boxes = self.boxes.split(which)
         new = self.shooter.shoot(*self.starts.states(boxes.centres[len(self.boxes.centres) :]))
         outcomes = self.outcomes.joined(new)
-        self.shooter.confirm(outcomes, _CERTAIN)
+        self.shooter.confirm(outcomes, factor=1.5)  # so that paths somewhat above the least are among the minima
         least = outcomes.least(len(self.shooter.problem.structure.attractors))
         return dataclasses.replace(self, boxes=boxes, outcomes=outcomes, history=(*self.history, least))
