@@ -132,5 +132,5 @@ def _difference(found: str, wanted: str) -> str:
             names = [name for name in other[key] if one[key].get(name) != other[key][name]]
             return f"the settings {', '.join(names)} differ" if len(names) > 1 else f"the setting {names[0]} differs"
     except (ValueError, AttributeError, KeyError, IndexError, StopIteration):
-        return "what it was made for is not known"
+        return "it does not say which work it belongs to"
     return f"it has another {key}" if key != "versions" else "it was written by other versions"

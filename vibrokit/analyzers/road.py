@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
@@ -117,7 +118,7 @@ class ExitRoad:
         """A step that polishes what a source proposes."""
 
         def take() -> None:
-            found = self._asked(source, lambda: source.propose(self.problem, self._polished[0]))
+            found = self._asked(source, functools.partial(source.propose, self.problem, self._polished[0]))
             self._findings += source.findings
             if source.attains:
                 self._least = detailed_balance.with_paths(self.problem, self._least, found)
@@ -181,7 +182,7 @@ class ExitRoad:
                 break
             known = KnownPaths(self._polished[0], evidence.settled(self._accuracy))
             before = graph.solution
-            found = self._asked(graph, lambda known=known: graph.finer(known))  # type: ignore[misc]
+            found = self._asked(graph, functools.partial(graph.finer, known))
             if graph.solution is not before:
                 self._polish(found)
 

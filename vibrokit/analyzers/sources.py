@@ -136,11 +136,8 @@ class Graph(Source):
                 if before is not None and before.finer > found.finer:
                     self.rougher = before
                 self.solution, solved = found, found.last
-        except StopIteration:
+        except StopIteration:  # also after an error, which ends the search
             self.searched = True
-        except Exception:
-            self.searched = True
-            raise
         return () if self.solution is None or self.solution is before else self.solution.candidates
 
     def beginnings(self, problem: ExitProblem, path: ActivationEnergy) -> Sequence[Candidate]:

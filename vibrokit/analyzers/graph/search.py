@@ -118,9 +118,9 @@ class GraphSearch(metaclass=Constructed):
 
         The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
         exit has few nodes for one that costs far less. So those that do are solved again without the others, or before
-        them if paths to them are known; what is known by then is yielded in between. If `known` is given, the last
-        solution has twice the `nodes`, around the paths to exits that are not settled then. What was found since is
-        sent in return for a solution that is the last one on its nodes.
+        them if paths to them are known; the solution so far is yielded in between. If `known` is given, the last
+        solution has twice the `nodes`, around the paths to exits that are not settled then. In return for the last
+        solution on a number of nodes, the caller may send newer known paths.
         """
         attractor = problem.attractor
         self.check_noise(problem.osc)

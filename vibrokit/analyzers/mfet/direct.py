@@ -42,7 +42,7 @@ class Escapes:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _State:
-    """All walkers, and what they were at the beginning of the round before the last and of the last."""
+    """All walkers: now, and at the beginnings of the last two rounds."""
 
     states: Array
     streams: NDArray[np.uint64]

@@ -76,7 +76,7 @@ def rate_around(log_value: float, relative_error: float, count: int) -> RateEsti
 
 
 def rate_unseen(log_total: float, count: int) -> RateEstimate:
-    """Return what is known of exits that none of a number of independent estimates of all exits has seen: a bound."""
+    """Return the upper bound of a rate to a target that none of `count` independent estimates of all exits has seen."""
     return RateEstimate(-math.inf, math.inf, -math.inf, log_total + math.log(-math.log1p(-CONFIDENCE) / count))
 
 
@@ -99,7 +99,7 @@ def exponential_p_value(exits: Exits, seed: int) -> float:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AtIntensity:
-    """What was found at one intensity."""
+    """Rates and exits at one noise intensity, with the findings."""
 
     intensity: float
     method: str  # "direct" or "splitting"
@@ -132,7 +132,7 @@ def from_direct(run: DirectRun, coarser: DirectRun | None, escapes: int) -> AtIn
 
 
 def from_splitting(run: SplittingRun) -> AtIntensity:
-    """Return what the batches of splitting say."""
+    """Return the rates by splitting, as means over its batches."""
     walk, estimates = run.walk, run.estimates
     source, intensity, error = walk.problem.source, walk.intensity, estimates.error
     count, rates, found = len(estimates.log_values), dict[int, RateEstimate](), list[Finding]()

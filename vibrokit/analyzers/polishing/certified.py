@@ -52,7 +52,7 @@ def certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding])
 
 
 def remarks(problem: ExitProblem, solved: SolvedPath) -> list[Finding]:
-    """What a path passes, and where its end leads."""
+    """Return findings on the orbits that a path passes, and on where its end leads."""
     found = [
         Finding.of(Code.PASSES_ORBITS, problem.source, target, action=solved.action, through=list(solved.through))
         for target in solved.targets
