@@ -1,7 +1,5 @@
 """The front door: what `import vibrokit` costs and what it offers."""
 
-import ast
-import importlib
 import inspect
 import subprocess
 import sys
@@ -35,30 +33,17 @@ def test_results_and_plots_open_without_numba():
     assert not {"numba", "sympy", "matplotlib"} & heavy
 
 
-@pytest.mark.parametrize("name", vibrokit.__all__)
-def test_public_name_resolves(name):
-    assert getattr(vibrokit, name) is not None
-    assert name in dir(vibrokit)
+def test_public_names_resolve():
+    assert len(vibrokit.__all__) >= 66
+    assert "Hertz" in vibrokit.__all__
+    for name in vibrokit.__all__:
+        assert getattr(vibrokit, name).__module__ == vibrokit._MODULES[name]
+        assert name in dir(vibrokit)
 
 
 @pytest.mark.parametrize("name", ["errors", "testing"])
 def test_public_module_resolves(name):
     assert inspect.ismodule(getattr(vibrokit, name))
-
-
-def test_type_checkers_see_what_exists():
-    """Type checkers are told the public names, from where they are at run time."""
-    imported = {
-        alias.asname: node.module
-        for node in ast.walk(ast.parse(inspect.getsource(vibrokit)))
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-        if alias.asname
-    }
-    assert imported == vibrokit._MODULES
-    assert sorted(imported) == sorted(vibrokit.__all__)
-    for name, module in imported.items():
-        assert getattr(importlib.import_module(module), name) is getattr(vibrokit, name)
 
 
 def test_unknown_name_is_an_attribute_error():

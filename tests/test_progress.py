@@ -1,6 +1,8 @@
 """Stages, counts, time limits and interrupts of long work."""
 
+import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from vibrokit.display import Display
 from vibrokit.errors import OutOfTime, StructureError, VibrokitError
@@ -140,3 +142,25 @@ def test_progress_is_true_none_or_a_function():
 def test_progress_true_is_the_display():
     with working(True) as work:
         assert type(work.listener) is Display
+
+
+def threads():
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_blas_has_one_thread_during_work_and_as_many_as_before_after_it():
+    """Sums of long vectors would depend on the number of threads."""
+    long, sums = np.random.default_rng(0).normal(size=40_000), set()
+    for limit in (1, 2):
+        with threadpool_limits(limits=limit, user_api="blas"):
+            before = threads()
+            with working():
+                with working():
+                    assert threads() == {1}
+                assert threads() == {1}
+                sums.add(float(long @ long))
+            assert threads() == before
+            with pytest.raises(KeyboardInterrupt), working():
+                raise KeyboardInterrupt
+            assert threads() == before
+    assert len(sums) == 1

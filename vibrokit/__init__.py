@@ -3,7 +3,9 @@
 The public names below are loaded on first use, so that importing vibrokit is fast.
 """
 
+import re
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -78,77 +80,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# The same imports again, for use at run time; tests/test_import.py checks that the two lists agree.
-_MODULES = {
-    "ActionGraph": "vibrokit.analyzers.action_graph",
-    "ActionPlot": "vibrokit.analyzers.action_plot",
-    "Analysis": "vibrokit.analyzers.analyzer",
-    "Analyzer": "vibrokit.analyzers.analyzer",
-    "energy_continuation": "vibrokit.analyzers.energy_continuation",
-    "evolve_density": "vibrokit.analyzers.evolution",
-    "Exit": "vibrokit.analyzers.exits",
-    "FirstContact": "vibrokit.analyzers.exits",
-    "LeaveBasin": "vibrokit.analyzers.exits",
-    "LeaveBounds": "vibrokit.analyzers.exits",
-    "LeaveRegion": "vibrokit.analyzers.exits",
-    "GraphSearch": "vibrokit.analyzers.graph.search",
-    "LeastAction": "vibrokit.analyzers.least_action",
-    "ExitProblem": "vibrokit.analyzers.problem",
-    "MFET": "vibrokit.analyzers.mean_exit_times",
-    "SGCM": "vibrokit.analyzers.sgcm_wkb",
-    "Shooting": "vibrokit.analyzers.shooting.shooting",
-    "assess": "vibrokit.assessment.assess",
-    "Assessment": "vibrokit.assessment.assessment",
-    "sweep": "vibrokit.assessment.sweep",
-    "plausibility": "vibrokit.assessment.plausibility",
-    "occupancies": "vibrokit.comparison.occupancies",
-    "reconcile": "vibrokit.comparison.reconcile",
-    "Reconciliation": "vibrokit.comparison.reconciliation",
-    "StationaryDensity": "vibrokit.comparison.stationary",
-    "Transitions": "vibrokit.comparison.transitions",
-    "FreeFlight": "vibrokit.kernels.free_flight",
-    "Order8": "vibrokit.kernels.order8",
-    "RK4": "vibrokit.kernels.rk4",
-    "RK8": "vibrokit.kernels.rk8",
-    "Oscillator": "vibrokit.oscillator",
-    "Barrier": "vibrokit.parts.barrier",
-    "ContactLaw": "vibrokit.parts.contact.contact_law",
-    "CustomLaw": "vibrokit.parts.contact.custom",
-    "Hertz": "vibrokit.parts.contact.hertz",
-    "Linear": "vibrokit.parts.contact.linear",
-    "Constant": "vibrokit.parts.excitation.constant",
-    "Excitation": "vibrokit.parts.excitation.excitation",
-    "Harmonic": "vibrokit.parts.excitation.harmonic",
-    "NoiseModel": "vibrokit.parts.noise.noise_model",
-    "StateDependentNoise": "vibrokit.parts.noise.state_dependent",
-    "WhiteNoise": "vibrokit.parts.noise.white",
-    "parameter": "vibrokit.parts.parameter",
-    "CubicSpring": "vibrokit.parts.spring.cubic",
-    "CustomSpring": "vibrokit.parts.spring.custom",
-    "LinearSpring": "vibrokit.parts.spring.linear",
-    "Spring": "vibrokit.parts.spring.spring",
-    "Report": "vibrokit.report.report",
-    "reproduce": "vibrokit.reproduction.reproduce",
-    "ActivationEnergy": "vibrokit.results.energy",
-    "Bound": "vibrokit.results.energy",
-    "EnergyContinuation": "vibrokit.results.energy_continuation",
-    "ExitRate": "vibrokit.results.exit_rate",
-    "load_result": "vibrokit.results.files",
-    "Code": "vibrokit.results.codes",
-    "Finding": "vibrokit.results.finding",
-    "Severity": "vibrokit.results.codes",
-    "Sweep": "vibrokit.results.sweep",
-    "Record": "vibrokit.results.record",
-    "Result": "vibrokit.results.result",
-    "Structure": "vibrokit.results.structure",
-    "bundled_scenes": "vibrokit.scene_file",
-    "load_scene": "vibrokit.scene_file",
-    "save_scene": "vibrokit.scene_file",
-    "continuation": "vibrokit.structure.continuation",
-    "find_structure": "vibrokit.structure.find",
-    "shape_stability": "vibrokit.structure.shocks",
-    "unstable_orbits": "vibrokit.structure.unstable_orbits",
-}
+# The imports above are for type checkers; at run time their text says where each name is.
+_IMPORT = re.compile(r"^    from (\S+) import \w+ as (\w+)$", re.MULTILINE)
+_MODULES = {name: module for module, name in _IMPORT.findall(Path(__file__).read_text("utf-8"))}
 
 __all__ = list(_MODULES)
 

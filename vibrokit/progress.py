@@ -16,9 +16,9 @@ from contextvars import ContextVar
 from typing import Annotated, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from vibrokit.arguments import real
-from vibrokit.blas import one_blas_thread
 from vibrokit.display import Display
 from vibrokit.display import Update as Update
 from vibrokit.documented import documented
@@ -205,8 +205,10 @@ def working(progress: Progress = None, time_limit: float | None = None) -> Itera
             yield work
         return
     try:
+        # One thread of BLAS: others would compete with those that integrate trajectories, and a sum over several
+        # threads depends on their number, so that results would differ from machine to machine.
         # What overflows or is no number is tested where it arises; NumPy's warnings would tell a user nothing more.
-        with one_blas_thread(), np.errstate(all="ignore"), opened(work):
+        with threadpool_limits(limits=1, user_api="blas"), np.errstate(all="ignore"), opened(work):
             yield work
     except Deadline:
         raise OutOfTime("the time limit was reached before there was a result; raise time_limit.") from None

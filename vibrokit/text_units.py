@@ -46,11 +46,6 @@ def parameter_text(path: str, symbol: str, unit: str | None) -> str:
     return f"{named} ({unit_text(unit)})" if unit else named
 
 
-def length_unit(largest: float) -> str:
-    """Return the unit in which lengths (m) up to a largest one are read most easily: that is 0.01 at least."""
-    return _largest_unit(100 * largest, "m") or ("nm" if largest > 0 else "m")
-
-
 def size_of(unit: str, base: str | None) -> float:
     """Return the size of a unit in the SI base units of a parameter, such as 2π for Hz and ``"s^-1"``.
 
@@ -66,17 +61,28 @@ def size_of(unit: str, base: str | None) -> float:
     return known[unit]
 
 
+def length_unit(largest: float) -> str:
+    """Return the unit in which lengths (m) up to a largest one are read most easily."""
+    return _readable_unit(largest, "m") or ("nm" if largest > 0 else "m")
+
+
 def familiar(value: float, base: str | None) -> str:
-    """Return a number in SI base units in the largest other unit in which it is 1 at least, such as ``"40 Hz"``."""
-    name = _largest_unit(value, base)
+    """Return a number in SI base units in the unit in which it reads best, such as ``"40 Hz"``; empty for SI itself."""
+    name = _readable_unit(value, base)
     size = _SIZES[base or ""][name] if name else 1.0
     return "" if size == 1.0 else f"{value / size:.6g} {name}"
 
 
-def _largest_unit(value: float, base: str | None) -> str:
-    """The largest unit that is not above a number in SI base units; empty if there is none."""
-    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if abs(value) >= size}
+def _readable_unit(value: float, base: str | None) -> str:
+    """The largest unit of which a number in SI base units is a tenth or more; empty if there is none."""
+    fitting = {name: size for name, size in _SIZES.get(base or "", {}).items() if abs(value) >= 0.1 * size}
     return max(fitting, key=fitting.__getitem__, default="")
+
+
+def split_number(text: str) -> tuple[float, str] | None:
+    """Return the number that a text begins with and the unit behind it; None if there is no number."""
+    match = _NUMBER.fullmatch(text)
+    return None if match is None else (float(match[1]), match[2])
 
 
 def number_in(text: str, base: str | None) -> tuple[float, str | None]:
@@ -87,8 +93,8 @@ def number_in(text: str, base: str | None) -> tuple[float, str | None]:
     ParameterError
         The text is no number, or the unit is not one of a parameter in these base units.
     """
-    match = _NUMBER.fullmatch(text)
-    if match is None:
+    split = split_number(text)
+    if split is None:
         raise ParameterError(f"{shown(text)} is no number; give one such as 0.57, or with a unit, such as '42 Hz'.")
-    unit = match[2] or None
-    return float(match[1]) * (1.0 if unit is None else size_of(unit, base)), unit
+    number, unit = split
+    return (number * size_of(unit, base), unit) if unit else (number, None)

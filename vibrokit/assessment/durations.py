@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from numbers import Real
 
 from vibrokit.arguments import real
 from vibrokit.errors import ParameterError, StructureError, nearest, shown
 from vibrokit.text_table import power_text
+from vibrokit.text_units import split_number
 
 _MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
 _YEAR = 365.25 * _DAY
@@ -22,7 +22,6 @@ _UNITS: Mapping[str, float] = {
     "a": _YEAR, "y": _YEAR, "yr": _YEAR, "year": _YEAR, "years": _YEAR,
 }  # fmt: skip
 _PERIODS = ("period", "periods")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)\s*")
 _SHOWN = (("years", _YEAR, 2.0), ("days", _DAY, 2.0), ("hours", _HOUR, 2.0), ("minutes", _MINUTE, 2.0))
 
 
@@ -35,10 +34,10 @@ def seconds_in(text: object, period: float | None = None) -> float:
     if isinstance(text, Real) and not isinstance(text, bool):
         number, unit = real(text), "s"
     else:
-        match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
-        if match is None:
+        split = split_number(text) if isinstance(text, str) else None
+        if split is None:
             raise ParameterError(f"The duration {shown(text)} is not one; {example}.")
-        number, unit = float(match[1]), match[2] or "s"
+        number, unit = split[0], split[1] or "s"
     if unit.lower() in _PERIODS:
         if period is None:
             raise ParameterError(f"The duration {shown(text)} is in periods, and the scene has no section; {example}.")

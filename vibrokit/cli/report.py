@@ -3,39 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-
-def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add the command to the parser of the command line."""
-    parser = commands.add_parser(
-        "report",
-        help="print what saved results of one scene say, or write a page to hand on",
-        description="Print what saved results of one scene say; with -o, write a page that begins with the answer in "
-        "plain words and ends with all settings. A file that exists is replaced.",
-        epilog="The page needs nothing else: no script, no file, no network. The exit status is 1 if a result is "
-        "incomplete.",
-    )
-    parser.add_argument("file", type=Path, nargs="+", help="what assess, run, reconcile or save wrote")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.html", help="write the page")
-    parser.add_argument("--tables", type=Path, metavar="FOLDER", help="write each table as comma-separated values")
-    parser.add_argument("--title", help="title of the page (default: the name of the first file)")
-    parser.set_defaults(command=report_files)
+from vibrokit.assessment.assessment import Assessment
+from vibrokit.cli.long_work import check_targets
+from vibrokit.report.assessment import assessment_text
+from vibrokit.report.material import gathered
+from vibrokit.report.report import Report, checked_page
+from vibrokit.report.tables import input_table
+from vibrokit.report.text import record_text
+from vibrokit.results.atomic import made_folder
+from vibrokit.results.files import load_result
 
 
 def report_files(options: argparse.Namespace) -> int:
-    """Run the command and return its exit status."""
-    from vibrokit.assessment.assessment import Assessment
-    from vibrokit.report.assessment import assessment_text
-    from vibrokit.report.material import gathered
-    from vibrokit.report.report import Report, checked_page
-    from vibrokit.report.tables import input_table
-    from vibrokit.report.text import record_text
-    from vibrokit.results.atomic import checked_target, made_folder
-    from vibrokit.results.files import load_result
-
+    """Print what saved results of one scene say, or write a page to hand on."""
     if options.output is not None:
-        checked_target(checked_page(options.output))
+        check_targets(checked_page(options.output))
     if options.tables is not None:
         made_folder(options.tables)
     records = [load_result(path) for path in options.file]

@@ -9,20 +9,28 @@ import sys
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from vibrokit.cli.interrupts import Interrupts
+from vibrokit.analyzers.analyzer import Analyzer
+from vibrokit.analyzers.settings import configured, named_exit, setting
+from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import VibrokitError
-
-if TYPE_CHECKING:
-    from vibrokit.analyzers.analyzer import Analyzer
-    from vibrokit.kernels.stepper import Stepper
-    from vibrokit.oscillator import Oscillator
-    from vibrokit.results.finding import Finding
-    from vibrokit.results.record import Record
-    from vibrokit.results.result import Result
-    from vibrokit.results.stoppable import Stoppable
-    from vibrokit.results.structure import Structure
+from vibrokit.kernels.named import named_stepper
+from vibrokit.kernels.stepper import Stepper
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import checked_time_limit
+from vibrokit.registry import Group, load
+from vibrokit.report.data import findings_data, run_data
+from vibrokit.report.text import record_text
+from vibrokit.results.codes import Code
+from vibrokit.results.finding import Finding
+from vibrokit.results.pictures import save_figure
+from vibrokit.results.record import Record, versions
+from vibrokit.results.result import Result
+from vibrokit.results.stoppable import Stoppable
+from vibrokit.results.structure import Structure
+from vibrokit.scene_file import load_scene
+from vibrokit.structure.find import find_structure
 
 STRUCTURE = "structure"  # its name among those of the analyzers
 _ENDINGS = (".png", ".pdf", ".svg", ".nc")
@@ -69,16 +77,12 @@ class Outcome:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    from vibrokit.results.stoppable import Stoppable
-
     outcome = Outcome(tuple(dict.fromkeys(options.analyzer)))
     with Interrupts() as interrupts:
         plan = planned(options)
         # It ends by itself, unless it is stopped before there is a structure, or Ctrl-C is pressed twice.
         with Stoppable("the search for steady states") as whole:
             _work(plan, options, interrupts, outcome, whole)
-            interrupts.finishing()
-        interrupts.finishing()
         outcome.findings += whole.findings
         _save(outcome, options)
         _print(outcome, options)
@@ -86,29 +90,12 @@ def run(options: argparse.Namespace) -> int:
             _draw(outcome, options)
         if interrupts.requested:
             print(f"vibrokit: interrupted; {_written(outcome)}.", file=sys.stderr)
-            return interrupts.status
-        return outcome.status
+        return interrupts.status(outcome.status)
 
 
 def planned(options: argparse.Namespace) -> Plan:
-    """Check what is asked for, and load what saves and prints: an import that Ctrl-C ends cannot be repeated."""
-    import vibrokit.report.data
-    import vibrokit.report.text
-    import vibrokit.results.files  # noqa: F401 - loaded for later
-    from vibrokit.analyzers.analyzer import Analyzer
-    from vibrokit.analyzers.settings import configured, named_exit, setting
-    from vibrokit.kernels.named import named_stepper
-    from vibrokit.progress import checked_time_limit
-    from vibrokit.registry import Group, load
-    from vibrokit.results.atomic import checked_target
-    from vibrokit.results.pictures import checked_picture
-    from vibrokit.scene_file import load_scene
-
-    for target in (options.output, options.figure, options.checkpoint):
-        if target is not None:
-            checked_target(target)
-    if options.figure is not None:
-        checked_picture(options.figure)
+    """Check what is asked for."""
+    check_targets(options.output, options.checkpoint, picture=options.figure)
     if not options.seed >= 0:
         raise VibrokitError(f"--seed must be a whole number, at least 0, got {options.seed}.")
     if not 2 <= options.cells <= 20_000:
@@ -137,23 +124,13 @@ def planned(options: argparse.Namespace) -> Plan:
     return Plan(osc, stepper, analyzers)
 
 
-def source_of(text: str) -> int | str:
-    """Return the label or the name of an attractor."""
-    return int(text) if text.isdecimal() else text
-
-
 def _work(plan: Plan, options: argparse.Namespace, interrupts: Interrupts, outcome: Outcome, whole: Stoppable) -> None:
     """Find the structure and run the analyzers; keep each of them in the outcome as soon as it is there."""
-    from vibrokit.progress import working
-    from vibrokit.results.codes import Code
-    from vibrokit.results.finding import Finding
-    from vibrokit.structure.find import find_structure
 
     def not_run(name: str, reason: str) -> None:
         outcome.findings.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=name, reason=reason))
 
-    with working(True, options.time_limit) as work:
-        interrupts.stops(work)
+    with interrupts.working(options.time_limit) as work:
         try:
             cells = (options.cells, options.cells)
             outcome.structure = find_structure(plan.osc, cells=cells, stepper=plan.stepper, rng=options.seed)
@@ -206,8 +183,6 @@ def _write(outcome: Outcome, name: str, path: Path) -> None:
 
 def _print_records(outcome: Outcome, options: argparse.Namespace) -> None:
     """Print as text what was not printed yet; JSON is one object, printed at the end."""
-    from vibrokit.report.text import record_text
-
     for name, record in outcome.records.items():
         if not options.json and name not in outcome.printed:
             text = record_text(f"{options.scene}: {name}", record, brief=not options.verbose)
@@ -217,9 +192,6 @@ def _print_records(outcome: Outcome, options: argparse.Namespace) -> None:
 
 def _print(outcome: Outcome, options: argparse.Namespace) -> None:
     """Print what was not printed yet, or one JSON object; what was not run goes to standard error too."""
-    from vibrokit.report.data import findings_data, run_data
-    from vibrokit.results.record import versions
-
     for finding in outcome.findings:
         print(f"vibrokit: {finding}", file=sys.stderr)
     if options.json:
@@ -235,8 +207,6 @@ def _print(outcome: Outcome, options: argparse.Namespace) -> None:
 
 def _draw(outcome: Outcome, options: argparse.Namespace) -> None:
     """Save a figure of each result; of the structure if no analyzer was asked for."""
-    from vibrokit.results.pictures import save_figure
-
     records = outcome.results if outcome.asked else outcome.records
     for name, record in records.items():
         path = options.figure or Path(f"{scene_stem(options.scene)}.png")
@@ -253,11 +223,6 @@ def _draw(outcome: Outcome, options: argparse.Namespace) -> None:
 def _written(outcome: Outcome) -> str:
     files = ", ".join(f"{path} ({name})" for name, path in outcome.files.items())
     return f"written: {files}" if files else "no result was saved; -o FILE saves them"
-
-
-def scene_stem(scene: str) -> str:
-    """Return the name of a scene without its folder and ending."""
-    return Path(scene).name.removesuffix(".toml")
 
 
 def _numbered(path: Path, name: str, count: int) -> Path:

@@ -21,9 +21,7 @@ from vibrokit.structure.basins.grid import classify_grid
 from vibrokit.structure.find import find_structure
 from vibrokit.text_table import text_table
 
-_HEADINGS = ("stepper", "margin", "wrong cells", "basin shift", "per cell (µs)", "")
 MARGINS: tuple[int | None, ...] = (1, 2, 3, None)
-_DEFAULT_MARGIN = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,10 +45,11 @@ class BasinTrade:
     reference: str
 
     def __str__(self) -> str:
+        headings = ("stepper", "margin", "wrong cells", "basin shift", "per cell (µs)", "")
         lines = [
             f"Basins on {self.cells[0]} × {self.cells[1]} cells, against {self.reference} with every cell followed.",
             "",
-            *text_table([_HEADINGS, *map(_line, self.rows)]),
+            *text_table([headings, *map(_line, self.rows)]),
         ]
         return "\n".join(lines)
 
@@ -84,7 +83,7 @@ def measure_basins(
             advance()
             for stepper, margin in itertools.product(ladder, margins):
                 labels, seconds = _labelled(osc, structure, stepper, cells, margin)
-                default = stepper == chosen and margin == _DEFAULT_MARGIN
+                default = stepper == chosen and margin == 2
                 wrong = float(np.mean(labels != reference))
                 rows.append(BasinRow(repr(stepper), margin, wrong, _shift(labels, reference), seconds, default))
                 advance()

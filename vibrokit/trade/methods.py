@@ -42,11 +42,8 @@ STEPS = (0.5, 2.0)
 """Of a density, in those of the default."""
 ERRORS = (0.2, 0.1, 0.05)
 """Relative errors that are asked for of simulated exit times."""
-_FINER, _FINEST = 1.4, 0.5  # nodes of the reference, in those of the default; its error, in the least that is asked for
 _WARM_UP = LeastAction(shooting=Shooting(points=64, rounds=0), graph=GraphSearch(nodes=(32, 32)))  # compiles
-_MIB = 2.0**20
 _RATE = "ln of the rate (s⁻¹) at the intensity of the scene"
-_IMPLIED = ("source", "intensities", "escapes")  # settings that all runs share
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,7 +137,7 @@ class _Bench:
             failure = str(error)
         seconds = time.perf_counter() - began
         if analyzer.takes_intensities:
-            memory = tracemalloc.get_traced_memory()[1] / _MIB
+            memory = tracemalloc.get_traced_memory()[1] / 2.0**20
             tracemalloc.stop()
         advance()
         default = setting == f"{type(analyzer).__name__}()"
@@ -202,7 +199,7 @@ def measure_densities(
             return dataclasses.replace(plain, nodes=(round(factor * shape[0]), round(factor * shape[1])))
 
         others = [dataclasses.replace(on(1), steps=2 * round(0.5 * factor * own_steps)) for factor in steps]
-        return bench.compared(_RATE, [*map(on, nodes), *others, plain], on(_FINER))
+        return bench.compared(_RATE, [*map(on, nodes), *others, plain], on(1.4))
 
 
 def measure_exit_times(
@@ -229,7 +226,7 @@ def measure_exit_times(
             for error in sorted(errors, reverse=True)
         ]
         finest = dataclasses.replace(
-            plain, splitting=ways[0], target_error=_FINEST * min(errors), replicas=8 * plain.replicas, seed=1
+            plain, splitting=ways[0], target_error=0.5 * min(errors), replicas=8 * plain.replicas, seed=1
         )
         return bench.compared(_RATE, settings, finest)
 
@@ -247,10 +244,8 @@ def _check_found(result: Result) -> ExitRate:
 
 def _typed(analyzer: Analyzer) -> str:
     """Return a setting as it is typed, without defaults and what all share."""
-    plain = type(analyzer)()
-    given = {
-        name: value
-        for name, value in vars(analyzer).items()
-        if name not in _IMPLIED and value != getattr(plain, name)
-    }  # fmt: skip
-    return f"{type(analyzer).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+    plain, shared = vars(type(analyzer)()), ("source", "intensities", "escapes")
+    given = (
+        f"{name}={value!r}" for name, value in vars(analyzer).items() if name not in shared and value != plain[name]
+    )
+    return f"{type(analyzer).__name__}({', '.join(given)})"

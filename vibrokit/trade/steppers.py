@@ -38,15 +38,6 @@ LADDERS: tuple[tuple[Stepper, ...], ...] = (
     tuple(FreeFlight(tolerance) for tolerance in TOLERANCES),
 )
 _FINEST = 1e-14
-_CHECKED = 16  # starts on which the references themselves are checked
-_MOST = 8192
-_FEW = 256
-_MEASURED = 1024  # trajectories whose arrays are measured
-_LEAST_REPEATS = 5
-_ALONE = 8  # trajectories that are timed one by one
-_HEADINGS = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "arrays (B)", "")
-_ABOVE_FLOOR = 30.0  # an error this far above the smallest of all is not rounding or the reference's own
-_ASYMPTOTIC = 0.02  # distances below this are small enough to show an order
 
 Array = NDArray[np.float64]
 
@@ -84,20 +75,22 @@ class Trade:
     first_calls: tuple[FirstCall, ...]
     references: Mapping[str, str]  # what the errors of each stepper are distances to
     orders: Mapping[str, float]  # exponent of the error, in the step or in the tolerance, or NaN
-    refused: Mapping[str, str]  # steppers that cannot integrate this scene, with the reason
-    too_coarse: Mapping[str, str]  # settings with which trajectories diverge, likewise
+    unused: Mapping[
+        str, str
+    ]  # steppers that cannot integrate this scene, and settings that are too coarse; with reasons
     checked: float  # median distance of the finest stepper to DOP853, which shares only the right-hand side with it
     starts: int
     periods: int
     threads: int
 
     def __str__(self) -> str:
+        headings = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "arrays (B)", "")
         lines = [
             f"Error: distance in (x, v) from a finer reference after {self.periods} periods, of {self.starts} starts.",
             f"Time per trajectory and period: in an ensemble on {self.threads} threads, and one trajectory alone.",
             "Arrays: peak that Python holds per trajectory (tracemalloc); the kernels' own few kB are not in it.",
             "",
-            *text_table([_HEADINGS, *(self._line(row) for row in self.rows)]),
+            *text_table([headings, *(self._line(row) for row in self.rows)]),
             "",
         ]
         for call in self.first_calls:
@@ -106,7 +99,7 @@ class Trade:
                 f"{call.name}: {self._order(call.name)}, against {self.references[call.name]}; "
                 f"first call {call.seconds:.1f} s ({source})."
             )
-        lines += [f"{name}: not used. {reason}" for name, reason in (*self.refused.items(), *self.too_coarse.items())]
+        lines += [f"{name}: not used. {reason}" for name, reason in self.unused.items()]
         lines.append(f"The reference of RK4 and SciPy's DOP853 at its finest differ by {self.checked:.1e} (median).")
         return "\n".join(lines)
 
@@ -148,10 +141,9 @@ def measure_steppers(
     states = starts_between_stops(osc, starts, np.random.default_rng(rng))
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
     rows: list[TradeRow] = []
-    too_coarse: dict[str, str] = {}
     with working(progress), stage("steppers", unit="settings"), warnings.catch_warnings():
         warnings.simplefilter("ignore", CoarseStepsWarning)  # too few steps are measured here on purpose
-        calls, refused = _first_calls(osc, ladders, states[:1])
+        calls, unused = _first_calls(osc, ladders, states[:1])
         taken = [stepper for ladder in ladders for stepper in ladder if type(stepper).__name__ in calls]
         references = _references(osc, states, periods)
         for done, stepper in enumerate(taken):
@@ -159,19 +151,18 @@ def measure_steppers(
             try:
                 row = _row(osc, stepper, states, periods, references[type(stepper).__name__][1], seconds)
             except IntegrationError as error:
-                too_coarse[repr(stepper)] = str(error)
+                unused[repr(stepper)] = str(error)
             else:
                 rows.append(dataclasses.replace(row, default=repr(stepper) in defaults))
         report(1 + len(taken))
-    checked = reference_map(osc, states[:_CHECKED], periods, tolerance=TIGHTEST)
+    checked = reference_map(osc, states[:16], periods, tolerance=TIGHTEST)
     return Trade(
         rows=tuple(rows),
         first_calls=tuple(calls.values()),
         references={name: references[name][0] for name in calls},
         orders={name: _fitted_order([row for row in rows if row.name == name], rows) for name in calls},
-        refused=refused,
-        too_coarse=too_coarse,
-        checked=float(np.median(np.linalg.norm(references["RK4"][1][:_CHECKED] - checked, axis=1))),
+        unused=unused,
+        checked=float(np.median(np.linalg.norm(references["RK4"][1][:16] - checked, axis=1))),
         starts=starts,
         periods=periods,
         threads=os.cpu_count() or 1,
@@ -222,9 +213,9 @@ def _first_calls(
 
 def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, reference: Array, seconds: float) -> TradeRow:
     errors = np.linalg.norm((osc.section_map(states, periods, stepper=stepper) - reference)[:, :2], axis=1)
-    many = _as_many(osc, stepper, states, seconds / (2 * _LEAST_REPEATS))
+    many = _as_many(osc, stepper, states, 0.1 * seconds)
     together = _median_time(lambda: osc.section_map(many, 1, stepper=stepper), 0.7 * seconds)
-    few, length = states[:_ALONE], 8
+    few, length = states[:8], 8
 
     def one_by_one() -> None:
         for state in few:
@@ -232,7 +223,7 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
 
     one_by_one()
     alone = _median_time(one_by_one, 0.3 * seconds)
-    counted = np.resize(states, (_MEASURED, states.shape[1]))
+    counted = np.resize(states, (1024, states.shape[1]))
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
@@ -242,25 +233,25 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
         error_90=float(np.quantile(errors, 0.9)),
         seconds=together / len(many),
         seconds_alone=alone / (len(few) * length),
-        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / _MEASURED,
+        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / len(counted),
     )
 
 
 def _as_many(osc: Oscillator, stepper: Stepper, states: Array, seconds: float) -> Array:
     """As many trajectories as can be integrated over one period in the time."""
-    count = _FEW
+    count = 256
     while True:
         many = np.resize(states, (count, states.shape[1]))
         began = time.perf_counter()
         osc.section_map(many, 1, stepper=stepper)
-        if count >= _MOST or time.perf_counter() - began > 0.5 * seconds:
+        if count >= 8192 or time.perf_counter() - began > 0.5 * seconds:
             return many
         count *= 2
 
 
 def _median_time(work: Callable[[], object], seconds: float) -> float:
     times: list[float] = []
-    while len(times) < _LEAST_REPEATS or (sum(times) < seconds and len(times) < 100):
+    while len(times) < 5 or (sum(times) < seconds and len(times) < 100):
         began = time.perf_counter()
         work()
         times.append(time.perf_counter() - began)
@@ -278,10 +269,10 @@ def _peak_of_arrays(work: Callable[[], object]) -> float:
 
 def _fitted_order(rows: Sequence[TradeRow], all_rows: Sequence[TradeRow]) -> float:
     """Fit the exponent with which the median error falls as cost rises; NaN with too few settings above the floor."""
-    floor = _ABOVE_FLOOR * min(row.error_median for row in all_rows)
+    floor = 30.0 * min(row.error_median for row in all_rows)  # an error above it is not rounding or the reference's
     errors = np.array([row.error_median for row in rows])
     costs = np.array([row.cost for row in rows])
-    kept = (errors > floor) & (errors < _ASYMPTOTIC)
+    kept = (errors > floor) & (errors < 0.02)  # distances that are small enough to show an order
     if kept.sum() < 3:
         return float("nan")
     return float(-np.polyfit(np.log(costs[kept]), np.log(errors[kept]), 1)[0])

@@ -1,17 +1,40 @@
-"""Ctrl-C and SIGTERM during a run: the first asks the work to stop, and nothing is lost; a second Ctrl-C stops it."""
+"""Long work of a command: files are checked before it, and it shows progress, has a time limit and can be stopped."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import signal
+from collections.abc import Iterator
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from vibrokit.progress import Work
+from vibrokit.progress import Work, working
+from vibrokit.results.atomic import checked_target
+from vibrokit.results.pictures import checked_picture
 
 _NOTICE = b"\nvibrokit: stopping; what was found is kept. Press Ctrl-C again to stop at once.\n"
 _STANDARD_ERROR = 2  # its descriptor: Python's own stream may be in use when a signal arrives
+
+
+def check_targets(*files: Path | None, picture: Path | None = None) -> None:
+    """Refuse, before any work is done, files and a picture that cannot be written; None stands for no file."""
+    for target in (*files, picture):
+        if target is not None:
+            checked_target(target)
+    if picture is not None:
+        checked_picture(picture)
+
+
+def scene_stem(scene: str) -> str:
+    """Return the name of a scene without its folder and ending."""
+    return Path(scene).name.removesuffix(".toml")
+
+
+def source_of(text: str | None) -> int | str | None:
+    """Return the label or the name of an attractor, or None for all."""
+    return int(text) if text is not None and text.isdecimal() else text
 
 
 class Interrupts:
@@ -44,21 +67,21 @@ class Interrupts:
         """Whether a signal was received."""
         return self.received is not None
 
-    @property
-    def status(self) -> int:
-        """Exit status after a signal, as shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
-        assert self.received is not None
-        return 128 + self.received
+    def status(self, own: int) -> int:
+        """Return the exit status: after a signal as shells have it, 130 or 143, and otherwise that of the work."""
+        return own if self.received is None else 128 + self.received
 
-    def stops(self, work: Work) -> None:
-        """From now on, ask this work to stop."""
-        self._work = work
-        if self.requested:
-            work.interrupt()
-
-    def finishing(self) -> None:
-        """Begin the second phase."""
-        self._finishing, self._work, self._presses = True, None, 0
+    @contextlib.contextmanager
+    def working(self, time_limit: float | None) -> Iterator[Work]:
+        """Open work that shows its progress and that a signal asks to stop; its end begins the second phase."""
+        try:
+            with working(True, time_limit) as work:
+                self._work = work
+                if self.requested:
+                    work.interrupt()
+                yield work
+        finally:
+            self._finishing, self._work, self._presses = True, None, 0
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         again = self._presses > 0
