@@ -10,6 +10,7 @@ from tests.assessment.test_assessment import BARRIERS, SCENE, STRUCTURE, rated
 from tests.builders import energy
 from tests.klein_kramers import double_well_rate
 from vibrokit.analyzers.settings import settings_of
+from vibrokit.assessment.road import barrier, ladder
 from vibrokit.errors import ParameterError, SceneError, StructureError, UnknownNameError, VibrokitError
 from vibrokit.progress import current
 from vibrokit.results.least_action import LeastActionResult
@@ -58,7 +59,7 @@ def calls(monkeypatch):
         (vk.LeastAction, "least-action", None), (vk.MFET, "mfet", MFETResult), (vk.SGCM, "sgcm", SGCMResult)
     ):  # fmt: skip
         monkeypatch.setattr(cls, "run", stub(name, kind))
-    monkeypatch.setattr("vibrokit.assessment.assess.find_structure", lambda osc, **options: KNOWN)
+    monkeypatch.setattr("vibrokit.assessment.road.find_structure", lambda osc, **options: KNOWN)
     return ran, stop
 
 
@@ -216,16 +217,13 @@ def test_a_checkpoint_does_not_replace_another_record(calls, tmp_path, record):
     assert vk.assess(OSC, known=path).complete
 
 
-@pytest.mark.parametrize("scene", [None, "hertz-0.570", 3])
-def test_what_is_no_scene_is_refused(calls, scene):
-    with pytest.raises(SceneError, match="Oscillator"):
+QUIET = [dataclasses.replace(OSC, noise=noise) for noise in (None, vk.WhiteNoise(0.0))]
+
+
+@pytest.mark.parametrize("scene", [None, "hertz-0.570", 3, *QUIET])
+def test_what_is_no_scene_or_has_no_noise_is_refused(calls, scene):
+    with pytest.raises(SceneError, match="noise" if scene in QUIET else "Oscillator"):
         vk.assess(scene)
-
-
-def test_scenes_without_noise_are_refused(calls):
-    for noise in (None, vk.WhiteNoise(0.0)):
-        with pytest.raises(SceneError):
-            vk.assess(dataclasses.replace(OSC, noise=noise))
 
 
 def test_a_single_state_is_kept_and_first_contact_is_offered(calls, monkeypatch, tmp_path):
@@ -234,7 +232,7 @@ def test_a_single_state_is_kept_and_first_contact_is_offered(calls, monkeypatch,
         attractors=KNOWN.attractors[:1],
         basins=dataclasses.replace(KNOWN.basins, labels=0 * KNOWN.basins.labels),
     )
-    monkeypatch.setattr("vibrokit.assessment.assess.find_structure", lambda osc, **options: one)
+    monkeypatch.setattr("vibrokit.assessment.road.find_structure", lambda osc, **options: one)
     with pytest.raises(StructureError, match="FirstContact"):
         vk.assess(OSC, checkpoint=tmp_path / "a.nc")
     assert vk.load_result(tmp_path / "a.nc").names == one.names
@@ -247,6 +245,28 @@ def test_what_a_share_of_the_time_did_not_suffice_for_is_run_again(calls):
     found = vk.assess(OSC, time_limit=1000.0)
     assert which(ran) == [PATHS, *BOTH, BOTH[1]]
     assert found.complete
+
+
+@pytest.mark.parametrize(
+    ("energies", "intensity", "decisive"),
+    [
+        ((3.5e-9, 6e-5), 2e-5, 6e-5),  # noise passes the first at once
+        ((6e-5, 3.5e-9), 1e-9, 3.5e-9),
+        ((3.5e-9, 2e-9), 2e-5, 2e-9),  # both at once: of weaker noise at least something is said
+        ((9e-5,), 2e-5, 9e-5),
+        ((), 2e-5, math.inf),
+    ],
+)
+def test_an_exit_that_noise_passes_at_once_does_not_decide(energies, intensity, decisive):
+    assert barrier(energies, intensity) == decisive
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_the_ladder_has_the_noise_of_the_scene_where_it_is_in_range(unit):
+    found = ladder(8e-5 * unit, 1e-5 * unit)
+    assert 1e-5 * unit in found
+    assert list(found) == sorted(found, reverse=True)
+    assert 1e-9 * unit not in ladder(8e-5 * unit, 1e-9 * unit)
 
 
 WELL = vk.Oscillator(

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.assessment.contact_times import contact_time
 from vibrokit.assessment.linear_response import linear_response
 from vibrokit.assessment.oddities import OddityCode
-from vibrokit.assessment.plausibility import Measure, plausibility
+from vibrokit.assessment.plausibility import Measure, contact_time, plausibility
 from vibrokit.scene_file import bundled_scenes, scene_from_data
 
 PUBLIC = Path(__file__).parents[1] / "benchmarks" / "public_cases.toml"

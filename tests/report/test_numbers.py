@@ -1,7 +1,6 @@
 """Every number in the tables of a page is one of the object for other programs, to the digits that the page has."""
 
 import csv
-import html.parser
 import itertools
 import json
 import math
@@ -10,37 +9,13 @@ import re
 import pytest
 
 from tests.assessment.test_assessment import assessment  # noqa: F401 - a fixture
+from tests.report.page import Page
 from vibrokit.assessment.plausibility import plausibility
 from vibrokit.report.assessment import assessment_data
 from vibrokit.report.data import reconciliation_data
 
 SECONDS = {"s": 1.0, "minutes": 60.0, "hours": 3600.0, "days": 86400.0, "years": 31557600.0}
 NUMBER = re.compile(r"(10\^)?([-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)")
-
-
-class Tables(html.parser.HTMLParser):
-    """The cells of the tables of a page, a list of rows for each."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tables, self.within = [], False
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        if tag == "table":
-            self.tables.append([])
-        elif tag == "tr":
-            self.tables[-1].append([])
-        elif tag in ("td", "th"):
-            self.tables[-1][-1].append("")
-        self.within = tag in ("td", "th")
-
-    def handle_endtag(self, tag):
-        self.within = False
-
-    def handle_data(self, data):
-        if self.within:
-            self.tables[-1][-1][-1] += data
 
 
 def same(text, value):
@@ -70,7 +45,7 @@ def finite(*values):
 def tables(assessment):  # noqa: F811
     """Tables of the page by chapter and name, after a look that page and files have the same cells."""
     report = assessment.report()
-    shown = Tables(report.html).tables
+    shown = Page(report.html).tables
     for cells, table in zip(shown, report.tables, strict=True):
         assert cells == list(csv.reader(table.csv.splitlines()))
     named = {(c.title, b.name): b.rows for c in report.chapters for b in c.blocks if b in report.tables}

@@ -1,7 +1,7 @@
 """The page of an assessment: its numbers, its parts, and that it needs nothing else."""
 
 import dataclasses
-import html.parser
+import html
 import json
 import math
 import shutil
@@ -13,6 +13,7 @@ import pytest
 import vibrokit as vk
 from tests.assessment.test_assessment import SCENE, STRUCTURE, assessment, rated  # noqa: F401 - a fixture
 from tests.builders import drop, full_structure, rewritten
+from tests.report.page import Page
 from vibrokit.assessment.durations import duration_text
 from vibrokit.cli import main
 from vibrokit.errors import ArgumentError, FileError, StructureError, VibrokitError
@@ -22,37 +23,6 @@ from vibrokit.results.section import Section
 from vibrokit.scene_file import scene_data
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-_VOID = {"meta", "br", "img", "link"}
-
-
-class Page(html.parser.HTMLParser):
-    """The elements of a page and the text of its table cells; counts what is not closed."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.links, self.ids, self.cells, self.words, self.tags = [], [], [], [], [], set()
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.ids += [value for name, value in attrs if name == "id"]
-        self.links += [value for name, value in attrs if name in ("src", "href", "xlink:href", "action", "data")]
-        self.tags.add(tag)
-        assert tag != "script"
-        if tag not in _VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.handle_starttag(tag, attrs)
-        if tag not in _VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.words.append(data)
-        if "td" in self.open:
-            self.cells.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +67,7 @@ def test_a_structure_and_results_are_one_assessment():
     results = [dataclasses.replace(rated(), section=Section.of(structure)) for _ in range(2)]
     (one,) = gathered([*results, structure])
     assert one.structure is structure
-    assert list(one.results) == ["mfet", "mfet-2"]
+    assert list(one.results) == ["mfet", "mfet 2"]
     assert "Answer" in [chapter.title for chapter in vk.Report.of(*results, structure).chapters]
 
 

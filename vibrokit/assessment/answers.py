@@ -10,9 +10,6 @@ from vibrokit.comparison.mean_times import LogTime
 from vibrokit.results.rated import METASTABLE
 from vibrokit.text_table import power_text
 
-_READABLE = math.log(1e6)  # ln of numbers of periods up to which they are written
-_LARGEST = 709.0  # exponent of the largest floating-point number
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Answer:
@@ -88,7 +85,7 @@ class MeanTime(Answer):
         """The time with its interval in the unit that reads best, and as a number of periods where that is readable."""
         text = interval_text(self.log_value, self.log_lower, self.log_upper)
         periods = self.log_value - math.log(self.period)
-        return f"{text}, {power_text(periods)} periods" if periods < _READABLE else text
+        return f"{text}, {power_text(periods)} periods" if periods < math.log(1e6) else text
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -138,4 +135,4 @@ def probability_within(time: float, leaving: LogTime, goal: LogTime, relaxation:
 
 def exponential(logarithm: float) -> float:
     """Return exp of a logarithm; infinite where that is too large."""
-    return math.exp(logarithm) if logarithm < _LARGEST else math.inf
+    return math.exp(logarithm) if logarithm < 709.0 else math.inf

@@ -3,45 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from numbers import Integral
+from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import Exit, LeaveBasin
 from vibrokit.arguments import members, real
 from vibrokit.assessment.assessment import Assessment
-from vibrokit.assessment.known import Known, Part
-from vibrokit.assessment.ladder import barrier, ladder
+from vibrokit.assessment.known import Known
+from vibrokit.assessment.road import Road
 from vibrokit.construction import called
-from vibrokit.errors import ParameterError, SceneError, StructureError, VibrokitError, shown
+from vibrokit.errors import ParameterError, SceneError, StructureError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.progress import Progress, Work, checked_time_limit, stage, working
+from vibrokit.progress import Progress, checked_time_limit, working
 from vibrokit.registry import Group, load
 from vibrokit.results.atomic import checked_target
-from vibrokit.results.codes import Code
 from vibrokit.results.files import load_result
-from vibrokit.results.finding import Finding
-from vibrokit.results.merging import merged, part_of
-from vibrokit.results.rated import RatedResult
-from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable
-from vibrokit.results.structure import Structure
-from vibrokit.scene_file import scene_data
-from vibrokit.structure.find import find_structure
-from vibrokit.structure.validation import check_belongs, check_means, seed_of
+from vibrokit.structure.validation import check_means, seed_of
 
 METHODS = ("least-action", "mfet", "sgcm")
 """Analyzers that an assessment runs, in this order, by their registered names."""
 TIME_LIMIT = 300.0
 """Default budget (s)."""
-
-_PATHS = 0.4  # share of the time left that least action may take when rates are wanted too
 
 
 @called
@@ -111,31 +99,35 @@ def assess(
     analyzers, seed = _analyzers(osc, methods, exit or LeaveBasin(), real(accuracy)), seed_of(rng)
     limit = checked_time_limit(time_limit)
     kept = None if checkpoint is None else checked_target(checkpoint)
-    listed = members(known)
-    given = (known,) if listed is None else listed
-    if kept is not None and kept.exists():
-        before = load_result(kept)
-        if not isinstance(before, Assessment):
-            raise StructureError(
-                f"{kept} holds a record of kind {before.kind!r}, which an assessment would replace; give another file "
-                "as the checkpoint, and this one as known."
-            )
-        given = (*given, before)
     last: Assessment | None = None
     with working(progress, limit) as work:
-        road = _Road(osc, real(accuracy), limit, source, analyzers, seed, executor, work)
-        road.take(Known.of(given, real(accuracy)))
+        given = Known.of(_given(known, kept), real(accuracy))
+        road = Road(osc, real(accuracy), limit, source, analyzers, seed, executor, work, given)
         with Stoppable("the assessment") as stages:
-            for assessment in road.stages():
+            for last in road.stages():
                 if kept is not None:
-                    assessment.save(kept)
-                last = assessment
+                    last.save(kept)
         if last is None:  # the first stage yields one, or is stopped
             work.stop_again()
     assert last is not None
     return dataclasses.replace(
         last, complete=last.complete and not stages.stopped, findings=(*last.findings, *stages.findings)
     )
+
+
+def _given(known: Any, checkpoint: Path | None) -> tuple[Any, ...]:
+    """What is known before: records and files, and the checkpoint if it exists."""
+    listed = members(known)
+    given = (known,) if listed is None else listed
+    if checkpoint is None or not checkpoint.exists():
+        return given
+    before = load_result(checkpoint)
+    if not isinstance(before, Assessment):
+        raise StructureError(
+            f"{checkpoint} holds a record of kind {before.kind!r}, which an assessment would replace; give another "
+            "file as the checkpoint, and this one as known."
+        )
+    return (*given, before)
 
 
 def _check(accuracy: Any, source: Any) -> None:
@@ -156,152 +148,3 @@ def _analyzers(osc: Oscillator, methods: Any, exit: Exit, accuracy: float) -> di
     for one in found.values():
         one.check(osc)
     return found
-
-
-@dataclasses.dataclass(eq=False)
-class _Road:
-    """Runs the stages of one assessment and keeps their results."""
-
-    osc: Oscillator
-    accuracy: float
-    time_limit: float | None
-    source: int | str | None
-    analyzers: dict[str, Analyzer]
-    seed: int
-    executor: Executor | None
-    work: Work
-    structure: Structure | None = None
-    parts: dict[tuple[str, int], Part] = dataclasses.field(default_factory=dict)  # by analyzer and by source
-    left: list[Finding] = dataclasses.field(default_factory=list)
-    complete: bool = False
-
-    def take(self, known: Known) -> None:
-        """Take what is known; raises StructureError if that is of another scene or another exit."""
-        self.known = known
-        known.check(self.osc, self._exit)
-        for one in known.structures:
-            check_belongs(self.osc, one)
-            self.structure = one
-
-    @property
-    def _exit(self) -> Exit:
-        return next(iter(self.analyzers.values())).exit
-
-    def stages(self) -> Iterator[Assessment]:
-        """Run what is wanted and not known, and yield the assessment after each stage."""
-        if self.structure is None or not self.structure.complete:
-            with stage("which states are there"):
-                self.structure = find_structure(self.osc, rng=self.seed)
-        structure = self.structure
-        if not structure.complete or not structure.attractors:
-            yield self._assessment()
-            return
-        self.parts = self.known.parts(self.osc, structure)
-        yield self._assessment()
-        for analyzer in self.analyzers.values():
-            analyzer.exit.check(self.osc, structure)
-        labels = range(len(structure.attractors)) if self.source is None else [structure.attractor(self.source).label]
-        rated = {name: one for name, one in self.analyzers.items() if one.takes_intensities}
-        others = [name for name in self.analyzers if name not in rated]
-        ran = True
-        for number, name in enumerate(others):
-            paths = dataclasses.replace(self.analyzers[name], source=self.source)
-            ran &= self._run(name, paths, labels, _PATHS if rated else 1.0 / (len(others) - number))
-            yield self._assessment()
-        order = sorted(labels, key=self._energy)
-        runs = [(name, label) for label in order for name in rated]
-        waiting, repeated = list(runs), False
-        while waiting:
-            name, label = waiting.pop(0)
-            chosen: dict[str, Any] = {"source": label, "intensities": self._intensities(label)}
-            rates = dataclasses.replace(rated[name], **chosen)
-            ran &= self._run(name, rates, [label], 1.0 / (len(waiting) + 1))
-            if not (waiting or repeated or self.work.over):
-                waiting, repeated = self._open(runs), True
-            yield self._assessment()
-        asked = ((name, label) for name, label in self.parts if name in self.analyzers and label in labels)
-        self.complete = ran and all(self._is_known(name, label) for name, label in asked)
-        yield self._assessment()
-
-    def _open(self, runs: Sequence[tuple[str, int]]) -> list[tuple[str, int]]:
-        """Runs that the limit ended, if each can now have more time than it had."""
-        if self.time_limit is None:
-            return []
-        left = self.time_limit - self.work.seconds
-        ended = [run for run in runs if run in self.parts and not self.parts[run][0].complete]
-        return [run for run in ended if self.parts[run][0].seconds < left / len(ended)]
-
-    def _run(self, name: str, analyzer: Analyzer, labels: Sequence[int], share: float) -> bool:
-        """Run one analyzer in a share of the time left, unless as much is known; return whether there was time."""
-        assert self.structure is not None
-        if all(self._is_known(name, label) for label in labels):
-            return True
-        subject = "" if analyzer.source is None else self.structure.names[labels[0]]
-        if self.work.over:
-            self._leave(name, subject, "the work was stopped before.")
-            return False
-        limit = None if self.time_limit is None else share * (self.time_limit - self.work.seconds)
-        try:
-            with stage("how it is left" if not subject else "how long it lasts", subject=subject):
-                found = analyzer.run(self.osc, self.structure, executor=self.executor, time_limit=limit)
-        except VibrokitError as error:
-            self._leave(name, subject, str(error))
-            return True
-        for label in labels:
-            known, part = self.parts.get((name, label)), part_of(found, label)
-            if part.complete:
-                self.parts[name, label] = part, self.accuracy
-            elif known is None or (math.isinf(known[1]) and _content(part) > _content(known[0])):
-                self.parts[name, label] = part, math.inf
-        return True
-
-    def _is_known(self, name: str, label: int) -> bool:
-        """Whether an analysis came to its end for the accuracy that is self."""
-        return (name, label) in self.parts and self.parts[name, label][1] <= self.accuracy
-
-    def _leave(self, name: str, subject: str, reason: str) -> None:
-        which = f"{name} of {subject}" if subject else name
-        self.left.append(Finding.of(Code.ANALYZER_NOT_RUN, analyzer=which, reason=reason))
-
-    def _intensities(self, label: int) -> tuple[float, ...] | None:
-        """Noise intensities for one state; without an energy None, for those that analyzers have by default."""
-        assert self.osc.noise is not None
-        energy = self._energy(label)
-        return ladder(energy, self.osc.noise.intensity) if 0 < energy < math.inf else None
-
-    def _energy(self, label: int) -> float:
-        """ΔU of the exit that decides how long a state lasts, by methods without rates; infinite if none is known.
-
-        An energy that follows from rates would give each method another ladder, and no intensity in common. One with an
-        error as large as itself tells no intensity.
-        """
-        known = (one for (_, source), (one, _) in self.parts.items() if source == label)
-        own = (e for one in known if not isinstance(one, RatedResult) for e in one.energies if e.source == label)
-        assert self.osc.noise is not None
-        return barrier([e.value for e in own if not e.numerical_error >= e.value], self.osc.noise.intensity)
-
-    def _assessment(self) -> Assessment:
-        assert self.structure is not None
-        results, reached = {}, {}
-        for name in dict.fromkeys(name for name, _ in self.parts):
-            own = {label: part for (other, label), part in sorted(self.parts.items()) if other == name}
-            results[name] = merged([part for part, _ in own.values()])
-            reached[name] = np.full(len(self.structure.names), np.inf)
-            reached[name][list(own)] = [accuracy for _, accuracy in own.values()]
-        return Assessment(
-            scene=scene_data(self.osc),
-            settings={"accuracy": self.accuracy, "time_limit": self.time_limit, "methods": list(self.analyzers)},
-            findings=tuple(self.left),
-            stats=self.work.stats,
-            complete=self.complete,
-            seed=self.seed,
-            seconds=self.work.seconds,
-            structure=self.structure,
-            results=results,
-            reached=reached,
-        )
-
-
-def _content(found: Result) -> int:
-    """Number of energies and rates: of two incomplete results, the one with more is kept."""
-    return len(found.energies) + len(found.rates)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import os
 from collections.abc import Iterable
@@ -12,6 +11,7 @@ from typing import Any
 from vibrokit.analyzers.exits import Exit
 from vibrokit.analyzers.settings import exit_data
 from vibrokit.assessment.assessment import Assessment
+from vibrokit.comparison.reconcile import numbered
 from vibrokit.errors import StructureError, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.comparable import check_comparable, check_scene, differences
@@ -83,8 +83,8 @@ class Known:
             check_comparable(f"the known result of {name}", known, scene_data(osc), Section.of(structure))
             for label in analyzed_labels(known):
                 part = part_of(known, label)
-                keys = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
-                key = next(one for one in keys if (one, label) not in parts or _same(parts[one, label][0], part))
+                free = (one for one in numbered(name) if (one, label) not in parts or _same(parts[one, label][0], part))
+                key = next(free)
                 parts.setdefault((key, label), (part, accuracy))
         return parts
 

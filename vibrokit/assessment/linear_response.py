@@ -16,11 +16,7 @@ from vibrokit.structure.roots import bracketed_roots
 from vibrokit.structure.tones import Tone, tones
 from vibrokit.symbolic.numeric import amplitude_at, drift_at, excitation_of, jacobian_of
 
-_PLACES = np.geomspace(1e-12, 1e12, 24 * 32 + 1)  # distances from x = 0 (m) at which forces at rest are compared with 0
-_TONES, _LEAST_TONE = 63, 1e-9  # of each excitation, and the least of them, of the largest
-_PER_WAVE = 512  # of the shortest wave: the parabola through the highest sample has an error of 5e-10
 _UNDAMPED = 1e-12  # of a rate: damping of that size is rounding
-_MOST_WAVES = 1024  # in a common period: above it the tones are taken to meet in phase
 
 Array = NDArray[np.float64]
 
@@ -49,7 +45,8 @@ def linear_response(osc: Oscillator) -> LinearResponse | None:
     def force(x: float) -> float:
         return drift([x, 0.0, *[0.0] * extra])[1] + mean
 
-    places = np.concatenate([-_PLACES[::-1], [0.0], _PLACES])
+    away = np.geomspace(1e-12, 1e12, 24 * 32 + 1)  # distances (m) at which forces at rest are compared with 0
+    places = np.concatenate([-away[::-1], [0.0], away])
     values = np.array([force(float(place)) for place in places])
     if not values.any():  # no spring: it rests anywhere
         return None
@@ -76,7 +73,8 @@ def _tones(osc: Oscillator) -> tuple[list[Tone], float]:
     found, mean = list[Tone](), 0.0
     for index, part in enumerate(osc.excitations):
         if part.period is not None and math.isfinite(part.period):
-            own, more = tones(excitation_of(osc.model, index), part.period, _TONES, _LEAST_TONE)
+            # At most 63 tones of each, none below 1e-9 of the largest.
+            own, more = tones(excitation_of(osc.model, index), part.period, 63, 1e-9)
             found, mean = found + more, mean + own
     return found, mean
 
@@ -92,10 +90,10 @@ def _forced(osc: Oscillator, found: list[Tone], stiffness: float, damping: float
     except NoSectionError:
         period = math.inf
     most = period * max(w for w, _ in waves) / (2 * math.pi)
-    if not most <= _MOST_WAVES or not all(cmath.isfinite(a) for _, a in waves):
-        reach = float(sum(abs(a) for _, a in waves))
+    if not most <= 1024 or not all(cmath.isfinite(a) for _, a in waves):
+        reach = float(sum(abs(a) for _, a in waves))  # so many waves meet in phase at some time
         return reach, reach, float(sum(w * abs(a) for w, a in waves))
-    count = math.ceil(most * _PER_WAVE)
+    count = math.ceil(512 * most)  # in the shortest wave 512: a parabola through the highest errs by 5e-10
     phases = 2j * np.pi * np.arange(count) / count
     turns = [np.exp(phases * round(w * period / (2 * math.pi))) for w, _ in waves]
     x = sum((a * turn).real for (_, a), turn in zip(waves, turns, strict=True))

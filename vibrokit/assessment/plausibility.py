@@ -7,25 +7,26 @@ import math
 from collections.abc import Iterator
 from enum import StrEnum
 
-from vibrokit.assessment.contact_times import contact_time
+import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
 from vibrokit.assessment.linear_response import LinearResponse, departure, linear_response
 from vibrokit.assessment.oddities import Oddity, OddityCode
 from vibrokit.construction import called
 from vibrokit.oscillator import Oscillator, check_oscillator
 from vibrokit.parts.barrier import Barrier
-from vibrokit.symbolic.numeric import amplitude_at
+from vibrokit.symbolic.numeric import amplitude_at, contact_force_of
 from vibrokit.text_table import text_table
+from vibrokit.text_units import size_of
 
 # The correct scenes of tests/assessment/test_plausibility.py lie within these limits, except those counted there.
-_FAR = (
-    100.0  # of a ratio of forcing to natural frequency, or of amplitude to gap: two decades from resonance, or contact
-)
+_FAR = 100.0  # of a ratio of forcing to natural frequency, or of amplitude to gap: two decades from resonance
 _NEAR = 2.0  # of f/f_n: where systems with stops are forced; 2π away from it, Hz was given for rad/s
 _HEAVY = 0.5  # of the damping ratio: above it there is no resonance, and 0.5 % is 0.005
 _NEVER = 1e3  # of ΔU/D: exp(1000) periods is longer than anything
 _BRIEF = 1e-4  # of a period: fixed steps that resolve a contact are beyond 10⁵ in a period
 _LINEAR = 0.1  # departure of the forces from linear ones, as a part of these, up to which linear responses are given
-_GRAVITY = 9.80665  # m s⁻²
 
 
 class Measure(StrEnum):
@@ -161,7 +162,7 @@ def _noise(osc: Oscillator, response: LinearResponse | None) -> Iterator[Row]:
         factor = amplitude_at(osc.model, (response.rest if response else 0.0, 0.0))[1]
         density = 2 * osc.noise.intensity * factor**2
         yield Row(Measure.PSD, density)
-        yield Row(Measure.PSD_G, density / _GRAVITY**2)
+        yield Row(Measure.PSD_G, density / size_of("g", "m s^-2") ** 2)
 
 
 def _stop(osc: Oscillator, response: LinearResponse, index: int, barrier: Barrier) -> Iterator[Row | Oddity]:
@@ -203,3 +204,36 @@ def _reach(osc: Oscillator, response: LinearResponse, side: str, gap: float) -> 
         yield Row(Measure.FIRST_CONTACT_OVER_D, ratio, side)
         if ratio > _NEVER:
             yield Oddity(OddityCode.NOISE_WEAK, {"side": side, "ratio": ratio})
+
+
+def contact_time(osc: Oscillator, index: int, speed: float) -> float:
+    """Return the time from touch to release at one stop for an impact at some speed (m s⁻¹).
+
+    The force is that at rate 0, which conserves energy. The largest depth d follows from ∫₀ᵈ F dδ = v²/2, and the time
+    is 2 ∫₀ᵈ dδ/√(v² − 2∫F). For kδ that is π/√k; for kδ^(3/2) it is 2.94 d/v. NaN if the force does not turn the mass
+    back.
+    """
+    force = contact_force_of(osc.model, index)
+    length = speed / osc.natural_frequency  # the depths are searched over twenty decades about it
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+
+    def work(low: float, high: float) -> float:
+        """∫F dδ, in δ = low + (high − low) s²: smooth at touch for half-integer powers."""
+        s = 0.5 * (nodes + 1)
+        forces = np.array([max(force(low + (high - low) * each**2, 0.0), 0.0) for each in s])
+        return float((high - low) * (weights * s * forces).sum())
+
+    def excess(depth: float) -> float:
+        return work(0.0, depth) - 0.5 * speed**2
+
+    low, high = 1e-15 * length, 1e6 * length
+    if not excess(low) < 0 < excess(high):
+        return math.nan
+    logarithm = brentq(lambda each: excess(math.exp(each)), math.log(low), math.log(high), xtol=1e-13)
+    depth = math.exp(logarithm)
+
+    def integrand(s: float) -> float:  # δ = d(1 − s²): the speed vanishes like s at the turning point
+        remaining = 2 * work(depth * (1 - s * s), depth)
+        return 2 * s * depth / math.sqrt(remaining) if remaining > 0 else 0.0
+
+    return 2 * float(quad(integrand, 0.0, 1.0, epsrel=1e-8, limit=50)[0])

@@ -38,9 +38,6 @@ from vibrokit.structure.validation import check_means, seed_of
 from vibrokit.text_units import size_of
 
 _DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
-_NODES = (120, 120)  # of graphs, which propose paths here: their lower bounds are not asked for
-_SAME = 1e-5  # of the widths of the region: distance of two points that are one
-_ERROR = 0.2  # of a mean time: 25 exits
 _ALONG = (Code.BIFURCATION, Code.BRANCH_ENDS, Code.PATH_LOST, Code.LEAST_PATH_CHANGES, Code.NOTHING_AT)
 _VALUES = ("value", "error", "low", "high", "next")  # of the parameter, in findings of these codes
 
@@ -179,9 +176,9 @@ class _Run:
             names[label]: [number for number, at in enumerate(self.states.states) if label in at.branches]
             for label in labels
         }
-        analyzer = LeastAction(
-            source=None if source is None else names[labels[0]], graph=GraphSearch(nodes=_NODES)
-        )  # fmt: skip
+        # Few nodes propose paths; their lower bounds are not asked for.
+        graph = GraphSearch(nodes=(120, 120))
+        analyzer = LeastAction(source=None if source is None else names[labels[0]], graph=graph)
         run = self.search = EnergyRun(
             self.osc, self.line, self.values, analyzer, places, self.states.seed or 0,
             structure_at=self._structure, existing=existing,
@@ -240,7 +237,7 @@ class _Run:
             energy = float(paths.energy(name)[place]) if name in left else 0.0
             if not energy > 0:
                 continue
-            analyzer = MFET(source=label, intensities=(energy / _DEPTH,), target_error=_ERROR)
+            analyzer = MFET(source=label, intensities=(energy / _DEPTH,), target_error=0.2)  # 25 exits
             try:
                 result = analyzer.run(self.line.at(self.osc, float(self.values[place])), structure)
             except VibrokitError as error:
@@ -254,7 +251,7 @@ def _same(attractor: Attractor, known: Sequence[Attractor], widths: NDArray[np.f
     """Which of some attractors it is, in a region of these widths."""
     for one in known:
         away = np.abs(one.points[:, :2] - attractor.points[0, :2])
-        if (one.kind, one.period) == (attractor.kind, attractor.period) and (away < _SAME * widths).all(axis=1).any():
+        if (one.kind, one.period) == (attractor.kind, attractor.period) and (away < 1e-5 * widths).all(axis=1).any():
             return one
     return None
 

@@ -6,8 +6,7 @@ import dataclasses
 import itertools
 import os
 import time
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from vibrokit.arguments import real
@@ -104,16 +103,17 @@ def _results_of(given: Sequence[Any]) -> list[Result]:
     return results
 
 
+def numbered(name: str) -> Iterator[str]:
+    """Yield the names that a first, a second, … result of one analyzer has: ``"mfet"``, ``"mfet 2"``, …."""
+    yield name
+    yield from (f"{name} {number}" for number in itertools.count(2))
+
+
 def _method_names(results: Sequence[Result]) -> tuple[str, ...]:
-    """Names of the results: those of their analyzers, numbered where one occurs twice."""
-    names = [result.made_by for result in results]
-    many = {name for name, count in Counter(names).items() if count > 1}
-    seen: Counter[str] = Counter()
-    found = []
-    for name in names:
-        seen[name] += 1
-        found.append(f"{name} {seen[name]}" if name in many else name)
-    return tuple(found)
+    names = list[str]()
+    for result in results:
+        names.append(next(name for name in numbered(result.made_by) if name not in names))
+    return tuple(names)
 
 
 def _with_totals(quantities: list[Quantity], methods: Sequence[str]) -> list[Quantity]:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from vibrokit.assessment.assessment import Assessment
+from vibrokit.comparison.reconcile import numbered
 from vibrokit.errors import ArgumentError, shown
 from vibrokit.results.comparable import check_comparable, check_scene
 from vibrokit.results.record import Record
@@ -51,7 +52,7 @@ def _assessment(whole: Assessment | None, structure: Structure, results: Sequenc
     named = dict(whole.results) if whole else {}
     for one in results:
         check_comparable("a result", one, structure.scene, Section.of(structure))
-        named[_free_name(one.made_by, named)] = one
+        named[next(name for name in numbered(one.made_by) if name not in named)] = one
     if whole is not None:
         return dataclasses.replace(whole, results=named)
     return Assessment(
@@ -62,9 +63,3 @@ def _assessment(whole: Assessment | None, structure: Structure, results: Sequenc
         seconds=structure.seconds + sum(one.seconds for one in results),
         versions=structure.versions,
     )
-
-
-def _free_name(name: str, taken: dict[str, Result]) -> str:
-    """A name, with a number where it is taken."""
-    count = sum(other == name or other.startswith(f"{name}-") for other in taken)
-    return f"{name}-{count + 1}" if count else name
