@@ -25,11 +25,9 @@ from vibrokit.parts.noise.noise_model import NoiseModel
 from vibrokit.parts.spring.spring import Spring
 from vibrokit.registry import load, names
 from vibrokit.testing.contact import ContactLawChecks
-from vibrokit.testing.excitation import ExcitationChecks
-from vibrokit.testing.noise_model import NoiseModelChecks
+from vibrokit.testing.kinds import ExcitationChecks, NoiseModelChecks, SpringChecks
 from vibrokit.testing.part_checks import PartChecks, Rng
 from vibrokit.testing.report import Check, ConformanceError, Outcome, Report, raise_failures, run_checks
-from vibrokit.testing.spring import SpringChecks
 
 __all__ = [
     "Check",

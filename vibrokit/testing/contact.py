@@ -24,10 +24,6 @@ from vibrokit.testing.report import Check, ConformanceError
 
 _SIDES = (("right", 1), ("left", -1))
 _NEAREST = mpmath.mpf(10) ** -4000  # a depth whose 200th root is negligible
-_ORDERS_AT_TOUCH = range(1, 9)
-_TOUCH_DIGITS = 250
-_SMOOTH_IN = {1: "depth", 2: "√depth", 4: "depth^(1/4)"}
-_NEAR, _NEARER = mpmath.mpf("1e-6"), mpmath.mpf("1e-12")
 
 
 class ContactLawChecks(PartChecks[ContactLaw]):
@@ -160,14 +156,15 @@ class ContactLawChecks(PartChecks[ContactLaw]):
 
     def smoothness(self) -> str:
         """Near the stop the force has the derived power series, in a root of the depth."""
-        results = []
+        results, roots = [], {1: "depth", 2: "√depth", 4: "depth^(1/4)"}
+        near, nearer = mpmath.mpf("1e-6"), mpmath.mpf("1e-12")
         for part, force in self.each():
             contact = self.contact(part)
-            results.append(_SMOOTH_IN[contact.root] if contact.smooth else "not smooth")
+            results.append(roots[contact.root] if contact.smooth else "not smooth")
             if not contact.smooth:
                 continue
-            for order in _ORDERS_AT_TOUCH:
-                slopes = [self._slope(force, order, size, contact.root) for size in (_NEARER, _NEAR)]
+            for order in range(1, 9):
+                slopes = [self._slope(force, order, size, contact.root) for size in (nearer, near)]
                 if abs(slopes[0]) > 30 * abs(slopes[1]) + 1e-9 * abs(force(1, 1)):
                     raise ConformanceError(
                         f"The model derives a force smooth in {results[-1]} at first touch for {part!r}, but its "
@@ -179,10 +176,11 @@ class ContactLawChecks(PartChecks[ContactLaw]):
     @staticmethod
     def _slope(force: Function, order: int, size: Any, root: int) -> Any:
         """Divided difference of the force over points 1, 2, … times `size`, in a root of the depth."""
-        with mpmath.workdps(_TOUCH_DIGITS):
+        digits = 250  # a difference of order 8 loses 8 · 12 of them
+        with mpmath.workdps(digits):
             total = mpmath.mpf(0)
             for k in range(order + 1):
-                value = force((size * (k + 1)) ** root, mpmath.mpf(1) / 3, digits=_TOUCH_DIGITS)
+                value = force((size * (k + 1)) ** root, mpmath.mpf(1) / 3, digits=digits)
                 total += (-1) ** (order - k) * mpmath.binomial(order, k) * value
             return total / size**order
 

@@ -20,7 +20,6 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.report import ConformanceError
 
-_STEPS_PER_TIME = 64
 _SECONDS = 300
 _ADVICE = "define the class at the top level of a module that can be imported."
 _MAIN = (
@@ -32,7 +31,7 @@ _MAIN = (
 def outcome(scene: Oscillator) -> tuple[str, bytes]:
     """Return the newly generated code of a scene, and the images of a few states."""
     flow = Flow.STATE if scene.noise is None else Flow.NOISY
-    stepper = RK4(steps=max(1, round(_STEPS_PER_TIME * scene.time_unit)))
+    stepper = RK4(steps=max(1, round(64 * scene.time_unit)))
     extra = 0 if scene.noise is None else len(scene.noise.extra_states)
     starts = np.array([[0.3, 0.4], [-0.2, 0.9], [0.15, 0.0], [0.05, -0.6]])
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])

@@ -16,8 +16,6 @@ from vibrokit.testing.report import ConformanceError
 DIGITS = 60
 CLOSE = 1e-12
 _STEP = mpmath.mpf("1e-10")  # relative; errors of a central difference: its square, and rounding, 1e-60 divided by it
-_EPSILON = 2.0**-52
-_ROUNDINGS = 64  # allowed per operation of a formula
 _FUNCTIONS = {"Max": max, "Min": min, "Abs": abs, "sign": mpmath.sign}
 
 Function = Callable[..., Any]
@@ -122,8 +120,8 @@ class Reference:
 
     @cached_property
     def bound(self) -> Function:
-        """The largest rounding error."""
-        allowed = sympy.Float(_ROUNDINGS * _EPSILON) * _in_roundings(self._formula)
+        """The largest rounding error: 64 roundings for each operation of the formula."""
+        allowed = sympy.Float(64 * 2.0**-52) * _in_roundings(self._formula)
         return function(allowed, self._arguments, self._values)
 
     def compare(self, point: Sequence[float], found: Any, factor: int = 1) -> tuple[float, bool]:

@@ -19,8 +19,6 @@ from vibrokit.testing.report import ConformanceError
 
 _SAMPLES = 3
 _ATTEMPTS = 100
-_SMALLEST, _LARGEST = 0.1, 100.0
-_EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.0, 1.25, 0.5)  # usual values of structural numbers
 
 # Instances of classes with a formula, which cannot be drawn at random.
 REPRESENTATIVES: dict[type[Part], Callable[[], Part]] = {
@@ -50,11 +48,11 @@ def samples(part: Part | type[Part], rng: np.random.Generator) -> tuple[Part, ..
 def value_for(declared: Parameter, rng: np.random.Generator) -> float:
     """Draw a value in the range of a parameter, of moderate size and not at the lower end."""
     if declared.structural:
-        fitting = [value for value in _EXPONENTS if _allowed(declared, value)]
+        fitting = [value for value in (1.0, 1.5, 2.0, 2.5, 3.0, 1.25, 0.5) if _allowed(declared, value)]
         if fitting:
             return float(rng.choice(fitting))
     low = declared.above if declared.above is not None else declared.minimum
-    size = math.exp(rng.uniform(math.log(_SMALLEST), math.log(_LARGEST)))
+    size = math.exp(rng.uniform(math.log(0.1), math.log(100.0)))
     if low is not None and declared.maximum is not None:
         return float(rng.uniform(low + 0.01 * (declared.maximum - low), declared.maximum))
     if low is not None:

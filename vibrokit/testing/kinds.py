@@ -1,7 +1,8 @@
-"""Checks of noise models."""
+"""Checks of springs, excitations and noise models."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -11,20 +12,122 @@ import sympy
 
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
+from vibrokit.parts.excitation.excitation import Excitation
 from vibrokit.parts.excitation.harmonic import Harmonic
 from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.noise.white import WhiteNoise
+from vibrokit.parts.spring.cubic import CubicSpring
+from vibrokit.parts.spring.spring import Spring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow import derive_flow
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import printable
-from vibrokit.testing.compiled import Compiled
+from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import Reference, derivative
 from vibrokit.testing.report import Check, ConformanceError
 
-_TAKEN = ("x", "v", "t", "S")
+_STATE = (sympy.Symbol("x", real=True), sympy.Symbol("v", real=True))
+
+
+class SpringChecks(PartChecks[Spring]):
+    """The checks of one spring."""
+
+    kind: ClassVar[type[Spring]] = Spring
+    group = Group.SPRINGS
+    arguments = _STATE
+    place = "spring"
+
+    def physics(self) -> tuple[Check, ...]:
+        return (
+            Check("finite force", self.finite),
+            Check("derivatives", self.derivatives),
+            Check("compiled", self.compiled),
+        )
+
+    def scene(self, part: Spring) -> Oscillator:
+        return Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=part, excitations=(Harmonic(0.2, 0.9),))
+
+    def compiled_distances(self, part: Spring) -> Iterator[float]:
+        scene = Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=part, noise=WhiteNoise(intensity=1.0))
+        code = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL)
+        formula = self.expression(part)
+        for orders, (index, momentum, factor) in ENTRIES.items():
+            reference = self.reference(part, derivative(formula, self.arguments, orders))
+            for point in self.points():
+                for rates in (code.derivative, code.rhs):  # the force on the mass is minus that of the spring
+                    found = rates(hamiltonian_start(point, momentum))[index]
+                    yield reference.check(f"the derivative of orders {orders} of {part!r}", point, found, -factor)
+
+
+class ExcitationChecks(PartChecks[Excitation]):
+    """The checks of one excitation."""
+
+    kind: ClassVar[type[Excitation]] = Excitation
+    group = Group.EXCITATIONS
+    arguments = (sympy.Symbol("t", real=True),)
+    place = "excitations.0"
+    reach, count = 50.0, 20
+
+    def physics(self) -> tuple[Check, ...]:
+        return (
+            Check("finite force", self.finite),
+            Check("period", self.period),
+            Check("compiled", self.compiled),
+        )
+
+    def scene(self, part: Excitation) -> Oscillator:
+        return Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(part,))
+
+    def period(self) -> str:
+        """The force repeats after a finite `period`; a `period` of None means a constant force."""
+        periods = []
+        for part in self.samples:
+            period = self._declared_period(part)
+            periods.append("constant" if period is None else f"{period:.6g} s")
+            if period == math.inf:
+                continue
+            force = self.reference(part).exact
+            shift = math.pi if period is None else period
+            times = [mpmath.mpf(k) * shift / 37 for k in range(-37, 370, 11)]  # ten periods
+            size = max(abs(force(t)) for t in times)
+            for t in times:
+                change = abs(force(t + shift) - force(t))
+                if change > 1e-12 * size:
+                    raise ConformanceError(
+                        f"{part!r} has the period {period}, but its force changes by {mpmath.nstr(change, 6)} from t = "
+                        f"{mpmath.nstr(t, 6)} to {mpmath.nstr(t + shift, 6)}; return a period of the force, or None if "
+                        "it is constant."
+                    )
+        return ", ".join(dict.fromkeys(periods))
+
+    @staticmethod
+    def _declared_period(part: Excitation) -> float | None:
+        try:
+            period = part.period
+        except Exception as error:
+            raise ConformanceError(f"{part!r}.period raises {type(error).__name__}: {error}.") from error
+        if period is not None and not (isinstance(period, (int, float)) and period > 0):
+            raise ConformanceError(
+                f"{part!r}.period must be a positive number of seconds, None for a constant force, or math.inf for one "
+                f"that never repeats, got {period!r}."
+            )
+        return period
+
+    def compiled_distances(self, part: Excitation) -> Iterator[float]:
+        scene = Oscillator(
+            natural_frequency=1.0,
+            damping_ratio=0.0,
+            spring=CubicSpring(linear=0.0, cubic=0.0),
+            excitations=(part,),
+        )
+        code, reference, start = Compiled(scene, Flow.STATE), self.reference(part), (0.0, 0.0)
+        for (time,) in self.points():
+            forcing = code.call("forcing", time) if code.has("forcing") else 0.0
+            for found in (code.derivative(start, forcing)[1], code.rhs(start, time=time)[1]):
+                yield reference.check(f"the force of {part!r}", (time,), found)
 
 
 class NoiseModelChecks(PartChecks[NoiseModel]):
@@ -33,7 +136,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
     kind: ClassVar[type[NoiseModel]] = NoiseModel
     group = Group.NOISE_MODELS
     method = "amplitude"
-    arguments = (sympy.Symbol("x", real=True), sympy.Symbol("v", real=True))
+    arguments = _STATE
     place = "noise"
 
     def physics(self) -> tuple[Check, ...]:
@@ -66,12 +169,12 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
 
     def extra_states(self) -> str:
         """Each extra state has a name and a rate, and the force depends on no other states."""
-        names = self.samples[0].extra_states
+        names, taken = self.samples[0].extra_states, ("x", "v", "t", "S")
         if not (isinstance(names, tuple) and all(isinstance(name, str) and name.isidentifier() for name in names)):
             raise ConformanceError(f"{self.cls.__name__}.extra_states must be a tuple of names, got {names!r}.")
-        if len(set(names)) < len(names) or set(names) & set(_TAKEN):
+        if len(set(names)) < len(names) or set(names) & set(taken):
             raise ConformanceError(
-                f"{self.cls.__name__}.extra_states must be distinct names, not {', '.join(_TAKEN)}, got {names!r}."
+                f"{self.cls.__name__}.extra_states must be distinct names, not {', '.join(taken)}, got {names!r}."
             )
         for part in self.samples:
             states = tuple(sympy.Symbol(name, real=True) for name in names)
