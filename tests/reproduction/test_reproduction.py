@@ -11,9 +11,8 @@ from vibrokit.errors import FileError
 from vibrokit.progress import working
 from vibrokit.reproduction.published import STATES, Method, Published, published_energies, scenes
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
-from vibrokit.reproduction.steps import Step, steps
+from vibrokit.reproduction.steps import Step, do, steps
 from vibrokit.reproduction.verdicts import Match, of_action_plot, of_density, of_exit_times, unknown
-from vibrokit.reproduction.work import do
 
 ONE = Published("hertz-0.570", "N", Method.ACTION_PLOT, 8.2e-5, 0.05e-5)
 STEPS = (

@@ -15,10 +15,9 @@ from vibrokit.plots.artists import Artists
 from vibrokit.plots.densities import density_map, sampled_density
 from vibrokit.plots.escapes import escapes
 from vibrokit.plots.exit_times import ArrheniusLine, ExitTimes, reconciled_times
-from vibrokit.reproduction.comparison import of_both, total_fit
 from vibrokit.reproduction.published import STATES, Method, paper, published_energies, target_of
-from vibrokit.reproduction.steps import METHODS
-from vibrokit.reproduction.work import Records
+from vibrokit.reproduction.steps import METHODS, Records
+from vibrokit.reproduction.verdicts import of_both, total_fit
 from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.record import Record

@@ -12,12 +12,10 @@ from vibrokit.progress import Progress, put_off, working
 from vibrokit.report.blocks import Chapter, Picture, Sentences, Table
 from vibrokit.report.chapters import work_chapter
 from vibrokit.report.report import Report
-from vibrokit.reproduction.comparison import verdicts
 from vibrokit.reproduction.figures import Figure, figures
 from vibrokit.reproduction.published import STATES
-from vibrokit.reproduction.steps import steps
-from vibrokit.reproduction.verdicts import Match, Verdict
-from vibrokit.reproduction.work import Records, do
+from vibrokit.reproduction.steps import Records, do, steps
+from vibrokit.reproduction.verdicts import Match, Verdict, verdicts
 from vibrokit.results.atomic import made_folder
 from vibrokit.results.pictures import save_figure
 from vibrokit.text_table import number_text

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from vibrokit.analyzers.action_plot import ActionPlot
@@ -10,10 +12,23 @@ from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.exits import LeaveBasin
 from vibrokit.analyzers.least_action import LeastAction
 from vibrokit.analyzers.mean_exit_times import MFET
+from vibrokit.analyzers.settings import settings_of
 from vibrokit.analyzers.sgcm_wkb import SGCM
 from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.errors import VibrokitError
+from vibrokit.oscillator import Oscillator
+from vibrokit.progress import advance, stage
 from vibrokit.reproduction.published import STATES, paper, scenes, target_of
+from vibrokit.results.atomic import checked_target
+from vibrokit.results.files import load_result
+from vibrokit.results.record import Record, versions
+from vibrokit.results.stoppable import Stoppable
+from vibrokit.results.structure import Structure
+from vibrokit.scene_file import load_scene, scene_data
+from vibrokit.structure.find import find_structure
 
+Records = dict[str, dict[str, Record]]
+"""By scene and by the name of the step."""
 METHODS = ("least-action", "ring", "density", "exit-times")
 """What each state is left by; the names of the steps are these with the state."""
 
@@ -61,3 +76,59 @@ def _methods(scene: str, state: str, *, quick: bool) -> tuple[Analyzer, ...]:
         SGCM(**left, intensities=(density,), accuracy=0.5 if quick else 0.1),
         MFET(**left, intensities=simulated, target_error=error, escapes=_ESCAPES),
     )
+
+
+def do(wanted: Sequence[Step], folder: Path) -> Records:
+    """Do the steps that have no complete record in a folder, and return the records of all that were reached.
+
+    A record is written whole or not at all, and read again, so that work which was stopped at any moment goes on with
+    the same bits: all arrays, energies and findings are those of work that was not stopped. Only times and the counts
+    of seconds differ. An interrupt or a time limit ends the work; the step under way is done again the next time.
+
+    Raises
+    ------
+    FileError
+        A file cannot be written; this is found before any work.
+    """
+    found: Records = {}
+    files = [checked_target(folder / step.file) for step in wanted]
+    with Stoppable("steps"), stage("steps", unit="steps", total=len(wanted)):
+        for step, file in zip(wanted, files, strict=True):
+            osc, own = load_scene(step.scene), found.setdefault(step.scene, {})
+            record = _kept(file, step, osc)
+            if record is None:
+                with stage(step.name, subject=step.scene, unit="step", total=1):
+                    made = _made(step, osc, own)
+                    if not made.complete:
+                        break
+                    made.save(file)
+                    advance()
+                record = load_result(file)
+            own[step.name] = record
+            advance()
+    return found
+
+
+def _kept(file: Path, step: Step, osc: Oscillator) -> Record | None:
+    """What a step made before; None if its file is missing or damaged, or of another scene, other settings or versions.
+
+    All these are done again: the file of a step is the work's own.
+    """
+    try:
+        record: Record = load_result(file)
+    except VibrokitError:
+        return None
+    if step.analyzer is None:
+        same = isinstance(record, Structure) and record.settings["cells"] == (step.cells and list(step.cells))
+    else:
+        same = record.settings == settings_of(step.analyzer)
+    same = same and (record.scene, record.versions) == (scene_data(osc), versions())
+    return record if record.complete and same else None
+
+
+def _made(step: Step, osc: Oscillator, before: dict[str, Record]) -> Record:
+    if step.analyzer is None:
+        return find_structure(osc, cells=step.cells)
+    structure = before["structure"]
+    assert isinstance(structure, Structure)  # the first step of a scene
+    return step.analyzer.run(osc, structure)

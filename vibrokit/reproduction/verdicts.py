@@ -1,12 +1,24 @@
-"""Verdicts: whether a published number is met, and if not, why."""
+"""Our numbers beside the published ones, and verdicts: whether a published number is met, and if not, why."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 
-from vibrokit.reproduction.published import Published
+from vibrokit.comparison.quantities import DEVIATIONS
+from vibrokit.comparison.stationary import StationaryDensity
+from vibrokit.errors import StructureError
+from vibrokit.reproduction.published import STATES, Method, Published, paper, published_energies, target_of
+from vibrokit.reproduction.steps import METHODS, Records
+from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.exit_rate import ExitRate
+from vibrokit.results.merging import merged
+from vibrokit.results.rated import RatedResult
+from vibrokit.results.record import Record
+from vibrokit.results.result import Result
 from vibrokit.results.sentenced import Sentenced
+from vibrokit.results.sgcm import SGCMResult
 
 _SAMPLES = 1e9  # the states of a simulation that fills a histogram, at most
 
@@ -97,3 +109,54 @@ def of_exit_times(one: Published, slope: float, error: float, certified: float) 
     else:
         match = Match.NOT_MET
     return Verdict(one, slope, slope - error, slope + error, certified, match, beside=slope)
+
+
+def verdicts(records: Records) -> list[Verdict]:
+    """Return a verdict for each published number; it is unknown where its records are missing."""
+    found: list[Verdict] = []
+    for one in published_energies():
+        try:
+            found.append(_verdict(one, records.get(one.scene, {})) or unknown(one, "the work ended before."))
+        except StructureError as error:
+            found.append(unknown(one, str(error)))
+    return found
+
+
+def _verdict(one: Published, known: dict[str, Record]) -> Verdict | None:
+    least, ring, _, times = (known.get(f"{name}-{one.state}") for name in METHODS)
+    if not isinstance(least, Result):
+        return None
+    source, target = STATES[one.state], target_of(one.state)
+    energy = least.energy(source, target)
+    match one.method:
+        case Method.ACTION_PLOT if isinstance(ring, Result):
+            return of_action_plot(one, energy.lower, energy.upper, _value(ring, source, target))
+        case Method.DENSITY if isinstance(density := of_both(known, "density"), SGCMResult):
+            intensity = paper()["density"]["intensity"]
+            value = float(StationaryDensity.of(density).barrier(energy.source).sel(intensity=intensity))
+            error = intensity * max(rate.log_error for rate in density.rates)  # ln p is the sum of both states' parts
+            return of_density(one, value, error, energy.value, intensity)
+        case Method.EXIT_TIMES if isinstance(times, RatedResult):
+            fit = total_fit(times, energy)
+            return of_exit_times(one, fit.slope, DEVIATIONS * fit.slope_error, energy.value)
+    return None
+
+
+def of_both(known: dict[str, Record], method: str) -> Result | None:
+    """Return what a method found for both states, as one result; None if one is missing."""
+    found = [one for state in STATES if isinstance(one := known.get(f"{method}-{state}"), Result)]
+    return merged(found) if len(found) == len(STATES) else None
+
+
+def total_fit(times: RatedResult, energy: ActivationEnergy) -> ArrheniusFit:
+    """Return the Arrhenius law of leaving a state for any target: the paper counts every exit."""
+    own = [rate for rate in times.rates if rate.source == energy.source]
+    at = dict.fromkeys(rate.intensity for rate in own)
+    return ArrheniusFit.of([ExitRate.total([rate for rate in own if rate.intensity == one]) for one in at])
+
+
+def _value(result: Result, source: str, target: str | None) -> float:
+    try:
+        return result.energy(source, target).value
+    except StructureError:
+        return math.nan
