@@ -9,6 +9,7 @@ import vibrokit as vk
 from tests.scenes import double_well
 from vibrokit.comparison.quantities import Kind
 from vibrokit.comparison.verdicts import Agreement
+from vibrokit.results.merging import part_of
 
 
 @pytest.fixture(scope="module")
@@ -74,19 +75,11 @@ def test_pictures_of_the_rates(wells):
         wells.plot_slopes(source="neither")
 
 
-def test_an_attractor_without_a_density_is_named(wells):
-    alone = vk.SGCM(source=0, intensities=(0.02,), nodes=(80, 80)).run(wells.oscillator, wells_structure(wells))
+def test_an_attractor_without_a_density_is_named_and_too_few_nodes_are_refused(wells):
     with pytest.raises(vk.errors.StructureError, match="right-rest"):
-        vk.StationaryDensity.of(alone)
+        vk.StationaryDensity.of(part_of(wells, 0))
     with pytest.raises(vk.errors.StructureError, match="needs a result of SGCM"):
         vk.StationaryDensity.of(3)
-
-
-@pytest.mark.parametrize("nodes", [(2, 2), (1, 9), 3.5, "many"])
-def test_too_few_nodes_are_refused(wells, nodes):
-    with pytest.raises(vk.errors.StructureError):
-        vk.StationaryDensity.of(wells, nodes)
-
-
-def wells_structure(wells):
-    return vk.find_structure(wells.oscillator, cells=(40, 40), manifolds=False, rng=0)
+    for nodes in ((2, 2), (1, 9), 3.5, "many"):
+        with pytest.raises(vk.errors.StructureError):
+            vk.StationaryDensity.of(wells, nodes)

@@ -68,25 +68,6 @@ def test_a_scene_file_may_name_it(tmp_path):
         vk.load_scene(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "flaw"),
-    [
-        ("import no_such_package\n", "ModuleNotFoundError: No module named 'no_such_package'"),
-        ("raise SystemExit(3)\n", "SystemExit: 3"),
-        ("Law = 3\n", "must be a subclass of ContactLaw, got 3"),
-        ("def f(:\n", "SyntaxError"),
-    ],
-)
-def test_a_broken_plugin_warns_by_name_and_stops_nothing(site, monkeypatch, text, flaw):
-    write_distribution(site, "broken-laws", "broken = broken_laws:Law", broken_laws=text)
-    monkeypatch.delitem(sys.modules, "broken_laws", raising=False)
-    assert Registered("broken", "broken-laws") in registry.names(Group.CONTACT_LAWS)
-    with pytest.warns(UserWarning, match=f"contact law 'broken' of the distribution broken-laws is skipped.*{flaw}"):
-        working = registry.load_all(Group.CONTACT_LAWS, ContactLaw)
-    assert {"hertz", "linear", "custom", "hunt-crossley"} <= set(working)
-    assert "broken" not in working
-
-
 def test_a_broken_plugin_is_not_even_imported_by_scenes_that_do_not_name_it(site, tmp_path):
     write_distribution(site, "broken-laws", "broken = broken_laws:Law", broken_laws="raise SystemExit(3)\n")
     with warnings.catch_warnings():

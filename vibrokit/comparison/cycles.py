@@ -8,8 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.comparison.difference_bounds import difference_bounds
-from vibrokit.comparison.in_trees import tree_costs
+from vibrokit.comparison.in_trees import difference_bounds, tree_costs
 from vibrokit.documented import documented
 
 Array = NDArray[np.float64]

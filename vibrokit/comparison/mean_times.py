@@ -19,8 +19,6 @@ from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
 
 _SAME = 1e-9  # relative: intensities that differ by less are one
-_FARTHEST = 30.0  # in ln D, from a computed intensity: twelve decades, farther than any noise is from it
-_STEP = 0.1  # in ln D, of a search for an intensity: ln τ is smooth over 10 %
 
 Array = NDArray[np.float64]
 
@@ -156,21 +154,22 @@ def intensity_for(
     def crossing(start: float, end: str, step: float) -> float | None:
         """ln of the nearest intensity from a start at which an end of the interval is `log_time`."""
         first = excess(start, end)
-        for number in range(math.ceil(_FARTHEST / abs(step))):
+        for number in range(300):  # over thirteen decades
             low, high = start + number * step, start + (number + 1) * step
             if not excess(high, end) * first > 0:
                 known_there = not math.isnan(excess(high, end))
                 return float(brentq(excess, low, high, args=(end,))) if known_there else None
         return None
 
+    step = 0.1  # in ln D: ln τ is smooth over 10 %
     computed = np.log(np.unique(np.concatenate([times.intensities for times in known])))
     start = float(computed[np.argmin([abs(excess(one, "value")) for one in computed])])
-    value = crossing(start, "value", _STEP if excess(start, "value") > 0 else -_STEP)
+    value = crossing(start, "value", step if excess(start, "value") > 0 else -step)
     if value is None:
         return None
     found = most_certain(known, math.exp(value), energy)
     assert found is not None
-    lower, upper = crossing(value, "lower", -_STEP), crossing(value, "upper", _STEP)
+    lower, upper = crossing(value, "lower", -step), crossing(value, "upper", step)
     return found, 0.0 if lower is None else math.exp(lower), math.inf if upper is None else math.exp(upper)
 
 

@@ -20,9 +20,6 @@ from vibrokit.errors import StructureError, shown
 from vibrokit.results.rated import HELD, METASTABLE, RatedResult
 from vibrokit.text_table import power_text, text_table
 
-_NAMED = 0.1  # of the exits of an attractor that is divided: states that fewer lead to are not named with it
-_ROUNDING = 1e-9  # of parts of an attractor
-_RETURNS = 12  # of motion that escapes: each reduces what is left of its effect by the share that escapes, a tenth
 _FARTHEST = 1e4  # of ln of rates and of odds, in place of infinity: so far beyond those that are known
 
 Array = NDArray[np.float64]
@@ -137,8 +134,8 @@ class Balance:
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """The name of the state that each attractor counts with; of all that it is divided between."""
-        named = self._parts >= np.minimum(_NAMED, self._parts.max(axis=1, keepdims=True))
+        """The name of the state that each attractor counts with; of all that a tenth of it or more counts with."""
+        named = self._parts >= np.minimum(0.1, self._parts.max(axis=1, keepdims=True))
         return tuple(" and ".join(self.names[label] for label in self._heads[each]) for each in named)
 
     @cached_property
@@ -184,8 +181,8 @@ class Balance:
                     "with exit=LeaveBasin(to=…)."
                 )
         exact = self._log_odds(parts, self.log_rates)
-        low = self._log_odds(np.floor(parts + _ROUNDING), self.log_rates)
-        high = self._log_odds(np.ceil(parts - _ROUNDING), self.log_rates)
+        low = self._log_odds(np.floor(parts + 1e-9), self.log_rates)
+        high = self._log_odds(np.ceil(parts - 1e-9), self.log_rates)
         down, up = np.zeros(len(parts)), np.zeros(len(parts))
         for place in zip(*np.nonzero(self.lower < self.upper), strict=True):
             moved = []
@@ -213,7 +210,8 @@ class Balance:
         held = np.flatnonzero(self.held)
         names, between = [self.names[label] for label in held], log_rates[np.ix_(held, held)]
         escapes, found = self.log_escapes[held, None], np.zeros(len(held)) - math.log(max(len(held), 1))
-        for _ in range(_RETURNS if np.isfinite(escapes).any() else 1):
+        # Each return reduces what is left of its effect by the share that escapes, a tenth.
+        for _ in range(12 if np.isfinite(escapes).any() else 1):
             found = log_stationary(np.logaddexp(between, escapes + found), names)
         return found
 

@@ -16,7 +16,6 @@ from vibrokit.comparison.verdicts import Agreement, Verdict
 from vibrokit.results.arrhenius import ENOUGH
 from vibrokit.results.rated import HELD, METASTABLE
 
-_ONE_SIDED = 1.645  # standard errors that a normal error exceeds on one side in 5 % of all cases
 _LEAST_ERROR = 1e-9  # relative: the effect of rounding
 
 
@@ -129,7 +128,7 @@ def _drift(rated: Side, fixed: Side) -> tuple[float, ...]:
     missing, explained = fixed.energy.value - rated.energy.value, fit.limit - fit.slope
     towards = math.copysign(1.0, missing)
     reach = 2.0 * towards * explained + DEVIATIONS * math.hypot(fit.limit_error, fixed.energy.error)
-    drifts = towards * fit.curvature > _ONE_SIDED * fit.curvature_error
+    drifts = towards * fit.curvature > 1.645 * fit.curvature_error  # a normal error exceeds it in 5 % of all cases
     slopes, _ = fit.local_slopes
     reached = drifts and towards * explained > 0 and abs(missing) <= reach
     return (float(slopes[0]), float(slopes[-1])) if reached else ()

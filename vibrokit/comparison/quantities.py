@@ -15,25 +15,33 @@ DEVIATIONS = 1.96
 
 
 class Kind(StrEnum):
-    """Kinds of quantities, with their units."""
+    """Kinds of quantities, in the order of tables, each with its `label` there."""
 
-    ENERGY = "energy"
+    label: str
+
+    def __new__(cls, value: str, label: str) -> Kind:
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.label = label
+        return member
+
+    ENERGY = "energy", "ΔU (m² s⁻³)"
     """ΔU for D → 0 (m² s⁻³): the least action with its bounds, or the limit of rates."""
-    BARRIER = "barrier"
-    """−D ln p at the lowest saddle above its minimum at noise D (m² s⁻³); it differs from ΔU by the order of D."""
-    SLOPE = "slope"
-    """d ln τ/d(1/D) between two neighbouring intensities (m² s⁻³), at the middle of their 1/D."""
-    ARRHENIUS = "arrhenius"
+    ARRHENIUS = "arrhenius", "ΔU by Arrhenius fit"
     """The slope of a straight line through all ln τ against 1/D (m² s⁻³); its interval is one for ΔU."""
-    LOG_TIME = "log-time"
+    BARRIER = "barrier", "barrier at the saddle"
+    """−D ln p at the lowest saddle above its minimum at noise D (m² s⁻³); it differs from ΔU by the order of D."""
+    LOG_TIME = "log-time", "ln τ (τ in s)"
     """ln τ at noise D, τ in s."""
-    LOG_PREFACTOR = "log-prefactor"
+    SLOPE = "slope", "slope d ln τ/d(1/D)"
+    """d ln τ/d(1/D) between two neighbouring intensities (m² s⁻³), at the middle of their 1/D."""
+    LOG_PREFACTOR = "log-prefactor", "ln of prefactor (s)"
     """ln of τ exp(−ΔU/D) in s at noise D, with the energy of the narrowest interval that any result has."""
-    OCCUPANCY = "occupancy"
+    OCCUPANCY = "occupancy", "share of time, by rates"
     """Share of time in a state in the long run at noise D, by the balance of rates."""
-    DENSITY_SHARE = "density-share"
+    DENSITY_SHARE = "density-share", "share, by the density"
     """Share of the stationary density at noise D in the cells of a state's basin; the method gives no interval."""
-    WEIGHT_EXPONENT = "weight-exponent"
+    WEIGHT_EXPONENT = "weight-exponent", "ln of share, exponent only"
     """ln of the share of time without its prefactor, −w/D, at noise D, by energies alone; 0 for the most stable."""
 
 

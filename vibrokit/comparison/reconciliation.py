@@ -21,7 +21,6 @@ from vibrokit.results.table import Table, fields_of
 if TYPE_CHECKING:
     from vibrokit.plots.exit_times import ReconciliationArtists
 
-_DRAWN = ("intensity", "value", "error")  # of a quantity
 _ANY = -3  # in files: the label of leaving at all
 _TARGET = Whole("label of what is reached; -1 for another exit, -2 for escape, -3 for leaving at all", low=_ANY)
 _QUANTITIES, _VERDICTS = (
@@ -135,7 +134,9 @@ class Reconciliation(Record):
             for method in self.methods:
                 times = [q for q in own if q.kind is Kind.LOG_TIME and q.method == method]
                 if times:
-                    intensity, value, error = ([getattr(q, name) for q in times] for name in _DRAWN)
+                    intensity, value, error = (
+                        [getattr(q, name) for q in times] for name in ("intensity", "value", "error")
+                    )
                     series.append(ExitTimes(intensity, value, error, source, f"{title}, {method}", place))
                     methods.append(method)
             known = [q for q in own if q.kind is Kind.ENERGY and q.resolved]

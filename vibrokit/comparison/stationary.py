@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_ABOVE = 1.3  # the quasi-potential at the highest saddle
 _LOWEST = -1e6  # in place of −inf where ln p is interpolated
 
 
@@ -155,7 +154,7 @@ class StationaryDensity(metaclass=Constructed):
         points = points[inside.all(axis=1)]
         there = potential[np.searchsorted(self.x, points[:, 0]), np.searchsorted(self.v, points[:, 1])]
         there = there[np.isfinite(there)]
-        return _ABOVE * float(there.max()) if there.size else None
+        return 1.3 * float(there.max()) if there.size else None
 
     def __str__(self) -> str:
         return shares_text(self.occupancies)

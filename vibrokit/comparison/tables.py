@@ -13,18 +13,6 @@ from vibrokit.text_table import number_text, power_text, text_table
 if TYPE_CHECKING:
     from vibrokit.comparison.reconciliation import Reconciliation
 
-_LABELS = {
-    Kind.ENERGY: "ΔU (m² s⁻³)",
-    Kind.ARRHENIUS: "ΔU by Arrhenius fit",
-    Kind.BARRIER: "barrier at the saddle",
-    Kind.LOG_TIME: "ln τ (τ in s)",
-    Kind.SLOPE: "slope d ln τ/d(1/D)",
-    Kind.LOG_PREFACTOR: "ln of prefactor (s)",
-    Kind.OCCUPANCY: "share of time, by rates",
-    Kind.DENSITY_SHARE: "share, by the density",
-    Kind.WEIGHT_EXPONENT: "ln of share, exponent only",
-}
-
 
 def reconciliation_text(one: Reconciliation) -> str:
     """Return how long each state lasts and whether the methods agree, the verdicts, and a table of each exit."""
@@ -35,9 +23,9 @@ def reconciliation_text(one: Reconciliation) -> str:
 
 def quantity_rows(one: Reconciliation) -> list[tuple[str, list[tuple[str, ...]]]]:
     """Return for each exit and each share of time its name, and rows of its numbers by method under their heading."""
-    of_exits, found = [kind for kind in _LABELS if kind not in OF_STATES], []
+    found = []
     for source, target in one.exits:
-        own = (q for q in one.quantities if (q.source, q.target) == (source, target) and q.kind in of_exits)
+        own = (q for q in one.quantities if (q.source, q.target) == (source, target) and q.kind not in OF_STATES)
         found.append((exit_name(one.names, source, target), _rows(own, one.methods)))
     for label, name in enumerate(one.names):
         shares = one.shares(label)
@@ -118,9 +106,9 @@ def verdict_rows(one: Reconciliation) -> list[tuple[str, str, str]]:
 
 def _rows(quantities: Iterable[Quantity], methods: tuple[str, ...]) -> list[tuple[str, ...]]:
     cells: dict[tuple[str, str], dict[str, str]] = {}
-    for q in sorted(quantities, key=lambda q: (list(_LABELS).index(q.kind), -q.intensity if q.resolved else 0.0)):
+    for q in sorted(quantities, key=lambda q: (list(Kind).index(q.kind), -q.intensity if q.resolved else 0.0)):
         at = number_text(q.intensity, ".4g")
-        cells.setdefault((_LABELS[q.kind], at), {})[q.method] = _cell(q)
+        cells.setdefault((q.kind.label, at), {})[q.method] = _cell(q)
     return [("", "D", *methods), *((*key, *(row.get(name, "") for name in methods)) for key, row in cells.items())]
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
 from vibrokit.comparison.cycles import Cycle, cycle_hierarchy
-from vibrokit.comparison.difference_bounds import difference_bounds
-from vibrokit.comparison.in_trees import tree_costs
+from vibrokit.comparison.in_trees import difference_bounds, tree_costs
 from vibrokit.construction import Constructed, called
 from vibrokit.documented import documented
 from vibrokit.errors import StructureError, shown
@@ -23,8 +22,6 @@ from vibrokit.results.result import Result
 from vibrokit.text_table import text_table
 
 Array = NDArray[np.float64]
-
-_ROUNDING = 1e-12  # of sums of energies
 
 
 @documented
@@ -167,7 +164,7 @@ class Transitions(metaclass=Constructed):
         """Labels of those that may be the most stable, within the bounds; empty where weights are not known."""
         if not self.known:
             return ()
-        rounding = _ROUNDING * self.energies[np.isfinite(self.energies)].max()
+        rounding = 1e-12 * self.energies[np.isfinite(self.energies)].max()
         return tuple(np.flatnonzero(self._differences[0].max(axis=1) <= rounding).tolist())
 
     @property

@@ -5,46 +5,49 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from enum import StrEnum
 from typing import Annotated
 
 from vibrokit.comparison.quantities import Kind
 from vibrokit.documented import documented
 from vibrokit.results.labels import exit_between
 from vibrokit.results.rated import HELD, METASTABLE
+from vibrokit.results.sentenced import Sentenced
 
 
-class Agreement(StrEnum):
-    """Codes of verdicts; each has a template of its sentence."""
+class Agreement(Sentenced):
+    """Codes of verdicts, the serious ones last; each has a template of its sentence."""
 
-    AGREE = "agree"
+    AGREE = "agree", "{one} and {other} agree in {what}: {tested}. The least combined error is {error:.2g}{unit}."
     """The differences are explained by the stated errors."""
-    ARRHENIUS_NOT_REACHED = "arrhenius-not-reached"
+    ARRHENIUS_NOT_REACHED = (
+        "arrhenius-not-reached",
+        "The slopes of {other} still drift, from {first:.4g} to {last:.4g} m² s⁻³ as D falls, towards the ΔU = "
+        "{energy:.5g} of {one}. Its limit for D → 0 misses that by {deviation:.1f} errors and is not ΔU yet: {remedy}. "
+        "Its mean times are not affected.",
+    )
     """The limit of rates misses the energy, and the slopes drift towards it as D falls, far enough to explain that."""
-    NOT_METASTABLE = "not-metastable"
+    NOT_METASTABLE = (
+        "not-metastable",
+        "{one} and {other} cannot be compared in {what}, since source or target is no state of its own at these noise "
+        "intensities: {reason}. No rate describes such an exit: lower the noise intensity.",
+    )
     """At no common noise intensity are source and target both metastable."""
-    EVENTS_DIFFER = "events-differ"
+    EVENTS_DIFFER = (
+        "events-differ",
+        "{one} and {other} count different events ({event_one}; {event_other}), so that their numbers differ by "
+        "definition: give both the same exit.",
+    )
     """The methods count different events, so that their numbers cannot be compared."""
-    UNDER_RESOLVED = "under-resolved"
+    UNDER_RESOLVED = (
+        "under-resolved",
+        "{reason}, so that {one} and {other} cannot be compared in {what}: {remedy} of {less_certain}.",
+    )
     """A method has no number with bounds, or the errors are as large as the number itself."""
-    DISAGREE = "disagree"
+    DISAGREE = (
+        "disagree",
+        "{one} and {other} disagree in {what}: {tested}. {less_certain} has the larger error: {remedy} there first.",
+    )
     """The differences are too large for the stated errors."""
-
-
-_SENTENCES = {
-    Agreement.AGREE: "{one} and {other} agree in {what}: {tested}. The least combined error is {error:.2g}{unit}.",
-    Agreement.ARRHENIUS_NOT_REACHED: "The slopes of {other} still drift, from {first:.4g} to {last:.4g} m² s⁻³ as D "
-    "falls, towards the ΔU = {energy:.5g} of {one}. Its limit for D → 0 misses that by {deviation:.1f} errors and is "
-    "not ΔU yet: {remedy}. Its mean times are not affected.",
-    Agreement.NOT_METASTABLE: "{one} and {other} cannot be compared in {what}, since source or target is no state of "
-    "its own at these noise intensities: {reason}. No rate describes such an exit: lower the noise intensity.",
-    Agreement.EVENTS_DIFFER: "{one} and {other} count different events ({event_one}; {event_other}), so that their "
-    "numbers differ by definition: give both the same exit.",
-    Agreement.UNDER_RESOLVED: "{reason}, so that {one} and {other} cannot be compared in {what}: {remedy} of "
-    "{less_certain}.",
-    Agreement.DISAGREE: "{one} and {other} disagree in {what}: {tested}. {less_certain} has the larger error: "
-    "{remedy} there first.",
-}
 
 
 @documented
@@ -89,7 +92,7 @@ class Verdict:
             "unit": _UNITS[self.kind],
             "reason": self._reason,
         }
-        return _SENTENCES[self.code].format(**{**words, "deviation": abs(self.deviation)})
+        return self.code.sentence.format(**{**words, "deviation": abs(self.deviation)})
 
     @property
     def _tested(self) -> str:
