@@ -6,7 +6,6 @@ import dataclasses
 import os
 import statistics
 import time
-import tracemalloc
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 
@@ -53,7 +52,6 @@ class TradeRow:
     error_90: float  # 90 % quantile
     seconds: float  # per trajectory and period, in an ensemble, all threads at work
     seconds_alone: float  # per period of trajectories that are integrated one by one
-    memory: float  # peak of the arrays that Python held, per trajectory (bytes); not a kernel's own few kilobytes
     in_steps: bool  # whether `cost` is a number of steps
     default: bool = False  # whether this is what the scene is given, for ensembles or for single trajectories
 
@@ -84,11 +82,10 @@ class Trade:
     threads: int
 
     def __str__(self) -> str:
-        headings = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "arrays (B)", "")
+        headings = ("stepper", "median", "90 %", "ensemble (µs)", "alone (µs)", "")
         lines = [
             f"Error: distance in (x, v) from a finer reference after {self.periods} periods, of {self.starts} starts.",
             f"Time per trajectory and period: in an ensemble on {self.threads} threads, and one trajectory alone.",
-            "Arrays: peak that Python holds per trajectory (tracemalloc); the kernels' own few kB are not in it.",
             "",
             *text_table([headings, *(self._line(row) for row in self.rows)]),
             "",
@@ -107,7 +104,7 @@ class Trade:
     def _line(row: TradeRow) -> tuple[str, ...]:
         errors = f"{row.error_median:.2e}", f"{row.error_90:.2e}"
         times = f"{1e6 * row.seconds:.4g}", f"{1e6 * row.seconds_alone:.4g}"
-        return (row.stepper, *errors, *times, f"{row.memory:.0f}", "← default" if row.default else "")
+        return (row.stepper, *errors, *times, "← default" if row.default else "")
 
     def _order(self, name: str) -> str:
         order = self.orders[name]
@@ -127,7 +124,7 @@ def measure_steppers(
     rng: int | np.random.Generator = 0,
     progress: Progress = None,
 ) -> Trade:
-    """Measure error, time and memory of every stepper that can integrate a scene, coarse to fine.
+    """Measure error and time of every stepper that can integrate a scene, coarse to fine.
 
     The error is the distance in (x, v) after a few periods, so that chaos does not amplify it, to a finer reference
     by another method: FreeFlight at 1e-14 for all others, Order8 at 1e-14 for FreeFlight. What these two share, the
@@ -223,7 +220,6 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
 
     one_by_one()
     alone = _median_time(one_by_one, 0.3 * seconds)
-    counted = np.resize(states, (1024, states.shape[1]))
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
@@ -233,7 +229,6 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
         error_90=float(np.quantile(errors, 0.9)),
         seconds=together / len(many),
         seconds_alone=alone / (len(few) * length),
-        memory=_peak_of_arrays(lambda: osc.section_map(counted, 1, stepper=stepper)) / len(counted),
     )
 
 
@@ -256,15 +251,6 @@ def _median_time(work: Callable[[], object], seconds: float) -> float:
         work()
         times.append(time.perf_counter() - began)
     return statistics.median(times)
-
-
-def _peak_of_arrays(work: Callable[[], object]) -> float:
-    tracemalloc.start()
-    try:
-        work()
-        return float(tracemalloc.get_traced_memory()[1])
-    finally:
-        tracemalloc.stop()
 
 
 def _fitted_order(rows: Sequence[TradeRow], all_rows: Sequence[TradeRow]) -> float:
