@@ -104,11 +104,8 @@ class Oscillator(Scene):
             The state is finite, but the steps that a force requires are too short; the error also has its time.
         """
         from vibrokit.kernels.choice import single_stepper
-        from vibrokit.kernels.ending import ending
         from vibrokit.kernels.named import check_stepper
         from vibrokit.kernels.single import recorded
-        from vibrokit.kernels.stopping import STALLED
-        from vibrokit.kernels.vector_field import VectorField
 
         start = self._checked_states(state, 1)[0]
         start_time = _START_TIME.checked("trajectory", start_time)
@@ -120,24 +117,7 @@ class Oscillator(Scene):
         path, status = recorded(self, flow, chosen, start, start_time, length / count, count, seed=seed)
         times: Array = start_time + length / count * np.arange(count + 1, dtype=float)
         if len(path) <= count:
-            last, since = tuple(float(value) for value in path[-1]), float(times[len(path) - 1])
-            when, border = ending(self, flow, chosen, path[-1], since, length / count)
-            if border:
-                raise IntegrationError(
-                    f"the trajectory ended at t = {when:.6g}, at {border}, after the sample {last}; {_AT_BORDER}",
-                    when,
-                    last,
-                )
-            if not np.isfinite(VectorField(self).rate(path[-1], since)).all():
-                raise IntegrationError(f"at t = {since:.6g} the trajectory came to {last}, {_NO_VALUE}", since, last)
-            if status == STALLED:
-                raise self._stalled("the trajectory needs", since, last, length / count)
-            raise IntegrationError(
-                f"the trajectory diverged between t = {since:g} and {times[len(path)]:g}, after the state {last}; "
-                f"{_advice(chosen)}",
-                since,
-                last,
-            )
+            raise self._ended_early(flow, chosen, path[-1], times[len(path) - 1 : len(path) + 1], status)
         return Trajectory(times, path, tuple(barrier.position for barrier in self.barriers))
 
     @called
@@ -231,6 +211,27 @@ class Oscillator(Scene):
         coarse = self.section_map(states, periods, stepper=chosen)
         fine = self.section_map(states, periods, stepper=chosen.refined())
         return np.linalg.norm(coarse - fine, axis=1)
+
+    def _ended_early(self, flow: Flow, stepper: Stepper, state: Array, between: Array, status: int) -> IntegrationError:
+        """Return the error of a trajectory that ends between two samples, after a state, with the cause."""
+        from vibrokit.kernels.ending import ending
+        from vibrokit.kernels.stopping import STALLED
+        from vibrokit.kernels.vector_field import VectorField
+
+        since, until = between.tolist()
+        last = tuple(state.tolist())
+        when, border = ending(self, flow, stepper, state, since, until - since)
+        if border:
+            text = f"the trajectory ended at t = {when:.6g}, at {border}, after the sample {last}; {_AT_BORDER}"
+            return IntegrationError(text, when, last)
+        if not np.isfinite(VectorField(self).rate(state, since)).all():
+            return IntegrationError(f"at t = {since:.6g} the trajectory came to {last}, {_NO_VALUE}", since, last)
+        if status == STALLED:
+            return self._stalled("the trajectory needs", since, last, until - since)
+        text = (
+            f"the trajectory diverged between t = {since:g} and {until:g}, after the state {last}; {_advice(stepper)}"
+        )
+        return IntegrationError(text, since, last)
 
     def _stalled(self, who: str, time: float, state: tuple[float, ...], interval: float) -> TooManyStepsError:
         """Return the error of motion that needs too many steps in an interval after a state, with their cause."""
