@@ -41,21 +41,21 @@ if TYPE_CHECKING:
     from vibrokit.kernels.rk8 import RK8 as RK8
     from vibrokit.oscillator import Oscillator as Oscillator
     from vibrokit.parts.barrier import Barrier as Barrier
-    from vibrokit.parts.contact.contact_law import ContactLaw as ContactLaw
-    from vibrokit.parts.contact.custom import CustomLaw as CustomLaw
-    from vibrokit.parts.contact.hertz import Hertz as Hertz
-    from vibrokit.parts.contact.linear import Linear as Linear
-    from vibrokit.parts.excitation.constant import Constant as Constant
-    from vibrokit.parts.excitation.excitation import Excitation as Excitation
-    from vibrokit.parts.excitation.harmonic import Harmonic as Harmonic
-    from vibrokit.parts.noise.noise_model import NoiseModel as NoiseModel
-    from vibrokit.parts.noise.state_dependent import StateDependentNoise as StateDependentNoise
-    from vibrokit.parts.noise.white import WhiteNoise as WhiteNoise
+    from vibrokit.parts.contact import ContactLaw as ContactLaw
+    from vibrokit.parts.contact import CustomLaw as CustomLaw
+    from vibrokit.parts.contact import Hertz as Hertz
+    from vibrokit.parts.contact import Linear as Linear
+    from vibrokit.parts.excitation import Constant as Constant
+    from vibrokit.parts.excitation import Excitation as Excitation
+    from vibrokit.parts.excitation import Harmonic as Harmonic
+    from vibrokit.parts.noise import NoiseModel as NoiseModel
+    from vibrokit.parts.noise import StateDependentNoise as StateDependentNoise
+    from vibrokit.parts.noise import WhiteNoise as WhiteNoise
     from vibrokit.parts.parameter import parameter as parameter
-    from vibrokit.parts.spring.cubic import CubicSpring as CubicSpring
-    from vibrokit.parts.spring.custom import CustomSpring as CustomSpring
-    from vibrokit.parts.spring.linear import LinearSpring as LinearSpring
-    from vibrokit.parts.spring.spring import Spring as Spring
+    from vibrokit.parts.spring import CubicSpring as CubicSpring
+    from vibrokit.parts.spring import CustomSpring as CustomSpring
+    from vibrokit.parts.spring import LinearSpring as LinearSpring
+    from vibrokit.parts.spring import Spring as Spring
     from vibrokit.report.report import Report as Report
     from vibrokit.reproduction.reproduce import reproduce as reproduce
     from vibrokit.results.codes import Code as Code

@@ -15,12 +15,12 @@ from vibrokit.construction import called
 from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, nearest_form, shown
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
-from vibrokit.parts.contact.contact_law import ContactLaw
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.contact import ContactLaw
+from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.spring import Spring
 from vibrokit.registry import Group, load, name_of
 from vibrokit.results.atomic import write_atomically
 

@@ -9,10 +9,10 @@ import vibrokit as vk
 from tests.scenes import Coloured
 from vibrokit import testing
 from vibrokit.analyzers.analyzer import Analyzer
-from vibrokit.parts.contact.contact_law import ContactLaw
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.noise.noise_model import NoiseModel
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.contact import ContactLaw
+from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.noise import NoiseModel
+from vibrokit.parts.spring import Spring
 from vibrokit.registry import Group, load_all
 from vibrokit.results.rated import RatedResult
 

@@ -10,7 +10,7 @@ import pytest
 import vibrokit as vk
 from vibrokit import registry
 from vibrokit.errors import UnknownNameError
-from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.contact import ContactLaw
 from vibrokit.registry import Group, Registered
 
 pytestmark = pytest.mark.slow

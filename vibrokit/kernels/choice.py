@@ -18,11 +18,10 @@ from vibrokit.kernels.order8 import Order8
 from vibrokit.kernels.pulses import changes_of
 from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.parts.excitation.constant import Constant
-from vibrokit.parts.excitation.harmonic import Harmonic
-from vibrokit.parts.noise.white import WhiteNoise
+from vibrokit.parts.excitation import Constant, Harmonic
+from vibrokit.parts.noise import WhiteNoise
 from vibrokit.parts.scene import Scene
-from vibrokit.parts.spring.linear import LinearSpring
+from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
 _STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscillation or more; in a very short one

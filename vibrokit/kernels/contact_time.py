@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
 from vibrokit.kernels.rk4 import RK4
-from vibrokit.parts.excitation.constant import Constant
+from vibrokit.parts.excitation import Constant
 from vibrokit.parts.scene import Scene
-from vibrokit.parts.spring.linear import LinearSpring
+from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128  # of the forcing, over one interval

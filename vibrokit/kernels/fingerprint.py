@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.scene import Scene
 
 _PACKAGES = ("sympy", "numba", "llvmlite", "numpy")

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
 
 from vibrokit.kernels.vector_field import VectorField
-from vibrokit.parts.excitation.constant import Constant
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.excitation.harmonic import Harmonic
+from vibrokit.parts.excitation import Constant, Excitation, Harmonic
 from vibrokit.parts.scene import Scene
 
 _SAMPLES = 2**16  # of a period; the narrowest pulse that is seen lasts two of them

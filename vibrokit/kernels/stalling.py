@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.scene import Scene
 
 _SHARES = np.geomspace(1e-13, 1e-1, 25)  # changes of a variable, as shares of its size, that a slope is taken over

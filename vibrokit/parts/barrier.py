@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 
 from vibrokit.construction import Constructed
 from vibrokit.errors import ParameterError, SceneError, shown
-from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.parameter import Parameter
 
 _POSITION = Parameter("position", "position", "b", "m")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from abc import ABC
 from collections.abc import Callable, Mapping
@@ -10,7 +11,6 @@ from typing import Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed
 from vibrokit.errors import ArgumentError, ParameterError, nearest
-from vibrokit.parts.exponents import exponents
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
 
 
@@ -85,7 +85,7 @@ class Part(ABC, metaclass=Constructed):
         if self.is_ours():  # declared where they are written; no SymPy is needed to find them
             return self._declared
         fixed = tuple((d.name, self._value(d)) for d in self._declared if d.structural)
-        shaping = exponents(type(self), fixed)
+        shaping = _exponents(type(self), fixed)
         return tuple(dataclasses.replace(d, structural=d.structural or d.name in shaping) for d in self._declared)
 
     def formulas(self, argument: Callable[[str], Any]) -> tuple[Any, ...]:
@@ -121,3 +121,23 @@ class Part(ABC, metaclass=Constructed):
         for declared in self._declared:
             object.__setattr__(twin, declared.attribute, values[declared.name])
         return twin
+
+
+@functools.lru_cache(maxsize=256)
+def _exponents(cls: Any, fixed: tuple[tuple[str, Any], ...]) -> frozenset[str]:
+    """Return the parameters in exponents of what varies with the arguments of a formula, which decide its smoothness.
+
+    The `fixed` parameters keep their values. A class whose formulas cannot be called with symbols has none here; the
+    derivation meets the same error and words it.
+    """
+    import sympy
+
+    part, known = object.__new__(cls), dict(fixed)
+    parameters = {d.name: sympy.Symbol(d.name, positive=True) for d in cls._declared if d.name not in known}
+    try:
+        found = part.twin(known | parameters).formulas(lambda name: sympy.Dummy(name, real=True))
+        powers = [power for formula in found for power in sympy.sympify(formula).atoms(sympy.Pow)]
+    except Exception:
+        return frozenset()
+    varying = [power.exp.free_symbols for power in powers if power.base.atoms(sympy.Dummy)]
+    return frozenset(name for name, symbol in parameters.items() if any(symbol in symbols for symbols in varying))

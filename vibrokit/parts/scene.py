@@ -13,10 +13,10 @@ from vibrokit.arguments import members, real
 from vibrokit.construction import Constructed, called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.parameter import Parameter
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.spring import Spring
 
 _OWN = (
     Parameter("natural_frequency", "natural_frequency", "omega_n", "s^-1", above=0),

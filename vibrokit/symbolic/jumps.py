@@ -10,8 +10,8 @@ import mpmath
 import sympy
 
 from vibrokit.errors import DerivationError
-from vibrokit.parts.noise.noise_model import NoiseModel
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.noise import NoiseModel
+from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.printer import as_text
 from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import sympy
 
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.spring import Spring
 
 _LARGEST_RATIO = 64  # of two periods to their common one
 _SAME = 1e-9  # relative: two periods, or two forces, that are the same

@@ -19,10 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 from vibrokit.errors import UnknownNameError, nearest
-from vibrokit.parts.contact.contact_law import ContactLaw
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.noise.noise_model import NoiseModel
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.contact import ContactLaw
+from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.noise import NoiseModel
+from vibrokit.parts.spring import Spring
 from vibrokit.registry import load, names
 from vibrokit.testing.contact import ContactLawChecks
 from vibrokit.testing.kinds import ExcitationChecks, NoiseModelChecks, SpringChecks

@@ -10,10 +10,10 @@ import mpmath
 
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
-from vibrokit.parts.contact.contact_law import ContactLaw
-from vibrokit.parts.excitation.harmonic import Harmonic
-from vibrokit.parts.noise.white import WhiteNoise
-from vibrokit.parts.spring.cubic import CubicSpring
+from vibrokit.parts.contact import ContactLaw
+from vibrokit.parts.excitation import Harmonic
+from vibrokit.parts.noise import WhiteNoise
+from vibrokit.parts.spring import CubicSpring
 from vibrokit.registry import Group
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow

@@ -12,12 +12,9 @@ import sympy
 
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.excitation.excitation import Excitation
-from vibrokit.parts.excitation.harmonic import Harmonic
-from vibrokit.parts.noise.noise_model import NoiseModel
-from vibrokit.parts.noise.white import WhiteNoise
-from vibrokit.parts.spring.cubic import CubicSpring
-from vibrokit.parts.spring.spring import Spring
+from vibrokit.parts.excitation import Excitation, Harmonic
+from vibrokit.parts.noise import NoiseModel, WhiteNoise
+from vibrokit.parts.spring import CubicSpring, Spring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow import derive_flow
 from vibrokit.symbolic.flow_kind import Flow

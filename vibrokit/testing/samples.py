@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from vibrokit.errors import ParameterError, VibrokitError
-from vibrokit.parts.contact.custom import CustomLaw
-from vibrokit.parts.noise.state_dependent import StateDependentNoise
+from vibrokit.parts.contact import CustomLaw
+from vibrokit.parts.noise import StateDependentNoise
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.part import Part
-from vibrokit.parts.spring.custom import CustomSpring
+from vibrokit.parts.spring import CustomSpring
 from vibrokit.testing.report import ConformanceError
 
 _SAMPLES = 3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibrokit.parts.contact.contact_law import ContactLaw
+from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.functions import Rational
 from vibrokit.parts.parameter import parameter
 

@@ -19,7 +19,7 @@ from vibrokit.errors import SceneError, counted
 from vibrokit.kernels.log_density import mark_rows, parts_of, step_rows
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.noise.noise_model import NoiseModel
+from vibrokit.parts.noise import NoiseModel
 from vibrokit.progress import current
 
 Array = NDArray[np.float64]

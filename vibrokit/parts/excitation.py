@@ -1,0 +1,82 @@
+"""Excitations: forces that depend on time only."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+from vibrokit.parts.functions import cos
+from vibrokit.parts.parameter import parameter
+from vibrokit.parts.part import Part
+
+
+class Excitation(Part):
+    """Force per unit mass that depends on time only. Abstract."""
+
+    variables: ClassVar[tuple[str, ...]] = ("t",)
+
+    @abstractmethod
+    def force(self, t: Any) -> Any:
+        """Force (m s⁻²) at time `t` (s), as a SymPy expression.
+
+        It may jump, and have pulses as short as 1/30 000 of its period; one that never repeats is searched for pulses
+        from t = 0 to 128 free oscillations.
+        """
+
+    @property
+    @abstractmethod
+    def period(self) -> float | None:
+        """Period (s); None if the force is constant, `math.inf` if it varies without period."""
+
+
+class Harmonic(Excitation):
+    """Harmonic force: f cos(ω t + φ).
+
+    Parameters
+    ----------
+    amplitude : float
+        f, in m s⁻².
+    frequency : float
+        ω, in rad s⁻¹, positive.
+    phase : float
+        φ, in rad.
+    """
+
+    amplitude: float = parameter("f", "m s^-2")
+    frequency: float = parameter("omega", "s^-1", above=0)
+    phase: float = parameter("phi", "rad", default=0.0)
+
+    def force(self, t: Any) -> Any:
+        """Force at time t: f cos(ω t + φ)."""
+        return self.amplitude * cos(self.frequency * t + self.phase)
+
+    @property
+    def period(self) -> float:
+        """Period 2π/ω (s)."""
+        return 2 * math.pi / self.frequency
+
+
+class Constant(Excitation):
+    """Constant force f.
+
+    Parameters
+    ----------
+    force : float
+        f, in m s⁻².
+    """
+
+    magnitude: float = parameter("f", "m s^-2", name="force")
+
+    def __init__(self, force: float) -> None:
+        object.__setattr__(self, "magnitude", force)
+        self.__post_init__()
+
+    def force(self, t: Any) -> Any:
+        """Force at any time: f."""
+        return self.magnitude
+
+    @property
+    def period(self) -> None:
+        """None: a constant force has no period."""
+        return None
