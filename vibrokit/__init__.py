@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from vibrokit.comparison.reconciliation import Reconciliation as Reconciliation
     from vibrokit.comparison.stationary import StationaryDensity as StationaryDensity
     from vibrokit.comparison.transitions import Transitions as Transitions
-    from vibrokit.kernels.free_flight import FreeFlight as FreeFlight
-    from vibrokit.kernels.order8 import Order8 as Order8
-    from vibrokit.kernels.rk4 import RK4 as RK4
-    from vibrokit.kernels.rk8 import RK8 as RK8
+    from vibrokit.kernels.fixed_steps import RK4 as RK4
+    from vibrokit.kernels.fixed_steps import RK8 as RK8
+    from vibrokit.kernels.located import FreeFlight as FreeFlight
+    from vibrokit.kernels.located import Order8 as Order8
     from vibrokit.oscillator import Oscillator as Oscillator
     from vibrokit.parts.barrier import Barrier as Barrier
     from vibrokit.parts.contact import ContactLaw as ContactLaw

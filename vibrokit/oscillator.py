@@ -235,8 +235,8 @@ class Oscillator(Scene):
 
     def _stalled(self, who: str, time: float, state: tuple[float, ...], interval: float) -> TooManyStepsError:
         """Return the error of motion that needs too many steps in an interval after a state, with their cause."""
-        from vibrokit.kernels.order8 import MOST_STEPS
-        from vibrokit.kernels.stalling import fastest_force
+        from vibrokit.kernels.ending import fastest_force
+        from vibrokit.kernels.located import MOST_STEPS
 
         force = fastest_force(self, np.array(state))
         where = f"{who} more than {MOST_STEPS:.0f} steps in the {interval:g} s after t = {time:g}, at the state {state}"

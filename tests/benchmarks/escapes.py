@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stochastic_step import FLAGS, FORCING, LANES, SCENE, STEPS, H, Here, scalar_step
 
 from vibrokit.kernels.ensemble import Stop, _blocks, run_ensemble
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.stopping import REACHED
 from vibrokit.kernels.streams import streams_of
 from vibrokit.symbolic.flow_kind import Flow

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.symbolic.flow_kind import Flow
 
 STEPS = 256

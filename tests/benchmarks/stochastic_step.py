@@ -25,8 +25,8 @@ from numba import njit
 sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.intrinsics import use_widest_registers
-from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.streams import normal_pair, seed_lane, streams_of
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -9,8 +9,8 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
-from vibrokit.kernels.contact_time import contact_times
 from vibrokit.kernels.named import name_of, named_stepper
+from vibrokit.kernels.time_scales import contact_times
 from vibrokit.scene_file import load_scene
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import vibrokit as vk
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper
-from vibrokit.kernels.pulses import changes_of
+from vibrokit.kernels.time_scales import changes_of
 from vibrokit.symbolic.flow_kind import Flow
 
 PERIOD, START = 7.0, (0.4, 0.2)

@@ -122,7 +122,7 @@ class MFET(RateAnalyzer):
         super().check(osc)
         self.wanted_intensities(osc)
         if self.stepper is not None:
-            self.stepper.check(osc, Flow.NOISY)
+            self.stepper.check(Flow.NOISY)
 
     def analyze(self, problem: ExitProblem) -> Analysis:
         """Simulate at each intensity; if the work is stopped, what was seen until then is kept, marked incomplete."""

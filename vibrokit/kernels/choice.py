@@ -10,14 +10,11 @@ from pathlib import Path
 from types import FrameType
 
 from vibrokit.errors import StepperError
-from vibrokit.kernels.contact_time import contact_times
-from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.free_flight import FreeFlight
+from vibrokit.kernels.fixed_steps import RK4, FixedSteps
 from vibrokit.kernels.kernel import kernel_for
-from vibrokit.kernels.order8 import Order8
-from vibrokit.kernels.pulses import changes_of
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.located import FreeFlight, Order8
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.time_scales import changes_of, contact_times
 from vibrokit.parts.excitation import Constant, Harmonic
 from vibrokit.parts.noise import WhiteNoise
 from vibrokit.parts.scene import Scene

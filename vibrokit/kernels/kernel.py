@@ -156,7 +156,7 @@ def kernel_for(scene: Scene, flow: Flow, stepper: Emitter) -> Kernel:
         )
     if not isinstance(stepper, Emitter):
         raise StepperError(f"stepper must be a Stepper, such as RK4(steps=256), got {shown(stepper)}.")
-    stepper.check(scene, flow)
+    stepper.check(flow)
     fingerprint = f"{scene_fingerprint(scene)}\n{emitter_fingerprint(stepper)}\n{flow.value}"
     name = f"vibrokit_{flow.value}_{stepper.name}_{_digest(fingerprint)}"
     if name not in _KERNELS:
@@ -215,13 +215,10 @@ def write_sources(scene: Scene, flow: Flow, stepper: Emitter) -> Sources:
 
     text = SceneText(scene, flow)
     source = _pasted([text.preamble, *stepper.scene_part(text)])
-    if stepper.called:
-        source = source.replace("(**INLINED)", "(**INLINED_AND_CALLED)")
-    source = with_needed_imports(source)
     if not stepper.templates:
-        return Sources(source)
+        return Sources(with_needed_imports(source))
     driver = _pasted([_TITLE, *stepper.driver_part(text), *map(read_template, stepper.templates)])
-    return Sources(source, with_needed_imports(driver))
+    return Sources(with_needed_imports(source), with_needed_imports(driver))
 
 
 def _pasted(pieces: Sequence[str]) -> str:

@@ -7,10 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from vibrokit.errors import StepperError, nearest, shown
-from vibrokit.kernels.free_flight import FreeFlight
-from vibrokit.kernels.order8 import Order8
-from vibrokit.kernels.rk4 import RK4
-from vibrokit.kernels.rk8 import RK8
+from vibrokit.kernels.fixed_steps import RK4, RK8
+from vibrokit.kernels.located import FreeFlight, Order8
 from vibrokit.kernels.stepper import Stepper
 
 _KINDS: Mapping[str, tuple[Callable[..., Stepper], Callable[[str], float]]] = {

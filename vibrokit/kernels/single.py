@@ -48,7 +48,7 @@ def recorded(
     """Return what `record` does, and why the trajectory ended: a constant of `vibrokit.kernels.stopping`."""
     kernel = kernel_for(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
-    common = (theta_of(scene), start_time, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
+    common = (theta_of(scene), start_time, spacing, np.array(stepper.settings(scene, spacing, count)))
     streams = streams_of(seed or 0, np.zeros(1, dtype=np.int64)) if flow is Flow.NOISY else np.empty((1, 0), np.uint64)
     budget, phase = np.full(1, count), np.zeros(1, dtype=np.int64)
     path = advance_block(kernel, state[None], budget, common, streams, phase, Stop(), count, 1, normals)
@@ -71,7 +71,7 @@ def record_each(
     kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     order = np.argsort(phases, kind="stable")
-    common = (theta_of(scene), 0.0, spacing, np.array(stepper.settings_of_path(scene, spacing, count)))
+    common = (theta_of(scene), 0.0, spacing, np.array(stepper.settings(scene, spacing, count)))
     none, budget = np.empty((len(states), 0), dtype=np.uint64), np.full(len(states), count)
     ended = advance_block(kernel, states[order], budget, common, none, phases[order], Stop(), count, 1)
     ended.visits[np.arange(count) >= ended.intervals[:, None]] = np.nan

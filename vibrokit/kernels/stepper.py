@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.construction import Constructed
+from vibrokit.errors import StepperError
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -26,18 +27,17 @@ class Emitter(ABC, metaclass=Constructed):
 
     name: ClassVar[str]
     templates: ClassVar[tuple[str, ...]] = ()
-    called: ClassVar[bool] = False  # whether Python calls functions that are otherwise only inlined
 
     @abstractmethod
     def scene_part(self, text: SceneText) -> list[str]:
-        """Return the pieces of the scene."""
+        """Return the pieces of the scene; raise StepperError if this flow of this scene cannot be integrated."""
 
     def driver_part(self, text: SceneText) -> list[str]:
         """Return the constants that stand above the templates."""
         return []
 
-    def check(self, scene: Scene, flow: Flow) -> None:
-        """Raise StepperError if the modules cannot be made for this flow of this scene."""
+    def check(self, flow: Flow) -> None:
+        """Raise StepperError for a flow that can be integrated in no scene."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,13 +49,20 @@ class Stepper(Emitter):
     A stepper also turns its fields into the few numbers that the templates read.
     """
 
-    @abstractmethod
-    def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Return the numbers that the templates read, for motion from section to section."""
+    draws: ClassVar[bool] = False
+    """Whether it can integrate random forces."""
+
+    def check(self, flow: Flow) -> None:
+        """Refuse noise where the order of the steps does not hold for a random force."""
+        if flow is Flow.NOISY and not self.draws:
+            raise StepperError(f"{type(self).__name__} integrates smooth motion only; use RK4 for noisy trajectories.")
 
     @abstractmethod
-    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
-        """Return the numbers that the templates read, for motion that goes on through the samples of a path."""
+    def settings(self, scene: Scene, interval: float, samples: int = 0) -> tuple[float, ...]:
+        """Return the numbers that the templates read, for motion from section to section (s).
+
+        With `samples`, for motion that goes on through the samples of a path, so many intervals apart.
+        """
 
     def steps_in(self, scene: Scene, interval: float) -> int:
         """Return the number of fixed steps in an interval (s); 0 if the stepper chooses its own steps."""

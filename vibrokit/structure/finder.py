@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import LOCATED, ensemble_stepper, single_stepper
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.named import name_of
-from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Work, put_off, stage

@@ -23,11 +23,11 @@ class Pieces(Emitter):
     """Includes every piece of the scene part."""
 
     name: ClassVar[str] = "pieces"
-    called: ClassVar[bool] = True
 
     def scene_part(self, text: SceneText) -> list[str]:
         pieces = [text.constants, text.forcing, text.derivative, text.rhs, text.stops, text.amplitude, text.slope]
-        return [piece for piece in pieces if piece]
+        # Python calls functions that are otherwise only inlined.
+        return [piece.replace("(**INLINED)", "(**INLINED_AND_CALLED)") for piece in pieces if piece]
 
 
 class Compiled:

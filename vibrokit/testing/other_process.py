@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from vibrokit.kernels.ensemble import run_ensemble
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.kernel import write_sources
-from vibrokit.kernels.rk4 import RK4
 from vibrokit.kernels.streams import streams_of
 from vibrokit.oscillator import Oscillator
 from vibrokit.symbolic.flow_kind import Flow

@@ -14,7 +14,7 @@ from scipy.integrate import DOP853
 
 from vibrokit.errors import IntegrationError
 from vibrokit.kernels.kernel import kernel_for, theta_of
-from vibrokit.kernels.order8 import Order8
+from vibrokit.kernels.located import Order8
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import IntegrationError, StepperError
 from vibrokit.kernels.choice import CoarseStepsWarning, ensemble_stepper, single_stepper
-from vibrokit.kernels.fixed_steps import FixedSteps
-from vibrokit.kernels.free_flight import FreeFlight
+from vibrokit.kernels.fixed_steps import RK4, RK8, FixedSteps
 from vibrokit.kernels.kernel import kernel_for
-from vibrokit.kernels.order8 import Order8
-from vibrokit.kernels.rk4 import RK4
-from vibrokit.kernels.rk8 import RK8
+from vibrokit.kernels.located import FreeFlight, Order8
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator

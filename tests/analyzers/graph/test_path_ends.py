@@ -13,7 +13,7 @@ from vibrokit.analyzers.graph.targets import FaceTarget, StateTarget
 from vibrokit.analyzers.path_ends import AtFace, AtSaddle, InBasin, PathEnd
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.results.basins import ESCAPED
 
 

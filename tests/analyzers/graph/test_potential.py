@@ -13,7 +13,7 @@ from vibrokit.analyzers.graph.seeds import seeds
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.tracing import backtrack
 from vibrokit.analyzers.graph.value_iteration import ValueIteration
-from vibrokit.kernels.rk4 import RK4
+from vibrokit.kernels.fixed_steps import RK4
 
 STEP = np.pi / 4
 GRIDS = Grids(np.array([[[-1.5, 1.5], [-1.5, 1.5]]]), (61, 61), STEP, 8)

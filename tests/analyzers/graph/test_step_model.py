@@ -6,7 +6,7 @@ import pytest
 from tests.analyzers.graph import linear
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.kernels.order8 import Order8
+from vibrokit.kernels.located import Order8
 
 STEP = 0.7
 GRIDS = Grids(np.array([[[-2.0, 2.0], [-3.0, 3.0]]]), (41, 31), STEP, 1)

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.kernels.contact_time import contact_times
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.time_scales import contact_times
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.structure.linear_map import GaussianMap, HamiltonianMap, Map, gaussian_map, hamiltonian_map, joined

@@ -9,8 +9,8 @@ from numba import njit
 
 from vibrokit.kernels.cubic import summit
 from vibrokit.kernels.intrinsics import offset_by
-from vibrokit.kernels.jumps import EXTREMALS
 from vibrokit.kernels.links import law, rhs
+from vibrokit.kernels.located import EXTREMALS
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED
 

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from vibrokit.kernels.intrinsics import offset_by
-from vibrokit.kernels.jumps import DIVERGING, EXTREMALS, LINEARIZED, MOMENTA
 from vibrokit.kernels.links import law, rhs
+from vibrokit.kernels.located import DIVERGING, EXTREMALS, LINEARIZED, MOMENTA
 from vibrokit.kernels.options import INNER
 from vibrokit.kernels.stopping import COMPLETED, GRAZED
 

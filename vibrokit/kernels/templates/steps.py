@@ -52,7 +52,7 @@ def barriers(theta):
 
 @njit(**INNER)
 def what_jumps(theta):
-    """What jumps at the touch of a stop; see `vibrokit.kernels.jumps`."""
+    """What jumps at the touch of a stop; see `vibrokit.kernels.located`."""
     return theta[-2 - LINKS]
 
 

@@ -1,4 +1,4 @@
-"""Order8: adaptive steps of order 8 that find every contact."""
+"""Order8 and FreeFlight: motion from contact to contact, each of which is located."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from vibrokit.errors import StepperError
 from vibrokit.kernels.attempts import AttemptWriter
-from vibrokit.kernels.jumps import DIVERGING, EXTREMALS, LINEARIZED, MOMENTA, NOTHING
-from vibrokit.kernels.pulses import changes_of
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.kernels.time_scales import changes_of
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -21,6 +20,9 @@ FINEST, COARSEST = 1e-15, 1e-2
 MOST_STEPS = 200_000.0
 """In one interval; motion that needs more is given up."""
 _IN_PULSE = 3.0  # a step of so many pulses has a stage in each: no two of its nodes are farther apart than 0.27
+# What jumps when a stop is touched or left, or where its law changes its sign: nothing, the derivatives M and the
+# covariance, momenta, momenta and their derivatives; or derivatives of momenta diverge at a touch, and motion ends.
+NOTHING, LINEARIZED, MOMENTA, EXTREMALS, DIVERGING = 0.0, 1.0, 2.0, 3.0, 4.0
 _JUMPING: Mapping[Flow, float] = {
     Flow.STATE_VARIATIONAL: LINEARIZED,
     Flow.LINEARISED: LINEARIZED,
@@ -28,7 +30,7 @@ _JUMPING: Mapping[Flow, float] = {
     Flow.HAMILTONIAN: MOMENTA,
     Flow.HAMILTONIAN_VARIATIONAL: EXTREMALS,
 }
-CONTACT = ("crossing", "landing", "contact")
+_CONTACT = ("crossing", "landing", "contact")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,19 +52,13 @@ class LocatedStepper(Stepper):
                 f"{type(self).__name__}: tolerance must be a number from {FINEST:g} to {COARSEST:g}, got {number!r}."
             )
 
-    def settings(self, scene: Scene, interval: float) -> tuple[float, ...]:
-        """Tolerance, most steps in an interval, intervals until the forcing repeats, 1/ω_n; 0: each begins anew.
+    def settings(self, scene: Scene, interval: float, samples: int = 0) -> tuple[float, ...]:
+        """Tolerance, most steps in an interval, intervals until the forcing repeats (0: never), 1/ω_n.
 
-        The last is the longest step (s).
+        Then the time over which motion goes on, 0 where each interval begins anew, and the longest step (s).
         """
-        return self._settings(scene, scene.intervals_in_period(interval), 0.0)
-
-    def settings_of_path(self, scene: Scene, spacing: float, samples: int) -> tuple[float, ...]:
-        """The same, under a forcing that never repeats, and the time over which the motion goes on."""
-        return self._settings(scene, 0, spacing * samples)
-
-    def _settings(self, scene: Scene, cycle: int, lapse: float) -> tuple[float, ...]:
-        longest = _IN_PULSE * changes_of(scene).pulse
+        cycle, longest = 0 if samples else scene.intervals_in_period(interval), _IN_PULSE * changes_of(scene).pulse
+        lapse = interval * samples
         return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, lapse, longest
 
     def scene_part(self, text: SceneText) -> list[str]:
@@ -100,11 +96,6 @@ class LocatedStepper(Stepper):
         """A hundred times the tolerance."""
         return dataclasses.replace(self, tolerance=min(COARSEST, self.tolerance * 100))
 
-    def check(self, scene: Scene, flow: Flow) -> None:
-        """Refuse noise: a random force has no order 8."""
-        if flow is Flow.NOISY:
-            raise StepperError(f"{type(self).__name__} integrates smooth motion only; use RK4 for noisy trajectories.")
-
 
 @dataclasses.dataclass(frozen=True)
 class Order8(LocatedStepper):
@@ -123,4 +114,30 @@ class Order8(LocatedStepper):
     """
 
     name: ClassVar[str] = "order8"
-    templates: ClassVar[tuple[str, ...]] = ("steps", *CONTACT, "order8", "attempts", "sections")
+    templates: ClassVar[tuple[str, ...]] = ("steps", *_CONTACT, "order8", "attempts", "sections")
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeFlight(LocatedStepper):
+    """Exact flight between the stops, for linear springs and sinusoidal forces.
+
+    The flight is its Taylor series to rounding error, at any damping and at resonance; the first touch is found by
+    bounds that cannot miss one. Contacts are stepped as `Order8` does, to the same order. Choose it for orbits,
+    certificates, grazing, stiff stops and long flights; a scene with a nonlinear spring is refused.
+
+    Parameters
+    ----------
+    tolerance : float
+        Largest error of one step in contact, relative to the size of what is integrated.
+    """
+
+    name: ClassVar[str] = "free_flight"
+    templates: ClassVar[tuple[str, ...]] = ("steps", *_CONTACT, "free_flight", "attempts", "sections")
+
+    def scene_part(self, text: SceneText) -> list[str]:
+        """That of a located stepper, and the series of the flight."""
+        return [text.flight_sizes, *super().scene_part(text), text.flight]
+
+    def series(self, text: SceneText) -> str:
+        """The order of the series, and its number of terms."""
+        return text.flight_sizes

@@ -1,7 +1,11 @@
-"""Durations of contacts, from which the number of fixed steps is chosen."""
+"""The shortest times of a scene that steps must resolve: pulses of its excitations, and contacts.
+
+A step that is longer than a pulse may jump it, and nothing shows that it did.
+"""
 
 from __future__ import annotations
 
+import bisect
 import functools
 import math
 import types
@@ -9,18 +13,67 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import grey_closing, grey_opening
 
+from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
-from vibrokit.kernels.rk4 import RK4
-from vibrokit.parts.excitation import Constant
+from vibrokit.kernels.vector_field import VectorField
+from vibrokit.parts.excitation import Constant, Excitation, Harmonic
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAMPLES = 128  # of the forcing, over one interval
-_DEPTHS = np.geomspace(1e-14, 10.0, 451)  # as parts of the reach of the motion
+_SAMPLES = 2**16  # of a period of an excitation; the narrowest pulse that is seen lasts two of them
+_TURNS = 128  # free oscillations from t = 0 in which an excitation that never repeats is sampled
+_WIDTHS = tuple(dict.fromkeys(int(2 ** (step / 2)) for step in range(2, 29)))  # of pulses, up to a quarter of a period
+_DEPTHS = np.geomspace(1e-14, 10.0, 451)  # of a contact, as parts of the reach of the motion
 _DECADE = 30  # of them in a decade
-_LONGEST_REACH = 10.0  # stops limit a resonance to about this many times their distance
+
+Array = NDArray[np.float64]
+
+
+class Changes(NamedTuple):
+    """The shortest times (s) in which excitations change; infinite for sinusoids, which every stepper resolves."""
+
+    pulse: float  # for which the force is larger, or smaller, than before and after
+    rise: float  # in which the force would cross its range at its greatest slope
+
+
+def changes_of(scene: Scene) -> Changes:
+    """Return the shortest times in which the excitations of a scene change."""
+    own = [part for part in scene.excitations if not isinstance(part, Constant | Harmonic)]
+    turns = _TURNS * 2 * math.pi / scene.natural_frequency
+    found = [_changes(part, turns if math.isinf(part.period or math.inf) else math.inf) for part in own]
+    return Changes(*(min(times) for times in zip(*found, strict=True))) if found else Changes(math.inf, math.inf)
+
+
+@functools.lru_cache(maxsize=64)
+def _changes(part: Excitation, longest: float) -> Changes:
+    """Measure one excitation over its period: a pulse is what an opening or a closing of its width removes.
+
+    Pulses lower than a hundredth of the range of the force are left out.
+    """
+    repeats, window = math.isinf(longest), min(part.period or math.inf, longest)
+    field = VectorField(Scene(natural_frequency=1.0, damping_ratio=0.0, excitations=(part,)))
+    spacing = window / _SAMPLES
+    force = np.nan_to_num([field.excitation(0, spacing * sample) for sample in range(_SAMPLES)])
+    size = float(np.ptp(force))
+    if not size > 0.0:
+        return Changes(math.inf, math.inf)
+    steepest = np.abs(np.diff(force, append=force[0] if repeats else force[-1])).max()
+    width = bisect.bisect_left(_WIDTHS, True, key=lambda width: _removes(width, force, 0.01 * size, repeats))
+    pulse = _WIDTHS[width] * spacing if width < len(_WIDTHS) else math.inf
+    return Changes(pulse, float(size / steepest) * spacing)
+
+
+def _removes(width: int, force: Array, least: float, repeats: bool) -> bool:
+    """Whether pulses are narrower than some samples: whether an opening or a closing of that width changes the force.
+
+    At the ends of a force that does not repeat nothing is known of it.
+    """
+    peaks, dips = force - grey_opening(force, width, mode="wrap"), grey_closing(force, width, mode="wrap") - force
+    changed = np.maximum(peaks, dips)
+    return bool((changed if repeats else changed[width:-width]).max() > least)
 
 
 class ContactTime(NamedTuple):
@@ -48,9 +101,7 @@ def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
     return tuple(contact for contact in found if contact is not None)
 
 
-def _contact(
-    module: types.ModuleType, theta: NDArray[np.float64], stop: int, reach: float, speed: float
-) -> ContactTime | None:
+def _contact(module: types.ModuleType, theta: Array, stop: int, reach: float, speed: float) -> ContactTime | None:
     depths = reach * _DEPTHS
     shortest = None
     for rate in (0.0, speed, -speed):  # a law that damps is stiffer on the way in, backwards in time on the way out
@@ -70,7 +121,7 @@ def _contact(
     return shortest
 
 
-def _typical_motion(scene: Scene, module: types.ModuleType, theta: NDArray[np.float64]) -> tuple[float, float]:
+def _typical_motion(scene: Scene, module: types.ModuleType, theta: Array) -> tuple[float, float]:
     """Largest displacement and speed: of the linear response to the forcing, or those needed to reach a stop."""
     own = scene.natural_frequency
     stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else own**2
@@ -83,22 +134,20 @@ def _typical_motion(scene: Scene, module: types.ModuleType, theta: NDArray[np.fl
     reach, speed = float(response.sum()) + abs(constant) / own**2, float((rates[moving] * response[moving]).sum())
     gap = max(abs(barrier.position) for barrier in scene.barriers)
     if gap > 0.0:
-        limit = _LONGEST_REACH * gap
+        limit = 10.0 * gap  # stops limit a resonance to about this
         reach, speed = max(gap, min(reach, limit)), max(own * gap, min(speed, own * limit))
     elif not 0.0 < reach < math.inf or not 0.0 < speed < math.inf:
         reach, speed = 1.0, own
     return reach, speed
 
 
-def _harmonics(
-    scene: Scene, module: types.ModuleType, theta: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _harmonics(scene: Scene, module: types.ModuleType, theta: Array) -> tuple[Array, Array]:
     """Angular frequencies of the forcing over one interval, and their amplitudes."""
     if not module.FORCED:
         return np.zeros(0), np.zeros(0)
-    unit = scene.time_unit
-    values = np.array([module.forcing(unit * sample / _SAMPLES, theta) for sample in range(_SAMPLES)])
-    sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / _SAMPLES), dtype=np.float64)
+    unit, samples = scene.time_unit, 128
+    values = np.array([module.forcing(unit * sample / samples, theta) for sample in range(samples)])
+    sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / samples), dtype=np.float64)
     sizes[0] /= 2.0
     sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would amplify
     return 2.0 * math.pi / unit * np.arange(len(sizes), dtype=np.float64), sizes
