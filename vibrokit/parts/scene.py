@@ -105,12 +105,13 @@ class Scene(metaclass=Constructed):
     def entries(self) -> tuple[Entry, ...]:
         """Every parameter with its path, in the order of the parameter array of compiled code."""
         found = [Entry(declared.name, declared, getattr(self, declared.name)) for declared in _OWN]
-        for prefix, part in self._placed_parts():
+        for prefix, part in self.placed_parts():
             values = part.parameters
             found += [Entry(f"{prefix}.{d.name}", d, values[d.name]) for d in part.declared()]
         return tuple(found)
 
-    def _placed_parts(self) -> list[tuple[str, Any]]:
+    def placed_parts(self) -> list[tuple[str, Any]]:
+        """Return the stops and all parts with their paths, in the order of `entries`."""
         placed: list[tuple[str, Any]] = [] if self.spring is None else [("spring", self.spring)]
         for index, barrier in enumerate(self.barriers):
             placed += [(f"barriers.{index}", barrier), (f"barriers.{index}.law", barrier.law)]

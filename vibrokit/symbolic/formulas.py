@@ -10,7 +10,10 @@ import sympy
 from sympy.concrete.expr_with_limits import ExprWithLimits
 
 from vibrokit.errors import DerivationError
+from vibrokit.parts.part import Part
+from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.printer import FUNCTIONS
+from vibrokit.symbolic.symbols import parameter_symbols
 
 _LARGEST_DENOMINATOR = 64
 _CALLS = (sympy.Function, ExprWithLimits, sympy.Derivative, sympy.Subs)
@@ -83,6 +86,17 @@ def _checked(title: str, answer: Any, known: set[Any]) -> sympy.Expr:
         lambda node: isinstance(node, sympy.Pow) and isinstance(node.exp, sympy.Float),
         lambda power: sympy.Pow(power.base, exact(float(power.exp))),
     )
+
+
+def formulas_of(scene: Scene, path: str, part: Part) -> str:
+    """Return text of all formulas of a part of a scene; "" where they fail, for then the derivation fails too."""
+    symbols = parameter_symbols(scene)
+    values = {name: symbols.get(f"{path}.{name}", exact(value)) for name, value in part.parameters.items()}
+    try:
+        found = part.twin(values).formulas(lambda name: sympy.Symbol(name, real=True, positive=name == "depth" or None))
+        return str(sympy.srepr(found))
+    except Exception:
+        return ""
 
 
 def exact(value: Any) -> Any:
