@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.kernels.choice import warn_of_coarse_steps
-from vibrokit.kernels.ensemble import Stop, advance_block, compiled_kernel
-from vibrokit.kernels.kernel import kernel_for, theta_of
+from vibrokit.kernels.ensemble import Stop, advance_block, common_of, compiled_kernel
+from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.streams import streams_of
 from vibrokit.parts.scene import Scene
@@ -23,14 +23,13 @@ def record(
     spacing: float,  # time from sample to sample (s)
     count: int,  # samples after the start
     *,
-    seed: int | None = None,  # of the noise, for the noisy flow
     normals: NDArray[np.float64] | None = None,  # (steps, 2), in place of those drawn, for coupled paths
 ) -> NDArray[np.float64]:
     """Integrate one trajectory of any flow; return its samples (≤ count + 1, equations).
 
     They are fewer if the trajectory diverged, needed too many steps, or grazed a stop whose force jumps.
     """
-    return recorded(scene, flow, stepper, state, start_time, spacing, count, seed=seed, normals=normals)[0]
+    return recorded(scene, flow, stepper, state, start_time, spacing, count, normals=normals)[0]
 
 
 def recorded(
@@ -42,13 +41,13 @@ def recorded(
     spacing: float,
     count: int,
     *,
-    seed: int | None = None,
+    seed: int | None = None,  # of the noise, for the noisy flow
     normals: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], int]:
     """Return what `record` does, and why the trajectory ended: a constant of `vibrokit.kernels.stopping`."""
     kernel = kernel_for(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
-    common = (theta_of(scene), start_time, spacing, np.array(stepper.settings(scene, spacing, count)))
+    common = common_of(scene, stepper, start_time, spacing, count)
     streams = streams_of(seed or 0, np.zeros(1, dtype=np.int64)) if flow is Flow.NOISY else np.empty((1, 0), np.uint64)
     budget, phase = np.full(1, count), np.zeros(1, dtype=np.int64)
     path = advance_block(kernel, state[None], budget, common, streams, phase, Stop(), count, 1, normals)
@@ -71,7 +70,7 @@ def record_each(
     kernel = compiled_kernel(scene, flow, stepper)
     warn_of_coarse_steps(scene, flow, stepper)
     order = np.argsort(phases, kind="stable")
-    common = (theta_of(scene), 0.0, spacing, np.array(stepper.settings(scene, spacing, count)))
+    common = common_of(scene, stepper, 0.0, spacing, count)
     none, budget = np.empty((len(states), 0), dtype=np.uint64), np.full(len(states), count)
     ended = advance_block(kernel, states[order], budget, common, none, phases[order], Stop(), count, 1)
     ended.visits[np.arange(count) >= ended.intervals[:, None]] = np.nan

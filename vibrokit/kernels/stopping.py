@@ -1,7 +1,5 @@
 """Stop tests, compiled into every stepper, so that each trajectory of an ensemble ends by itself."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -15,25 +13,6 @@ REACHED = 3  # in the ellipse around a known point
 DIVERGED = 4  # not finite
 STALLED = 5  # more steps in one interval than allowed
 GRAZED = 6  # at the touch of a stop, too slow to determine a jump of momenta, or at which their derivatives diverge
-
-
-class StopTest(NamedTuple):
-    """What ends trajectories, as drivers take it; see `vibrokit.kernels.ensemble.Stop`.
-
-    Drivers unpack it once. Handed on as a whole, the references to its arrays are counted at each test, with which RK4
-    took a tenth longer on hertz-0.570.
-    """
-
-    every: int
-    region: NDArray[np.float64]  # (2, 2); infinite bounds switch the test off
-    between: bool
-    area: NDArray[np.float64]  # (2, 2)
-    labels: NDArray[np.int16]  # negative where unknown; empty: no test
-    home: int
-    points: NDArray[np.float64]  # (K, 2)
-    point_labels: NDArray[np.int64]  # (K,)
-    metrics: NDArray[np.float64]  # (K, 2, 2)
-    turn: float
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
