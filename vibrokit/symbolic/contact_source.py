@@ -5,8 +5,8 @@ from __future__ import annotations
 import sympy
 
 from vibrokit.symbolic.contact import DEPTH, RATE
+from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.flow import FlowEquations
-from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import SourcePrinter, assignments, printable
 from vibrokit.symbolic.symbols import code_name
 
@@ -17,7 +17,7 @@ _SIDE = sympy.Symbol("side")
 class ContactWriter:
     """Writes the contact terms that a flow needs."""
 
-    def __init__(self, model: Model, equations: FlowEquations) -> None:
+    def __init__(self, model: Equations, equations: FlowEquations) -> None:
         self.model = model
         self.needed = equations.contacts
         self.stops = sorted({stop for stop, _, _ in equations.contacts.values()})

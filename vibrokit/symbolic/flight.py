@@ -7,8 +7,8 @@ import contextlib
 import sympy
 
 from vibrokit.errors import StepperError
+from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.flow import ACTION, FORCING, FlowEquations
-from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import SourcePrinter, unpack
 
 ORDER = 22
@@ -22,7 +22,7 @@ class FlightWriter:
     not linear, or a force is not a sum of sinusoids.
     """
 
-    def __init__(self, model: Model, equations: FlowEquations) -> None:
+    def __init__(self, model: Equations, equations: FlowEquations) -> None:
         self.model = model
         self.variables, self.covariances = equations.variables, equations.covariances
         no_contact = dict.fromkeys(equations.contacts, sympy.Integer(0))
@@ -98,7 +98,7 @@ class FlightWriter:
         return [*lines, f"        series[{row}*TERMS + _k + 1] = share*({' + '.join(terms) or '0.0'})"]
 
 
-def sinusoids(model: Model) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
+def sinusoids(model: Equations) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
     """Split the forcing into sinusoids: (ω, even, odd) of each, the value and its derivative divided by ω."""
     time = model.time
     forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing

@@ -9,8 +9,8 @@ import sympy
 
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
+from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.symbolic.model import Model
 
 FORCING = sympy.Symbol("f", real=True)
 ACTION = sympy.Symbol("S", real=True)
@@ -26,7 +26,7 @@ class FlowEquations:
     covariances: tuple[sympy.Symbol, ...]  # among the variables
 
 
-class ReversedModel(Model):
+class ReversedEquations(Equations):
     """The motion of a scene backwards in time.
 
     With s = −t and w = −v the motion is again x′ = w, w′ = f(x, −w, −s): the acceleration keeps its sign, so steppers
@@ -63,12 +63,12 @@ class ReversedModel(Model):
         return sympy.sympify(expression).xreplace({self.state[1]: -self.state[1], self.time: -self.time})
 
 
-def model_for(scene: Scene, flow: Flow) -> Model:
+def model_for(scene: Scene, flow: Flow) -> Equations:
     """Return the model of a flow: that of the scene, or of the scene backwards in time."""
-    return ReversedModel(scene) if flow.reversed else Model(scene)
+    return ReversedEquations(scene) if flow.reversed else Equations(scene)
 
 
-def derive_flow(model: Model, flow: Flow) -> FlowEquations:
+def derive_flow(model: Equations, flow: Flow) -> FlowEquations:
     """Derive the equations of a flow from its model, as returned by `model_for`."""
     if flow.differentiates:
         model.check_derivatives()
@@ -107,7 +107,7 @@ def derive_flow(model: Model, flow: Flow) -> FlowEquations:
 
 
 def _with_plain_contacts(
-    model: Model, opaque: tuple[sympy.Expr, ...], rates: list[sympy.Expr]
+    model: Equations, opaque: tuple[sympy.Expr, ...], rates: list[sympy.Expr]
 ) -> tuple[list[sympy.Expr], dict[sympy.Symbol, tuple[int, int, int]]]:
     """Replace the force of each stop and its derivatives by one symbol each, and say which; what is 0 is left out."""
     x, v = model.state[:2]

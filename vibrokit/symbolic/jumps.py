@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,13 +14,10 @@ from vibrokit.errors import DerivationError
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.printer import as_text
-from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
+from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, Slice, real_value, switches_of, zeros_of
 
 _WIDTH = 1e-3  # of the smooth form, in the velocity that the jump changes in a time of 1/ω_n
-_SWITCHES = (
-    sympy.sign, sympy.Heaviside, sympy.floor, sympy.ceiling, sympy.frac, sympy.Mod, sympy.acot, sympy.atan2,
-)  # fmt: skip
-
+_DRAWS = 40  # of the other variables and parameters
 _SPEEDS = ("v", "rate")
 _NOT_LOCATED = "and no stepper locates that, so multipliers and energies would be wrong"
 
@@ -60,46 +58,16 @@ def refuse_jumps(
 def _refuse(
     part: Any, force: sympy.Expr, speed: sympy.Symbol, values: Mapping[str, sympy.Expr], natural_frequency: float
 ) -> None:
-    switches = switches_of(force, speed)
-    if not switches:
+    if not (switches := switches_of(force, speed)):
         return
-    names = {symbol: name for name, symbol in values.items() if symbol in force.free_symbols}
-    numbers = {symbol: float(part.parameters[name]) for symbol, name in names.items()}
-    others = sorted(force.free_symbols - {speed}, key=str)
-    value = sympy.lambdify([speed, *others], force, "mpmath", dummify=True)
-    fixed = set().union(*(power.exp.free_symbols for power in force.atoms(sympy.Pow))) & set(numbers)
+    slice_ = Slice(part, force, speed, values)
     with mpmath.workdps(DIGITS):
         for switch in switches:
-            argument = sympy.lambdify([speed, *others], switch, "mpmath", dummify=True)
-            for point in points_of(others, numbers, fixed):
-                if _jump(value, argument, point, speed.is_positive) > 0:
-                    steps = [
-                        _jump(value, argument, each, speed.is_positive)
-                        for each in points_of(others, numbers, set(numbers), 3)
-                    ]
-                    plain = {symbol: sympy.Symbol(name) for symbol, name in names.items()}
-                    raise _refusal(part, force.xreplace(plain), switch.xreplace(plain), speed, steps, natural_frequency)
-
-
-def switches_of(force: sympy.Expr, speed: sympy.Symbol) -> list[sympy.Expr]:
-    """Expressions at whose zeros the force may jump in the speed."""
-    found: list[sympy.Expr] = []
-    for node in sympy.preorder_traversal(force):
-        if isinstance(node, sympy.Mod):
-            found += [node.args[0] / node.args[1]]
-        elif isinstance(node, _SWITCHES):
-            found += node.args
-        elif isinstance(node, sympy.core.relational.Relational):
-            found.append(node.lhs - node.rhs)
-        elif isinstance(node, sympy.tan | sympy.sec):  # an arc tangent makes a jump of a pole
-            found.append(sympy.cos(node.args[0]))
-        elif isinstance(node, sympy.cot | sympy.csc):
-            found.append(sympy.sin(node.args[0]))
-        elif isinstance(node, sympy.Pow) and node.exp.is_nonnegative is not True:
-            found.append(node.base.args[0] if isinstance(node.base, sympy.Abs) else node.base)
-        if isinstance(node, sympy.floor | sympy.ceiling | sympy.frac | sympy.Mod):  # at 0 a factor may hide the jump
-            found.append(found[-1] - 1)
-    return [each for each in dict.fromkeys(found) if speed in each.free_symbols]
+            jump = functools.partial(_jump, slice_.value, slice_.function_of(switch), positive=speed.is_positive)
+            if any(jump(point) > 0 for point in slice_.points(_DRAWS)):
+                steps = [jump(point) for point in slice_.points(3, own=True)]
+                plain = {symbol: sympy.Symbol(name) for symbol, name in slice_.names.items()}
+                raise _refusal(part, force.xreplace(plain), switch.xreplace(plain), speed, steps, natural_frequency)
 
 
 def _jump(value: Function, argument: Function, point: list[mpmath.mpf], positive: bool | None) -> float:

@@ -1,182 +1,48 @@
-"""Model: the equations of a scene, derived from its parts."""
+"""Model: the equations of a scene as a user reads them, and what they say of its motion."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 
 import sympy
 
-from vibrokit.errors import DerivationError
-from vibrokit.parts.scene import Scene
-from vibrokit.symbolic.borders import Border, borders_of
-from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact, refuse_steep_touch
+from vibrokit.symbolic.borders import Border
+from vibrokit.symbolic.contact import RATE
 from vibrokit.symbolic.domain import Domain, border_ahead
-from vibrokit.symbolic.formulas import derived_formula, derived_rates
-from vibrokit.symbolic.jumps import refuse_jumps
+from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.mathml import definition, rate_equation
 from vibrokit.symbolic.printer import as_latex, as_text
-from vibrokit.symbolic.removable import without_removable
-from vibrokit.symbolic.roughness import Roughness, refuse_rough, roughness_of
-from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
-
-_SHARES = (0.0341, 0.2163, 0.4527, 0.6194, 0.8812)  # of a period, where a pulse seldom begins or ends
-_SAME = 1e-6  # of the largest force: a period with seven digits repeats
 
 
-class Model:
-    """Drift, diffusion, Hamiltonian and derived quantities, as SymPy expressions.
-
-    Large-deviation convention: ε = D, dq = b(q, t) dt + √D σ(q) dW, a = σσᵀ, and
-
-        H(q, p, t) = p·b(q, t) + ½ pᵀ a(q) p,   q′ = ∂H/∂p,   p′ = −∂H/∂q,   S′ = ½ pᵀ a p
-
-    (Freidlin & Wentzell, *Random Perturbations of Dynamical Systems*).
+class Model(Equations):
+    """The equations of a scene, where its forces have values, and whether its motion keeps or loses energy.
 
     Parameters
     ----------
     scene : Scene
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.symbols = parameter_symbols(scene)
-        self.time = sympy.Symbol("t", real=True)
-        self.state = state_symbols(scene)
-
-    def _symbols_of(self, prefix: str) -> dict[str, sympy.Symbol]:
-        paths = (path for path in self.symbols if path.startswith(f"{prefix}."))
-        return {path.removeprefix(f"{prefix}."): self.symbols[path] for path in paths}
-
     @cached_property
-    def contacts(self) -> tuple[DerivedContact, ...]:
-        """Derived contact of each stop."""
-        return tuple(
-            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"), self.scene.natural_frequency)
-            for index, barrier in enumerate(self.scene.barriers)
-        )
-
-    def guarded_force(self, index: int, in_x: int = 0, in_v: int = 0) -> sympy.Expr:
-        """Force of stop `index` on the mass: zero without contact, and where a clamped law would pull.
-
-        `in_x` and `in_v` are orders of differentiation in x and in v.
-        """
+    def equations(self) -> dict[sympy.Symbol, sympy.Expr]:
+        """Rate of every variable: Hamilton's equations if the scene has noise, otherwise the equations of motion."""
+        if not self.momenta:
+            return dict(zip(self.state, self.drift, strict=True))
+        # H is differentiated with opaque stop forces, so that their formulas keep the form in which they were written.
         x, v = self.state[:2]
-        sign, position = self.scene.barriers[index].sign, self.symbols[f"barriers.{index}.position"]
-        force = -sign * self.contacts[index].law.subs({DEPTH: sign * (x - position), RATE: sign * v})
-        touching = x > position if sign > 0 else x < position
-        if self.contacts[index].clamped:
-            touching = sympy.And(touching, -sign * force > 0)
-        return sympy.Piecewise((sympy.diff(force, (x, in_x), (v, in_v)), touching), (0, True))
-
-    @cached_property
-    def smooth_force(self) -> sympy.Expr:
-        """Acceleration without stops and without time-dependent excitations."""
-        x, v, *extra = self.state
-        omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
-        spring = omega**2 * x if self.scene.spring is None else self._spring_force
-        constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
-        push = self._noise_formula("force", tuple(extra)) if extra else 0
-        return -2 * zeta * omega * v - spring + constant + push
-
-    @cached_property
-    def _spring_force(self) -> sympy.Expr:
-        """Force of the spring that is given."""
-        spring, symbols, (x, v) = self.scene.spring, self._symbols_of("spring"), self.state[:2]
-        force = without_removable(derived_formula(spring, "force", symbols, (x, v)), (x, v))
-        refuse_jumps(spring, force, (v,), symbols, self.scene.natural_frequency)
-        return force
-
-    @cached_property
-    def roughness(self) -> Roughness:
-        """Where the force of the spring is least smooth."""
-        if self.scene.spring is None:
-            return Roughness()
-        return roughness_of(self.scene.spring, self._spring_force, self.state[:2], self._symbols_of("spring"))
-
-    def check_derivatives(self) -> None:
-        """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under a force."""
-        if self.scene.spring is not None:
-            refuse_rough(self.scene.spring, self._spring_force, self.roughness, self._symbols_of("spring"))
-        for contact in self.contacts:
-            refuse_steep_touch(contact)
-
-    @cached_property
-    def excitations(self) -> tuple[sympy.Expr, ...]:
-        """Force of each excitation as an expression in time."""
-        forces = []
-        for index, part in enumerate(self.scene.excitations):
-            forces.append(derived_formula(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,)))
-            if part.period is None and self.time in forces[-1].free_symbols:
-                raise DerivationError(
-                    f"{type(part).__name__}.period is None, which means a constant, but its force depends on time; "
-                    "return the period, or math.inf if it never repeats."
-                )
-            if part.period is not None and math.isfinite(part.period):
-                self._check_repeats(type(part).__name__, part.period, forces[-1])
-        return tuple(forces)
-
-    def _check_repeats(self, name: str, period: float, force: sympy.Expr) -> None:
-        """Refuse an excitation that does not repeat after its period, as with 1/f where 2π/ω is meant."""
-        force = force.subs(self.numbers)
-
-        def at(share: float) -> complex:
-            return complex(force.subs(self.time, period * share))
-
-        change = max(abs(at(share + 1) - at(share)) for share in _SHARES)
-        if change > _SAME * max(abs(at(share)) for share in _SHARES):
-            raise DerivationError(
-                f"{name}.period is {period:.10g}, but its force changes by {change:.3g} from one "
-                "period to the next; return a period of the force, or math.inf if it never repeats."
-            )
-
-    @cached_property
-    def forcing(self) -> sympy.Expr:
-        """Sum of the excitations that depend on time."""
-        return sum((f for f in self.excitations if self.time in f.free_symbols), sympy.Integer(0))
-
-    def drift_with(self, forcing: sympy.Expr, contacts: tuple[sympy.Expr, ...]) -> sympy.Matrix:
-        """Drift b for a given forcing and given forces of the stops."""
-        v = self.state[1]
-        acceleration = self.smooth_force + forcing + sum(contacts, sympy.Integer(0))
-        return sympy.Matrix([v, acceleration, *self._extra_drift])
-
-    @cached_property
-    def _extra_drift(self) -> tuple[sympy.Expr, ...]:
-        noise, extra = self.scene.noise, self.state[2:]
-        if noise is None or not extra:
-            return ()
-        symbols = self._symbols_of("noise")
-        rates = derived_rates(noise, "drift", symbols, self.state, len(extra))
-        for rate in rates:
-            refuse_jumps(noise, rate, self.state, symbols, self.scene.natural_frequency)
-        return rates
-
-    @cached_property
-    def drift(self) -> sympy.Matrix:
-        """Drift b(q, t) with stops as `Piecewise`, a column of length n."""
-        return self.drift_with(self.forcing, tuple(map(self.guarded_force, range(len(self.scene.barriers)))))
-
-    @cached_property
-    def borders(self) -> tuple[Border, ...]:
-        """Where motion without noise ends: the poles of the forces, and the edges of their domains."""
-        x, v = self.state[:2]
-        found = dict.fromkeys(one for rate in (self.smooth_force, *self._extra_drift) for one in self._borders(rate))
-        for index, (contact, barrier) in enumerate(zip(self.contacts, self.scene.barriers, strict=True)):
-            depth = barrier.sign * (x - self.symbols[f"barriers.{index}.position"])
-            for one in borders_of(contact.law, (DEPTH, RATE)):
-                gauge = one.gauge.subs({DEPTH: sympy.Max(depth, 0), RATE: barrier.sign * v}, simultaneous=True)
-                found[Border(gauge, one.pole)] = None
-        return tuple(found)
-
-    @cached_property
-    def noise_borders(self) -> tuple[Border, ...]:
-        """Where noisy motion ends besides: the borders of the amplitude of the noise."""
-        return tuple(one for one in self._borders(sum(self.amplitude)) if one not in self.borders)
-
-    def _borders(self, expression: sympy.Expr) -> tuple[Border, ...]:
-        return borders_of(sympy.sympify(expression), self.state)
+        forces = self.opaque_forces
+        hamiltonian = self.hamiltonian_with(self.drift_with(self.forcing, forces))
+        rates = {q: sympy.diff(hamiltonian, p) for q, p in zip(self.state, self.momenta, strict=True)}
+        rates |= {
+            p: sum(sympy.expand_mul(term, deep=False) for term in sympy.Add.make_args(-sympy.diff(hamiltonian, q)))
+            for q, p in zip(self.state, self.momenta, strict=True)
+        }
+        written_out = {
+            sympy.diff(force, (x, a), (v, b)): self.guarded_force(index, a, b)
+            for index, force in enumerate(forces)
+            for a, b in ((1, 0), (0, 1), (0, 0))
+        }
+        return {variable: rate.xreplace(written_out) for variable, rate in rates.items()}
 
     def border_ahead(self, state: Sequence[float], time: float, lapse: float) -> str:
         """Return in words the border that the motion from a state (x, v, …) meets within a time (s); "" for none.
@@ -212,73 +78,6 @@ class Model:
         return Domain([border.at(at_rest) for border in self.borders], self.state[0])
 
     @cached_property
-    def amplitude(self) -> sympy.Matrix:
-        """Column σ(q), the factor of √D dW."""
-        column = [sympy.Integer(0)] * len(self.state)
-        if self.scene.noise is not None:
-            column[-1 if len(self.state) > 2 else 1] = self._noise_formula("amplitude", self.state[:2])
-        return sympy.Matrix(column)
-
-    def _noise_formula(self, method: str, state: tuple[sympy.Symbol, ...]) -> sympy.Expr:
-        symbols = self._symbols_of("noise")
-        formula = derived_formula(self.scene.noise, method, symbols, state)
-        refuse_jumps(self.scene.noise, formula, state, symbols, self.scene.natural_frequency)
-        return formula
-
-    @cached_property
-    def diffusion(self) -> sympy.Matrix:
-        """Diffusion matrix a = σσᵀ, n × n, without the factor D."""
-        return self.amplitude * self.amplitude.T
-
-    @cached_property
-    def momenta(self) -> tuple[sympy.Symbol, ...]:
-        """Momenta conjugate to the state; none in a scene without noise."""
-        if self.scene.noise is None:
-            return ()
-        return tuple(sympy.Symbol(f"p_{index + 1}", real=True) for index in range(len(self.state)))
-
-    def hamiltonian_with(self, drift: sympy.Matrix) -> sympy.Expr:
-        """H for a given drift."""
-        return (sympy.Matrix(self.momenta).T * drift)[0] + self.action_rate if self.momenta else sympy.Integer(0)
-
-    @cached_property
-    def hamiltonian(self) -> sympy.Expr:
-        """H(q, p, t) = p·b + ½ pᵀ a p."""
-        return self.hamiltonian_with(self.drift)
-
-    @cached_property
-    def action_rate(self) -> sympy.Expr:
-        """S′ = ½ pᵀ a p along Hamilton's equations."""
-        p = sympy.Matrix(self.momenta)
-        return (p.T * self.diffusion * p)[0] / 2 if self.momenta else sympy.Integer(0)
-
-    @cached_property
-    def equations(self) -> dict[sympy.Symbol, sympy.Expr]:
-        """Rate of every variable: Hamilton's equations if the scene has noise, otherwise the equations of motion."""
-        if not self.momenta:
-            return dict(zip(self.state, self.drift, strict=True))
-        # H is differentiated with opaque stop forces, so that their formulas keep the form in which they were written.
-        x, v = self.state[:2]
-        forces = self.opaque_forces
-        hamiltonian = self.hamiltonian_with(self.drift_with(self.forcing, forces))
-        rates = {q: sympy.diff(hamiltonian, p) for q, p in zip(self.state, self.momenta, strict=True)}
-        rates |= {
-            p: sum(sympy.expand_mul(term, deep=False) for term in sympy.Add.make_args(-sympy.diff(hamiltonian, q)))
-            for q, p in zip(self.state, self.momenta, strict=True)
-        }
-        written_out = {
-            sympy.diff(force, (x, a), (v, b)): self.guarded_force(index, a, b)
-            for index, force in enumerate(forces)
-            for a, b in ((1, 0), (0, 1), (0, 0))
-        }
-        return {variable: rate.xreplace(written_out) for variable, rate in rates.items()}
-
-    @property
-    def opaque_forces(self) -> tuple[sympy.Expr, ...]:
-        """The force of each stop as an undefined function of x and v."""
-        return tuple(sympy.Function(f"C{index}")(*self.state[:2]) for index in range(len(self.scene.barriers)))
-
-    @cached_property
     def jacobian(self) -> sympy.Matrix:
         """∂b/∂q, n × n."""
         return self.drift.jacobian(list(self.state))
@@ -311,12 +110,6 @@ class Model:
         if self.forcing != 0 or len(self.state) > 2 or not self._conservative_stops:
             return False
         return not self._friction.free_symbols & {*self.state}
-
-    @cached_property
-    def numbers(self) -> dict[sympy.Symbol, float]:
-        """The values of the parameters of the scene."""
-        values = self.scene.parameters
-        return {symbol: values[path] for path, symbol in self.symbols.items()}
 
     @cached_property
     def _friction(self) -> sympy.Expr:

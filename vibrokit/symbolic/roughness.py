@@ -11,9 +11,8 @@ import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.part import Part
-from vibrokit.symbolic.jumps import switches_of
 from vibrokit.symbolic.printer import as_text
-from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, points_of, real_value, zeros_of
+from vibrokit.symbolic.switching import DIGITS, NEAR, NEARER, Function, Slice, real_value, switches_of, zeros_of
 
 _DRAWS = 8  # of the other variables and parameters
 _JUMP = 0.01  # power of the distance below which a change is a jump
@@ -47,20 +46,15 @@ def roughness_of(
 ) -> Roughness:
     """Find where a force of a part is least smooth in some variables.
 
-    `values` has the symbol of each parameter of the part. Those that are no exponents are drawn at random too, since
-    the same compiled code serves other values.
+    `values` has the symbol of each parameter of the part.
     """
-    names = {symbol: name for name, symbol in values.items() if symbol in force.free_symbols}
-    numbers = {symbol: float(part.parameters[name]) for symbol, name in names.items()}
-    fixed = set().union(*(power.exp.free_symbols for power in force.atoms(sympy.Pow))) & set(numbers)
     least = Roughness()
     for variable in variables:
-        others = sorted(force.free_symbols - {variable}, key=str)
-        value = sympy.lambdify([variable, *others], force, "mpmath", dummify=True)
+        slice_ = Slice(part, force, variable, values)
         for switch in dict.fromkeys([*switches_of(force, variable), *_roots(force, variable)]):
-            argument = sympy.lambdify([variable, *others], switch, "mpmath", dummify=True)
+            argument = slice_.function_of(switch)
             with mpmath.workdps(DIGITS):
-                power = min(_power(value, argument, each) for each in points_of(others, numbers, fixed, _DRAWS))
+                power = min(_power(slice_.value, argument, point) for point in slice_.points(_DRAWS))
             least = min(least, Roughness(power, switch), key=lambda each: each.power)
     return least
 

@@ -10,7 +10,8 @@ import mpmath
 import numpy as np
 import sympy
 
-_DRAWS = 40  # of the other variables and parameters
+from vibrokit.parts.part import Part
+
 _DECADES = 6.0  # their sizes are 10^±6; so are the velocities between which a switch is sought
 _GRID = sorted(
     mpmath.mpf(sign * 10.0 ** (step / 4)) for sign in (-1, 0, 1) for step in range(-24, 25) if sign or not step
@@ -20,23 +21,76 @@ DIGITS = 60
 NEAR, NEARER = mpmath.mpf("1e-10"), mpmath.mpf("1e-20")
 """Distances from a switch, relative to its place; continuous functions differ across the two."""
 
+_SWITCHES = (
+    sympy.sign, sympy.Heaviside, sympy.floor, sympy.ceiling, sympy.frac, sympy.Mod, sympy.acot, sympy.atan2,
+)  # fmt: skip
+
 Function = Callable[..., Any]
 
 
-def points_of(
-    others: list[sympy.Symbol], numbers: Mapping[sympy.Symbol, float], fixed: set[sympy.Symbol], count: int = _DRAWS
-) -> Iterator[list[mpmath.mpf]]:
-    """Values of all symbols but the speed: the parameters `fixed` and, at first, all keep those of the scene."""
-    rng = np.random.default_rng(0)
-    for draw in range(count):
-        point = []
-        for symbol in others:
-            size = 10.0 ** rng.uniform(-_DECADES, _DECADES)
-            sign = 1.0 if symbol.is_nonnegative else -1.0 if symbol.is_negative else rng.choice([-1.0, 1.0])
-            drawn = size * sign
-            kept = symbol in fixed or (draw == 0 and symbol in numbers)
-            point.append(mpmath.mpf(numbers[symbol] if kept else float(drawn)))
-        yield point
+class Slice:
+    """A formula of a part as a function of one variable, at any values of the others and of the parameters.
+
+    Parameters
+    ----------
+    part : Part
+    formula : sympy.Expr
+    variable : sympy.Symbol
+    values : mapping
+        The symbol of each parameter of the part.
+    """
+
+    def __init__(
+        self, part: Part, formula: sympy.Expr, variable: sympy.Symbol, values: Mapping[str, sympy.Expr]
+    ) -> None:
+        self.names = {symbol: name for name, symbol in values.items() if symbol in formula.free_symbols}
+        self._numbers = {symbol: float(part.parameters[name]) for symbol, name in self.names.items()}
+        self._others = sorted(formula.free_symbols - {variable}, key=str)
+        self._exponents = set().union(*(power.exp.free_symbols for power in formula.atoms(sympy.Pow)))
+        self._variable = variable
+        self.value = self.function_of(formula)
+
+    def function_of(self, expression: sympy.Expr) -> Function:
+        """Return an expression as a function of the variable and a point."""
+        return sympy.lambdify([self._variable, *self._others], expression, "mpmath", dummify=True)
+
+    def points(self, count: int, *, own: bool = False) -> Iterator[list[mpmath.mpf]]:
+        """Draw values of all symbols but the variable.
+
+        Parameters in exponents and, at first or with `own`, all others keep the values of the scene: the same compiled
+        code serves other values.
+        """
+        rng = np.random.default_rng(0)
+        for draw in range(count):
+            point = []
+            for symbol in self._others:
+                size = 10.0 ** rng.uniform(-_DECADES, _DECADES)
+                sign = 1.0 if symbol.is_nonnegative else -1.0 if symbol.is_negative else rng.choice([-1.0, 1.0])
+                drawn = float(size * sign)
+                kept = symbol in self._numbers and (own or draw == 0 or symbol in self._exponents)
+                point.append(mpmath.mpf(self._numbers[symbol] if kept else drawn))
+            yield point
+
+
+def switches_of(force: sympy.Expr, speed: sympy.Symbol) -> list[sympy.Expr]:
+    """Expressions at whose zeros the force may jump in the speed."""
+    found: list[sympy.Expr] = []
+    for node in sympy.preorder_traversal(force):
+        if isinstance(node, sympy.Mod):
+            found += [node.args[0] / node.args[1]]
+        elif isinstance(node, _SWITCHES):
+            found += node.args
+        elif isinstance(node, sympy.core.relational.Relational):
+            found.append(node.lhs - node.rhs)
+        elif isinstance(node, sympy.tan | sympy.sec):  # an arc tangent makes a jump of a pole
+            found.append(sympy.cos(node.args[0]))
+        elif isinstance(node, sympy.cot | sympy.csc):
+            found.append(sympy.sin(node.args[0]))
+        elif isinstance(node, sympy.Pow) and node.exp.is_nonnegative is not True:
+            found.append(node.base.args[0] if isinstance(node.base, sympy.Abs) else node.base)
+        if isinstance(node, sympy.floor | sympy.ceiling | sympy.frac | sympy.Mod):  # at 0 a factor may hide the jump
+            found.append(found[-1] - 1)
+    return [each for each in dict.fromkeys(found) if speed in each.free_symbols]
 
 
 def zeros_of(argument: Callable[[Any], mpmath.mpf]) -> Iterator[mpmath.mpf]:
