@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import vibrokit as vk
 from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
-from vibrokit.structure.circle import turn_of
+from vibrokit.structure.along_x import turn_of
 
 
 def pendulum(*excitations, damping=0.1, force="sin(x)", **constants):

@@ -11,7 +11,7 @@ from scipy import stats
 import vibrokit as vk
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.results.codes import Code
-from vibrokit.structure import searched_value as module
+from vibrokit.structure import continuation as module
 from vibrokit.structure.continuation import continuation
 
 pytestmark = pytest.mark.slow

@@ -19,7 +19,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.structure import Structure
-from vibrokit.structure.borders import apart
+from vibrokit.structure.along_x import apart
 from vibrokit.structure.scales import turns_of
 
 _CHECKS_WITHOUT_SECTION = 16  # exit tests per unit of time where no section sets them

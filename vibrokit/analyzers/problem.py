@@ -24,8 +24,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.structure import Structure
-from vibrokit.structure.borders import apart
-from vibrokit.structure.circle import wrapped
+from vibrokit.structure.along_x import apart, wrapped
 from vibrokit.structure.orbits import Orbit, refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -29,7 +29,7 @@ from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.structure.orbits import Orbit
-from vibrokit.structure.orbits_inside import orbits_inside
+from vibrokit.structure.unstable_orbits import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
 
 _LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor

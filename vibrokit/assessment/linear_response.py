@@ -12,8 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from vibrokit.errors import NoSectionError
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.roots import bracketed_roots
-from vibrokit.structure.tones import Tone, tones
+from vibrokit.structure.one_variable import Tone, bracketed_roots, tones
 from vibrokit.symbolic.numeric import amplitude_at, drift_at, excitation_of, jacobian_of
 
 _UNDAMPED = 1e-12  # of a rate: damping of that size is rounding

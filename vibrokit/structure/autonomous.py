@@ -19,12 +19,12 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.circle import turn_of, wrapped
+from vibrokit.structure.along_x import states_at, turn_of, wrapped
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.orbits import CONVERGED, EQUAL, Orbit
 from vibrokit.structure.rest import SteadyForce
-from vibrokit.structure.scales import size_of, states_at, units_of
+from vibrokit.structure.scales import size_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16

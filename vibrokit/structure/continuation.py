@@ -5,7 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
+from vibrokit.errors import VibrokitError
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import carry
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, current, put_off, stage, working
+from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
 from vibrokit.results.finding import Finding
@@ -26,11 +28,11 @@ from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of
-from vibrokit.structure.basins.grid import SETTLING, basin_fractions
+from vibrokit.structure.basins.grid import CELL_CODES, SETTLING, basin_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN
+from vibrokit.structure.find import structure_of
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
-from vibrokit.structure.searched_value import SearchedValue, searched_value
 from vibrokit.structure.tracing.branches import Tracing, thinned, without_fraction
 from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
@@ -181,11 +183,8 @@ class ContinuationRun:
     def _search(self) -> None:
         """Search for the steady states at each value."""
         tasks = [(self.osc, self.line, value, self.request) for value in self.values]
-        with (
-            stage("values", unit="values", total=len(tasks)),
-            contextlib.closing(self._each(searched_value, tasks)) as all_,
-        ):
-            for found in all_:
+        with stage("values", unit="values", total=len(tasks)), self._each(searched_value, tasks) as every:
+            for found in every:
                 self.found.append(found)
                 current().stop_again()
                 advance()
@@ -217,11 +216,8 @@ class ContinuationRun:
             )
             for value, attractors in held
         ]  # fmt: skip
-        with (
-            stage("basin fractions", unit="values", total=len(tasks)),
-            contextlib.closing(self._each(basin_fractions, tasks)) as each,
-        ):
-            for index, (attractors, findings) in zip(places, each, strict=True):
+        with stage("basin fractions", unit="values", total=len(tasks)), self._each(basin_fractions, tasks) as every:
+            for index, (attractors, findings) in zip(places, every, strict=True):
                 tracing.found[index] = list(attractors)
                 self.cell_findings[tracing.values[index]] = findings
                 advance()
@@ -230,7 +226,7 @@ class ContinuationRun:
         """Yield states that are the same at every value, at those values that were not searched."""
         for value in self.values[len(self.found) :]:
             reason = self.line.refusal(self.osc, value)
-            nothing = SteadyStates(value, (), (), (Finding.of(Code.NOTHING_AT, value=value, reason=reason),))
+            nothing = SteadyStates(value, (), (), (_nothing_at(value, reason),))
             yield nothing if reason else dataclasses.replace(states, value=value)
 
     def _states(self) -> Generator[SteadyStates, None, None]:
@@ -238,10 +234,9 @@ class ContinuationRun:
         places = {value: index for index, value in enumerate(self.tracing.values)}
         for at in self.found:
             index = places.get(at.value)
-            pairs = (
-                [] if index is None else list(zip(self.tracing.found[index], self.tracing.numbered[index], strict=True))
-            )
-            pairs.sort(key=lambda pair: order_of(pair[0]))  # as find_structure does, for the same names
+            tracing = self.tracing
+            both = () if index is None else zip(tracing.found[index], tracing.numbered[index], strict=True)
+            pairs = sorted(both, key=lambda pair: order_of(pair[0]))  # as find_structure does, for the same names
             named = labelled([attractor for attractor, _ in pairs], has_stops=bool(self.osc.barriers))
             yield SteadyStates(
                 at.value,
@@ -250,8 +245,41 @@ class ContinuationRun:
                 (*at.findings, *self.cell_findings.get(at.value, ())),
             )
 
-    def _each(self, work: Callable[..., Any], tasks: list[tuple[Any, ...]]) -> Generator[Any, None, None]:
-        return (work(*task) for task in tasks) if self.executor is None else carry(work, tasks, self.executor)
+    def _each(
+        self, work: Callable[..., Any], tasks: list[tuple[Any, ...]]
+    ) -> contextlib.AbstractContextManager[Iterable[Any]]:
+        """Do each task as it is asked for, one after another or by the executor."""
+        one_by_one = (work(*task) for task in tasks)
+        return contextlib.closing(one_by_one if self.executor is None else carry(work, tasks, self.executor))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SearchedValue:
+    """Steady states found at one value, each by itself."""
+
+    value: float
+    attractors: tuple[Attractor, ...] = ()
+    region: Region | None = None
+    budget: int = 0
+    findings: tuple[Finding, ...] = ()
+    refused: bool = False  # whether there is no such scene, or none that can have attractors
+
+
+def searched_value(osc: Oscillator, line: ParameterLine, value: float, request: Request) -> SearchedValue:
+    """Search for the steady states at a value; basins are found once all attractors are known."""
+    refused = True
+    try:
+        there = line.at(osc, value)
+        refused = there.model.undamped
+        structure = structure_of(there, dataclasses.replace(request, cells=None), basins=False)
+    except VibrokitError as error:
+        return SearchedValue(value, findings=(_nothing_at(value, error),), refused=refused)
+    findings = tuple(one for one in structure.findings if one.code not in (*CELL_CODES, Code.STOPPED))
+    return SearchedValue(value, structure.attractors, structure.basins.region, structure.budget, findings)
+
+
+def _nothing_at(value: float, reason: object) -> Finding:
+    return Finding.of(Code.NOTHING_AT, value=value, reason=str(reason))
 
 
 def _union(regions: list[Region]) -> Region | None:

@@ -26,17 +26,17 @@ from vibrokit.results.region import Region
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
+from vibrokit.structure.along_x import states_at, turn_of
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import SETTLING, BasinGrid, with_fractions
 from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SOON, SaddleSearch
-from vibrokit.structure.circle import turn_of
 from vibrokit.structure.manifolds import BRANCHES, default_arc_length, grow_manifolds
 from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_stepper, slowest_rate, wait_of
 from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
 from vibrokit.structure.rest import in_front_of_stops, tops_around
-from vibrokit.structure.scales import length_of, states_at
+from vibrokit.structure.scales import length_of
 from vibrokit.structure.search import Search
 from vibrokit.structure.validation import Request
 from vibrokit.symbolic.flow_kind import Flow

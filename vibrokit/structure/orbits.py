@@ -19,7 +19,7 @@ from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.circle import wrapped
+from vibrokit.structure.along_x import wrapped
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.newton import Evaluation, newton, scaled
 from vibrokit.structure.scales import units_of

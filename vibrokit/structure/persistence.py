@@ -13,7 +13,7 @@ from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
-from vibrokit.structure.circle import turn_of, wrapped
+from vibrokit.structure.along_x import turn_of, wrapped
 from vibrokit.structure.scales import turns_of
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -15,9 +15,8 @@ from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.along_x import between_borders, shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.basins.stop_cells import MARGIN, is_extended
-from vibrokit.structure.borders import between_borders
-from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.rest import SteadyForce, tops_around
 from vibrokit.structure.scales import length_of, units_of
 from vibrokit.structure.validation import DEFAULT_CELLS

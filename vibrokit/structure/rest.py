@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +16,8 @@ from numpy.typing import NDArray
 from vibrokit.errors import StructureError
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.borders import intervals_within
-from vibrokit.structure.roots import bracketed_roots
-from vibrokit.structure.tones import SAMPLES
+from vibrokit.structure.along_x import intervals_within, states_at
+from vibrokit.structure.one_variable import bracketed_roots, tones
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PLACES = 1024  # in a range of x between borders, at which the force is compared with 0
@@ -30,28 +30,22 @@ class SteadyForce:
 
     def __init__(self, osc: Oscillator) -> None:
         self.osc, self.field = osc, VectorField(osc)
-        self._extra = len(osc.noise.extra_states) if osc.noise else 0
         periods = {i: part.period for i, part in enumerate(osc.excitations) if part.period is not None}
         now = sum(self.field.excitation(index, 0.0) for index in periods)
-        self._periodic = now - sum(self._mean(*each) for each in periods.items() if math.isfinite(each[1]))
-
-    def _mean(self, index: int, period: float) -> float:
-        return float(np.mean([self.field.excitation(index, period * k / SAMPLES) for k in range(SAMPLES)]))
+        finite = ((partial(self.field.excitation, i), period) for i, period in periods.items() if math.isfinite(period))
+        self._periodic = now - sum(tones(force, period, 1, 1.0)[0] for force, period in finite)
 
     def __call__(self, states: Array) -> Array:
         """Return the force at states (…, 2)."""
         with np.errstate(all="ignore"):  # a force may be singular
-            rates: Array = self.field.rate(self._padded(states))[..., 1] - self._periodic
+            rates: Array = self.field.rate(states_at(self.osc, states))[..., 1] - self._periodic
         return rates
 
     def slope(self, states: Array) -> Array:
         """Return the derivatives of the force by x and v at states (…, 2), shape (…, 2)."""
         with np.errstate(all="ignore"):
-            derivatives: Array = self.field.jacobian(self._padded(states))[..., 1, :2]
+            derivatives: Array = self.field.jacobian(states_at(self.osc, states))[..., 1, :2]
         return derivatives
-
-    def _padded(self, states: Array) -> Array:
-        return np.concatenate([states, np.zeros((*states.shape[:-1], self._extra))], axis=-1) if self._extra else states
 
     def at_rest(self, places: Array) -> Array:
         """Return the force at rest at places (…)."""

@@ -15,10 +15,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
-from vibrokit.structure.borders import length_between_borders
-from vibrokit.structure.circle import turn_of
-from vibrokit.structure.harmonic_balance import Balance, balances_of
-from vibrokit.structure.roots import bracketed_roots
+from vibrokit.structure.along_x import states_at, turn_of
+from vibrokit.structure.known_motions import Balance, balances_of
+from vibrokit.structure.one_variable import bracketed_roots
 
 _RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
 _DECADES = 12  # above and below 1 m: deflections at which a spring is compared with a linear one, damping with 0
@@ -46,7 +45,7 @@ def length_of(osc: Oscillator) -> float:
         push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
     stops = (2 * abs(barrier.position) for barrier in osc.barriers)
     if osc.model.domain:
-        return max([push, length_between_borders(osc), *stops]) or 1.0
+        return max([push, _length_between_borders(osc), *stops]) or 1.0
     length = max([push, _self_sustained(osc, field), *stops])
     if not length or _pushes_away(osc, field):
         length = max(length, _bending(osc, field))
@@ -116,6 +115,27 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
     return float(f"{math.exp(max(found, default=-math.inf)):.9g}")
 
 
+def _length_between_borders(osc: Oscillator) -> float:
+    """Return the distance (m) from x = 0 to the nearest border; 0 for a scene without.
+
+    Where x = 0 is itself a border, or beyond one, it is twice the distance to the farthest place of rest, or else the
+    distance to the farther border.
+    """
+    low, high = osc.model.domain.around(0.0)
+    if low < 0.0 < high:
+        nearest = min(-low, high)
+        return nearest if math.isfinite(nearest) else 0.0
+    side = 1.0 if low >= 0.0 else -1.0
+    near, far = sorted((abs(low), abs(high)))
+    away = near + np.geomspace(1e-12, 1e12, 24 * 32 + 1)
+    away = away[away < far]
+    places = np.stack([side * away, np.zeros_like(away)], axis=1)
+    outward = VectorField(osc).rate(states_at(osc, places))[:, 1] > 0
+    rests = away[1:][outward[1:] != outward[:-1]]
+    lengths = [*(2.0 * rests[-1:]), *([far] if math.isfinite(far) else [])]
+    return float(f"{min(lengths, default=0.0):.9g}")
+
+
 def _pushes_away(osc: Oscillator, field: VectorField) -> bool:
     """Return whether the force on a mass near x = 0 grows in the direction of its displacement."""
     return bool(field.jacobian(states_at(osc, np.zeros((1, 2))))[0, 1, 0] > 0)
@@ -158,9 +178,3 @@ def _largest_force(field: VectorField, index: int, period: float | None, turn: f
         options={"xatol": 1e-9 * spacing},
     )  # fmt: skip
     return max(force(near), -float(refined.fun))
-
-
-def states_at(osc: Oscillator, places: Array) -> Array:
-    """Return states (…, n) at places (…, 2); states of the noise are 0."""
-    extra = len(osc.noise.extra_states) if osc.noise else 0
-    return np.pad(places, (*[(0, 0)] * (places.ndim - 1), (0, extra)))

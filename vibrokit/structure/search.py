@@ -20,15 +20,15 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.results.survival import Survival
+from vibrokit.structure.along_x import shifted, turn_of, wrapped
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering, is_cycle
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.stop_cells import wells
-from vibrokit.structure.circle import shifted, turn_of, wrapped
 from vibrokit.structure.known_motions import known_motions
 from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.persistence import is_on_cycle
-from vibrokit.structure.scales import units_of
+from vibrokit.structure.scales import length_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 LONGEST_PERIOD = 16
@@ -76,7 +76,7 @@ class Search:
             if self.osc.autonomous:  # then starts need not be followed until they rest, which is long on stiff stops
                 self.add_rests(*self.region.x)
             else:
-                for start in known_motions(self.osc, self.region):
+                for start in known_motions(self.osc, self.region, length_of(self.osc)):
                     self._add_orbit(start, 1)
             for periods in _rounds(wait):
                 states = self.unsettled = self._add_orbits(self._after(states, periods), LONGEST_PERIOD)

@@ -18,9 +18,9 @@ from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
+from vibrokit.structure.along_x import turns_to, wrapped
 from vibrokit.structure.attractors.wandering import LyapunovEstimate
 from vibrokit.structure.autonomous import equilibrium_exponents
-from vibrokit.structure.circle import turns_to, wrapped
 from vibrokit.structure.orbits import EQUAL, SAMPLES, Orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow

@@ -21,8 +21,8 @@ from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.survival import Survival
+from vibrokit.structure.along_x import wrapped
 from vibrokit.structure.basins.landings import followed
-from vibrokit.structure.circle import wrapped
 from vibrokit.structure.linear_map import linear_map
 
 Array = NDArray[np.float64]

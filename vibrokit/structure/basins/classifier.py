@@ -20,9 +20,9 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins, exits_of
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
+from vibrokit.structure.along_x import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.basins.landings import Landings, followed
 from vibrokit.structure.basins.stop_cells import MARGIN, AttractorMask, core_of, is_extended, mask_of, wells
-from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import arrival_at
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -18,11 +18,11 @@ from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, B
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
+from vibrokit.structure.along_x import states_at
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
 from vibrokit.structure.basins.stop_cells import FINEST, MARGIN, agreeing
 from vibrokit.structure.persistence import persistent_stepper
 from vibrokit.structure.regions import on_circle
-from vibrokit.structure.scales import states_at
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -16,7 +16,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import AT_COPY, UNSETTLED, Basins
 from vibrokit.results.region import Region
-from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.along_x import shifted, turn_of, turns_to, wrapped
 from vibrokit.symbolic.flow_kind import Flow
 
 Array = NDArray[np.float64]

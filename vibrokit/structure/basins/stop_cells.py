@@ -17,10 +17,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.structure.along_x import states_at, wrapped
 from vibrokit.structure.basins.landings import Landings
-from vibrokit.structure.circle import wrapped
 from vibrokit.structure.rest import SteadyForce
-from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 MARGIN = 2

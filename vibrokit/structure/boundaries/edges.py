@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.results.basins import NOT_FOLLOWED, UNSETTLED, Basins, exits_of
+from vibrokit.structure.along_x import shifted, states_at, turn_of, turns_to
 from vibrokit.structure.autonomous import PARTS_OF_A_TURN
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.meetings import Pair, grouped, meeting_cells, settled, spread
-from vibrokit.structure.circle import shifted, turn_of, turns_to
-from vibrokit.structure.scales import states_at
 from vibrokit.symbolic.flow_kind import Flow
 
 _WIDTH = 1e-10  # of the region's widths: target distance of two ends

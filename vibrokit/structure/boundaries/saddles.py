@@ -21,6 +21,7 @@ from vibrokit.results.basins import UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.along_x import wrapped
 from vibrokit.structure.autonomous import PARTS_OF_A_TURN, equilibria, refine_cycle
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.stop_cells import MARGIN
@@ -28,9 +29,8 @@ from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, Strip
 from vibrokit.structure.boundaries.meetings import Pair, first_few, groups_of, meeting_cells, pairs_apart
 from vibrokit.structure.boundaries.motions import NEAR, almost_repeats, chaotic_set, closing, recurrence, same_place
 from vibrokit.structure.boundaries.unstable import RESIDUAL, branch_limits, describe_unstable, in_turn, refine_unstable
-from vibrokit.structure.circle import wrapped
 from vibrokit.structure.orbits import EQUAL, Orbit
-from vibrokit.structure.orbits_inside import orbits_inside
+from vibrokit.structure.unstable_orbits import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
 
 SOON = 128

@@ -14,10 +14,10 @@ from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
+from vibrokit.structure.along_x import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.meetings import settled
-from vibrokit.structure.circle import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.orbits import SAMPLES, Orbit, least_period, nodes_from, refine_orbit, states_along, visited
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -1,8 +1,11 @@
-"""Roots of a function of one variable, pairs of them between two samples included."""
+"""Functions of one variable, from samples: roots, and the tones of periodic functions."""
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,3 +40,32 @@ def bracketed_roots(function: Callable[[float], float], places: Array, values: A
         if nearest.fun <= 0:
             found += [root(low, nearest.x), root(nearest.x, high)]
     return sorted(found)
+
+
+class Tone(NamedTuple):
+    """The part Re F exp(iωt) of a periodic force; F is its complex amplitude."""
+
+    frequency: float
+    amplitude: complex
+
+    @property
+    def force(self) -> float:
+        """|F|."""
+        return abs(self.amplitude)
+
+    @property
+    def phase(self) -> float:
+        """arg F."""
+        return cmath.phase(self.amplitude)
+
+
+def tones(force: Callable[[float], float], period: float, count: int, least: float) -> tuple[float, list[Tone]]:
+    """Return the mean of a force over its period, and its lowest tones without those below a part of the largest."""
+    samples = 512  # with which both are known to rounding where the force is smooth
+    series = np.fft.rfft([force(period * k / samples) for k in range(samples)]) * (2 / samples)
+    sizes = np.abs(series)
+    rounding = 1e-12 * sizes.max()
+    floor = max(least * sizes[1 : count + 1].max(), rounding)
+    orders = [order for order in range(1, count + 1) if sizes[order] > floor]
+    mean = float(series[0].real) / 2 if sizes[0] > rounding else 0.0
+    return mean, [Tone(2 * math.pi * order / period, complex(series[order])) for order in orders]
