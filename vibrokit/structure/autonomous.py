@@ -29,7 +29,6 @@ from vibrokit.symbolic.flow_kind import Flow
 
 PARTS_OF_A_TURN = 16
 """Parts of 2π/ω_n: over one of them the motion at an equilibrium is linearized."""
-_SAMPLES = 256  # in 2π/ω_n, along a path in which a cycle is searched for
 _RECURRENCE = 1e-2  # of the extent of the motion: distance of two passages from which Newton's method starts
 
 Array = NDArray[np.float64]
@@ -226,37 +225,39 @@ def find_cycle(osc: Oscillator, state: Array, stepper: Stepper, *, longest: floa
     excitation, and for motion that does not repeat within that time.
     """
     _refuse_forcing(osc)
-    spacing = osc.time_unit / _SAMPLES
-    path = record(
-        osc, Flow.STATE, stepper, np.array(state, dtype=float), 0.0, spacing, math.ceil(2 * longest / spacing)
-    )
+    start, spacing = np.array(state, dtype=float), osc.time_unit / 256
+    path = record(osc, Flow.STATE, stepper, start, 0.0, spacing, math.ceil(2 * longest / spacing))
     for speed, duration in _turning_over(osc, path, spacing):
         with contextlib.suppress(StructureError):
             return refine_cycle(osc, np.array([0.0, speed, *path[-1, 2:]]), duration, stepper, pinned=0)
     extent = float(np.ptp(path[len(path) // 2 :, :2], axis=0).max())
-    turns, failures = list[Passage](), list[StructureError]()
-    for turn in _turning_points(osc, path, spacing, stepper):
-        turns.append(turn)
-        last, here = turns[0]
-        time, there = turn
-        if time == last or last - time > longest or float(np.abs(here - there).max()) > _RECURRENCE * extent:
-            continue
-        highest = max(turns[1:], key=lambda turn: float(turn[1][0]))[1]
+    failures = list[StructureError]()
+    for highest, duration in _recurrences(_turning_points(osc, path, spacing, stepper), longest, extent):
         try:
-            cycle = refine_cycle(osc, highest, last - time, stepper)
+            cycle = refine_cycle(osc, highest, duration, stepper)
         except StructureError as error:
             failures.append(error)
             if len(failures) == 8:
                 break
             continue
-        off = abs(cycle.duration - (last - time)) / cycle.duration + np.abs(cycle.point - highest).max() / extent
+        off = abs(cycle.duration - duration) / cycle.duration + np.abs(cycle.point - highest).max() / extent
         if off < 10 * _RECURRENCE:
             return cycle
     raise StructureError(
         f"the motion from {tuple(np.round(state, 6).tolist())} does not repeat within {longest:.6g} s, by its last "
-        f"{len(turns)} turning points; start nearer to the cycle, or give a longer time than that."
+        "turning points; start nearer to the cycle, or give a longer time than that."
         + (f" Where it came close to doing so: {failures[0]}" if failures else "")
     )
+
+
+def _recurrences(turns: Iterator[Passage], longest: float, extent: float) -> Iterator[tuple[Array, float]]:
+    """The highest turning point since each one near the last, and the time since then; the last turn comes first."""
+    since = list[Passage]()
+    last, here = next(turns, (0.0, np.empty(0)))
+    for time, there in turns:
+        since.append((time, there))
+        if last - time <= longest and float(np.abs(here - there).max()) <= _RECURRENCE * extent:
+            yield max(since, key=lambda turn: float(turn[1][0]))[1], last - time
 
 
 def _turning_points(osc: Oscillator, path: Array, spacing: float, stepper: Stepper) -> Iterator[Passage]:

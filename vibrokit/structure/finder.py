@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -30,20 +30,18 @@ from vibrokit.structure.along_x import states_at, turn_of
 from vibrokit.structure.attractors.names import labelled, order_of
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import SETTLING, BasinGrid, with_fractions
+from vibrokit.structure.basins.landings import copies_in, lies_in, on_circle
 from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SOON, SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, default_arc_length, grow_manifolds
 from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_stepper, slowest_rate, wait_of
-from vibrokit.structure.regions import copies_in, frame_of, lies_in, on_circle, regions_over_tops, search_region
+from vibrokit.structure.regions import frame_of, regions_over_tops, search_region
 from vibrokit.structure.rest import in_front_of_stops, tops_around
 from vibrokit.structure.scales import length_of
 from vibrokit.structure.search import Search
 from vibrokit.structure.validation import Request
 from vibrokit.symbolic.flow_kind import Flow
 
-_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS = 10**7, 5 * 10**9  # of edge tracking: 10 to 20 s
-_MANIFOLD_SECTIONS = 3_000_000  # of all branches together, 10 to 20 s with stops
-_MOST_STEPS = 1024  # above this, locating contacts is cheaper and far more accurate
 _WIDENINGS = 2  # of the region
 
 Array = NDArray[np.float64]
@@ -85,7 +83,7 @@ class Finder:
         if self.request.stepper is not None or not isinstance(self.stepper, RK4):
             return self.stepper
         finer = self.stepper.refined().refined()
-        return finer if finer.steps <= _MOST_STEPS else LOCATED
+        return finer if finer.steps <= 1024 else LOCATED  # above, that is cheaper and far more accurate
 
     def _find_attractors(self) -> None:
         """Search from a grid of starts, and choose a stepper with which every attractor persists."""
@@ -187,12 +185,12 @@ class Finder:
     def _find_saddles(self) -> None:
         """Track the boundaries between basins to the saddles on them."""
         assert self.grid is not None
-        # By located contacts a section takes as long as a thousand steps.
+        # By located contacts a section takes as long as a thousand steps. The budget is that of 10 to 20 s.
         steps = self.stepper.steps_in(self.osc, self.osc.section_interval) or 1000
         self.saddle_search = SaddleSearch(
             self.classifier, self.grid.basins, self.orbit_stepper,
             sections=max(SOON, math.ceil(0.25 * self.wait)), margin=self.request.margin or MARGIN,
-            budget=self.request.edge_budget or min(_MOST_EDGE_SECTIONS, _MOST_EDGE_STEPS // steps),
+            budget=self.request.edge_budget or min(10**7, 5 * 10**9 // steps),
         )  # fmt: skip
         self.saddle_search.run(self.rng)
 
@@ -203,13 +201,14 @@ class Finder:
         saddles = [(n, one) for n, one in every if one.kind in ("saddle", "flip saddle") and not one.embedded]
         count = sum(4 * len(saddle.points) for _, saddle in saddles)
         length = default_arc_length(self.frame, max(count, 1))
+        most_sections = 3_000_000 / max(count, 1)  # all branches together then take 10 to 20 s with stops
         with stage("manifolds", unit=BRANCHES, total=count):
             for index, saddle in saddles:
                 known = self.manifolds
                 try:
                     for branch in grow_manifolds(
                         self.osc, index, saddle,
-                        region=self.frame, arc_length=length, most_sections=_MANIFOLD_SECTIONS / count,
+                        region=self.frame, arc_length=length, most_sections=most_sections,
                         stepper=self.request.stepper, executor=self.executor,
                     ):  # fmt: skip
                         self.manifolds += (branch,)
@@ -242,38 +241,31 @@ class Finder:
         )
 
     def _findings(self, grid: BasinGrid) -> tuple[Finding, ...]:
-        search, region, found = self.search, grid.basins.region, list[Finding]()
-        found.append(Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts))
+        search, region = self.search, grid.basins.region
+        found = [Finding.of(Code.STEADY_STATES, count=len(self.attractors), starts=search.starts)]
         if shift := turn_of(self.osc):
             found.append(Finding.of(Code.ON_CIRCLE if self.circle else Code.SHIFTED_COPIES, shift=shift))
-        if search.diverged and (where := self.osc.model.conditions):
-            found.append(Finding.of(Code.STARTS_ENDED, count=search.diverged, starts=search.starts, where=where))
-        elif search.diverged:
-            found.append(Finding.of(Code.STARTS_DIVERGED, count=search.diverged, starts=search.starts))
-        if search.stalled:
-            found.append(Finding.of(Code.STARTS_STALLED, count=search.stalled, starts=search.starts))
-        if self.work.stopped and self.work.doing == "attractors":
-            found.append(search.progress)
-        if followed := search.beyond["followed"]:
-            settled = followed - search.beyond["diverged"] - search.beyond["moving"]
-            found.append(Finding.of(Code.FOLLOWED_ON, settled=settled, **search.beyond))
-        if outside := sum(not lies_in(region, attractor) for attractor in self.attractors):
-            (x_min, x_max), (v_min, v_max) = frame_of(self.osc, self.attractors).bounds.tolist()
-            bounds = {"x_min": x_min, "x_max": x_max, "v_min": v_min, "v_max": v_max}
-            found.append(Finding.of(Code.REGION_TOO_SMALL, count=outside, **bounds))
-        if self.attractors and not self.circle:
-            x = np.concatenate([attractor.orbit[:, 0] for attractor in self.attractors])
-            tops = tops_around(self.osc, float(x.min()), float(x.max()), length_of(self.osc))
-            places = sorted(top.place for top in in_front_of_stops(self.osc, tops))
-            found += [Finding.of(Code.TOPS_OUTSIDE, place=x) for x in places if not region.x[0] <= x <= region.x[1]]
-        names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
-        survivals = [{name: getattr(one, name) for name in names} for one in search.survival]
-        found += [*search.findings, *(Finding.of(Code.SURVIVAL, **values) for values in survivals), *grid.findings]
+        found += search.endings
+        found += [search.progress] if self.work.stopped and self.work.doing == "attractors" else []
+        found += [*self._outside(region), *search.findings, *grid.findings]
         if (saddles := self.saddle_search) is not None:
             found += saddles.findings
             outside = sum(not lies_in(region, saddle) for saddle in saddles.saddles)
             found += [Finding.of(Code.SADDLES_OUTSIDE, count=outside)] if outside else []
         return (*found, *self.without_manifolds, *self.work.findings)
+
+    def _outside(self, region: Region) -> Iterator[Finding]:
+        """Findings about attractors and tops of barriers that lie outside a region."""
+        if outside := sum(not lies_in(region, attractor) for attractor in self.attractors):
+            (x_min, x_max), (v_min, v_max) = frame_of(self.osc, self.attractors).bounds.tolist()
+            bounds = {"x_min": x_min, "x_max": x_max, "v_min": v_min, "v_max": v_max}
+            yield Finding.of(Code.REGION_TOO_SMALL, count=outside, **bounds)
+        if self.attractors and not self.circle:
+            x = np.concatenate([attractor.orbit[:, 0] for attractor in self.attractors])
+            tops = tops_around(self.osc, float(x.min()), float(x.max()), length_of(self.osc))
+            for place in sorted(top.place for top in in_front_of_stops(self.osc, tops)):
+                if not region.x[0] <= place <= region.x[1]:
+                    yield Finding.of(Code.TOPS_OUTSIDE, place=place)
 
 
 def _starts(osc: Oscillator, region: Region, counts: tuple[int, int], rng: np.random.Generator) -> Array:

@@ -29,6 +29,8 @@ EQUAL = 1e-6
 """Distance, relative to the size of an orbit, below which two points are one."""
 CONVERGED = 1e-6
 """Largest residual, relative to the size of the motion, of an orbit that Newton's method has found."""
+LONGEST_PERIOD = 16
+"""Longest period of orbits that are searched for."""
 SAMPLES = 1024
 """Of an orbit in a section interval, for records and pictures."""
 
@@ -197,13 +199,14 @@ def states_along(osc: Oscillator, nodes: Array, period: int, stepper: Stepper, p
     total = period * pieces
     if len(nodes) >= total:
         return nodes[:: len(nodes) // total]
-    each, spacing = total // len(nodes), osc.section_interval / pieces
-    return np.concatenate(
-        [
-            record(osc, Flow.STATE, stepper, node, at * each * spacing, spacing, each)[:each]
-            for at, node in enumerate(nodes)
-        ]
-    )
+    return sampled(osc, nodes, period * osc.section_interval, stepper, total // len(nodes))
+
+
+def sampled(osc: Oscillator, nodes: Array, duration: float, stepper: Stepper, each: int) -> Array:
+    """Return so many states from each node (count, n) of an orbit of a duration on, each reached from that node."""
+    span = duration / len(nodes)
+    parts = (record(osc, Flow.STATE, stepper, node, at * span, span / each, each) for at, node in enumerate(nodes))
+    return np.concatenate([part[:each] for part in parts])
 
 
 def unstable_direction(osc: Oscillator, nodes: Array, period: int, stepper: Stepper) -> Array | None:

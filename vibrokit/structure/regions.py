@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
@@ -14,15 +13,14 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.region import Region
-from vibrokit.results.saddle import Saddle
-from vibrokit.structure.along_x import between_borders, shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.along_x import between_borders, turn_of
+from vibrokit.structure.basins.landings import on_circle, without_copies
 from vibrokit.structure.basins.stop_cells import MARGIN, is_extended
 from vibrokit.structure.rest import SteadyForce, tops_around
 from vibrokit.structure.scales import length_of, units_of
 from vibrokit.structure.validation import DEFAULT_CELLS
 
-_MARGIN = 0.25  # of the width, on each side
-_SAME_PLACE = 1e-6  # relative: difference of two places that are the same
+_ROOM = 1.5  # width of a region, in units of that of what it is made to contain
 _RESOLVED = 2 * MARGIN + 1  # cells: fewer do not lead to one attractor with all those around them
 
 Array = NDArray[np.float64]
@@ -51,7 +49,7 @@ def _speed_of_turning(osc: Oscillator) -> float:
         return 0.0
     places = np.stack([np.linspace(0.0, turn, 64, endpoint=False), np.zeros(64)], axis=1)
     drift = abs(float(SteadyForce(osc)(places).mean())) / damping if damping else 0.0
-    return (1 + 2 * _MARGIN) * max(drift, turn / osc.section_interval)
+    return _ROOM * max(drift, turn / osc.section_interval)
 
 
 def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
@@ -65,29 +63,31 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     It contains the tops of the potential barriers around the attractors, as far as a grid then resolves what is inside,
     and the speeds at which the mass reaches them and the stops.
     """
-    attractors, turn = without_copies(osc, attractors), turn_of(osc)
+    attractors = without_copies(osc, attractors)
     if on_circle(osc, attractors, None):
         return _turn_around(osc, attractors)
-    points = np.concatenate([attractor.points[:, :2] for attractor in attractors])
     cycles = [attractor.orbit for attractor in attractors if attractor.kind == "limit cycle"]
-    points = np.concatenate([points, *cycles])
+    points = np.concatenate([*(attractor.points[:, :2] for attractor in attractors), *cycles])
     places = [barrier.position for barrier in osc.barriers]
-    gap = float(np.ptp(places)) if len(places) == 2 else 0.0
     x, v = points.T
-    low, high = min([x.min(), *places]), max([x.max(), *places])
-    low, high = over_tops(osc, attractors, low, high)
-    crossing = SteadyForce(osc).speed_to_reach(low, high)
-    swings = [0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors]
-    widest = max(swings)
-    least = 0.5 * max(gap, turn) or (widest if widest > 1e-3 * length_of(osc) else length_of(osc))
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), least)
+    low, high = over_tops(osc, attractors, min([x.min(), *places]), max([x.max(), *places]))
+    least = _least_half_width(osc, attractors)
+    middle, half = 0.5 * (low + high), _ROOM * max(0.5 * (high - low), least)
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
-    speed = max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest, crossing)
-    half, speed = half * (1 + 2 * _MARGIN), speed * (1 + 2 * _MARGIN)
+    crossing = SteadyForce(osc).speed_to_reach(low, high)
+    speed = _ROOM * max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest, crossing)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
-    region = between_borders(osc, region, points[:, 0].tolist())
+    region = between_borders(osc, region, x.tolist())
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
+
+
+def _least_half_width(osc: Oscillator, attractors: Sequence[Attractor]) -> float:
+    """Half the gap between two stops, or a turn, or else the widest motion, or the length of a scene at rest."""
+    places = [barrier.position for barrier in osc.barriers]
+    gap = float(np.ptp(places)) if len(places) == 2 else 0.0
+    widest = max(0.5 * float(np.ptp(attractor.orbit[:, 0])) for attractor in attractors)
+    return 0.5 * max(gap, turn_of(osc)) or (widest if widest > 1e-3 * length_of(osc) else length_of(osc))
 
 
 def over_tops(osc: Oscillator, attractors: Sequence[Attractor], low: float, high: float) -> tuple[float, float]:
@@ -98,7 +98,7 @@ def over_tops(osc: Oscillator, attractors: Sequence[Attractor], low: float, high
     held = bool(osc.barriers)
     for top in tops_around(osc, low, high, length_of(osc)):
         wider = min(low, top.place), max(high, top.place)
-        widths = (1 + 2 * _MARGIN) * np.array([wider[1] - wider[0], 2 * top.speed])
+        widths = _ROOM * np.array([wider[1] - wider[0], 2 * top.speed])
         inside = [np.array([high - low, 2 * SteadyForce(osc).speed_to_reach(low, high)])] if held else []
         cells = np.abs(np.array([*inside, *_differences(osc, attractors)]).reshape(-1, 2)) / (widths / DEFAULT_CELLS)
         if np.all(cells[: len(inside)] >= _RESOLVED) and np.all(cells[len(inside) :].max(axis=1) >= _RESOLVED):
@@ -121,58 +121,13 @@ def _met(one: Attractor) -> Array:
     return points[:: -(-len(points) // 256)]
 
 
-def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Attractor]:
-    """Return attractors of which none is another one moved along x by whole turns; those nearest to x = 0."""
-    kept = list[Attractor]()
-    for one in sorted(attractors, key=lambda each: abs(float(each.points[:, 0].mean()))):
-        if not any(_is_copy(osc, one, other) for other in kept):
-            kept.append(one)
-    return kept
-
-
-def _is_copy(osc: Oscillator, one: Attractor, other: Attractor) -> bool:
-    if not turn_of(osc) or one.points.shape != other.points.shape:
-        return False
-    return bool(np.all(np.abs(wrapped(osc, one.points - other.points)) < _SAME_PLACE * units_of(osc)))
-
-
-def copies_in(osc: Oscillator, attractors: Sequence[Attractor], region: Region, *, one_each: bool) -> list[Attractor]:
-    """Return each attractor in the turn around the middle of a region, or once for each turn in which it is there.
-
-    Motion that turns over, and motion that never repeats, is one attractor however often it is met.
-    """
-    turn = turn_of(osc)
-    if not turn:
-        return list(attractors)
-    middle, found = float(np.mean(region.x)), list[Attractor]()
-    most = 0 if one_each else math.ceil(region.widths[0] / turn)
-    for one in without_copies(osc, attractors):
-        anywhere = bool(one.turns) or not one.repeats
-        nearest = _moved(one, -turn * float(turns_to(osc, one.points[:1], middle)[0]))
-        moved = [_moved(nearest, turn * away) for away in range(-most, most + 1)]
-        found += [nearest] if anywhere else [each for each in moved if lies_in(region, each)] or [nearest]
-    return found
-
-
-def _moved(one: Attractor, distance: float) -> Attractor:
-    """Return an attractor moved along x."""
-    return dataclasses.replace(one, points=shifted(one.points, distance), orbit=shifted(one.orbit, distance))
-
-
-def on_circle(osc: Oscillator, attractors: Sequence[Attractor], region: Region | None) -> bool:
-    """Whether states a turn apart along x count as one: motion turns over, and the region is one turn or none."""
-    turn = turn_of(osc)
-    narrow = region is None or region.widths[0] <= turn * (1 + _SAME_PLACE)
-    return bool(turn) and narrow and any(each.turns for each in attractors)
-
-
 def _turn_around(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     """Return one turn along x around the attractors that do not turn over, to half a turn, and all their speeds."""
     turn = turn_of(osc)
     resting = [each for each in attractors if not each.turns] or attractors
     middle = 0.5 * turn * round(float(resting[0].points[:, 0].mean()) / (0.5 * turn))
     fastest = max(float(np.abs(each.orbit[:, 1]).max()) for each in attractors)
-    speed = (1 + 2 * _MARGIN) * max(fastest, osc.natural_frequency * 0.5 * turn)
+    speed = _ROOM * max(fastest, osc.natural_frequency * 0.5 * turn)
     return Region((middle - 0.5 * turn, middle + 0.5 * turn), (-speed, speed))
 
 
@@ -188,7 +143,7 @@ def _without_deep_contact(osc: Oscillator, region: Region, kept: tuple[float, fl
         most = barrier.sign * (edge - barrier.position)
         if most <= 0:
             continue
-        end = barrier.position + barrier.sign * (1 + 2 * _MARGIN) * _reached_depth(osc, barrier, speed, most)
+        end = barrier.position + barrier.sign * _ROOM * _reached_depth(osc, barrier, speed, most)
         if barrier.side == "right":
             high = min(high, max(end, kept[1]))
         else:
@@ -204,9 +159,3 @@ def _reached_depth(osc: Oscillator, barrier: Barrier, speed: float, most: float)
     energy = depths * touching - np.concatenate([[0.0], np.cumsum(steady.work(places)[1])])
     beyond = np.flatnonzero(~(energy <= 0.5 * speed**2))
     return float(depths[beyond[0]]) if beyond.size else most
-
-
-def lies_in(region: Region, orbit: Attractor | Saddle) -> bool:
-    """Whether some point of an orbit on the section is in a region; of a limit cycle, whether any of its points is."""
-    points = orbit.orbit if isinstance(orbit, Attractor) and orbit.kind == "limit cycle" else orbit.points
-    return bool(region.contains(points).any())

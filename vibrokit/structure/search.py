@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +27,14 @@ from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_ex
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.stop_cells import wells
 from vibrokit.structure.known_motions import known_motions
-from vibrokit.structure.orbits import EQUAL, arrival_at, least_period, refine_orbit, same_point, visited
+from vibrokit.structure.orbits import EQUAL, LONGEST_PERIOD, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.persistence import is_on_cycle
 from vibrokit.structure.scales import length_of, units_of
 from vibrokit.symbolic.flow_kind import Flow
 
-LONGEST_PERIOD = 16
-"""Longest period of orbits that are searched for among all starts."""
 _LONGER_PERIOD = 256  # of orbits that are searched for among starts that settle slowly
-_RECURRENCE = 1e-5
 _NEAR = 1e-3  # distance, relative to the motion, between an orbit and its approximation by a coarse stepper
 _LOOSE = 1e-2  # the same, of recurrences from which Newton's method is tried
-_REACH = 0.1  # the same, of a stable orbit that Newton's method finds from a guess
 
 Array = NDArray[np.float64]
 
@@ -61,15 +58,15 @@ class Search:
         self.starts = self.diverged = self.stalled = 0  # stalled: they need too many steps in a section interval
         self.unsettled = np.empty((0, 2))  # states of the starts that have not settled, after so many periods
         self.periods = 0
-        self.findings: list[Finding] = []
+        self.long_motion: list[Finding] = []
         self.beyond = {"followed": 0, "diverged": 0, "moving": 0}  # motions that were followed on, and how these ended
 
     def run(self, states: Array, wait: int, patient: bool) -> None:
         """Follow the states (count, n) until each recurs, diverges, or has not settled for a long time.
 
-        Starts are followed for twice the periods `wait` that a transient is given, because some settle slowly.
-        `patient` is whether that is as long as the damping requires. If not, and nothing has settled, motion that goes
-        on is not evidence of an attractor.
+        Some settle slowly, so that starts are followed for twice `wait`, the periods that a transient is given. Unless
+        that is as long as the damping requires (`patient`), motion that goes on while nothing has settled is no
+        evidence of an attractor.
         """
         self.starts, self.unsettled = len(states), states
         with stage("attractors", unit="starts", total=self.starts):
@@ -85,7 +82,7 @@ class Search:
                     return
             if self.osc.autonomous:
                 if unsettled := len(self._add_cycles(states)):
-                    self.findings.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
+                    self.long_motion.append(Finding.of(Code.STARTS_UNSETTLED, count=unsettled))
             elif patient or self.attractors:
                 self._watch(states)
             report(self.starts)
@@ -120,6 +117,28 @@ class Search:
             left=len(self.unsettled) - moving, diverged=self.diverged,
         )  # fmt: skip
 
+    @property
+    def endings(self) -> list[Finding]:
+        """Findings about the starts and the lost cells that came to no attractor."""
+        found = []
+        if self.diverged and (where := self.osc.model.conditions):
+            found.append(Finding.of(Code.STARTS_ENDED, count=self.diverged, starts=self.starts, where=where))
+        elif self.diverged:
+            found.append(Finding.of(Code.STARTS_DIVERGED, count=self.diverged, starts=self.starts))
+        if self.stalled:
+            found.append(Finding.of(Code.STARTS_STALLED, count=self.stalled, starts=self.starts))
+        if followed := self.beyond["followed"]:
+            settled = followed - self.beyond["diverged"] - self.beyond["moving"]
+            found.append(Finding.of(Code.FOLLOWED_ON, settled=settled, **self.beyond))
+        return found
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Findings about motion that goes on for long."""
+        names = ("periods", "stepper", "survivors", "starts", "lifetime", "lifetime_error")
+        survivals = [{name: getattr(one, name) for name in names} for one in self.survival]
+        return [*self.long_motion, *(Finding.of(Code.SURVIVAL, **values) for values in survivals)]
+
     def failure(self, budget: int, wait: int) -> str:
         """Return why nothing was found, and what to change; `wait` is the budget that the damping requires."""
         advice = "raise budget" if budget < wait else "widen the region or raise budget"
@@ -147,8 +166,8 @@ class Search:
     def _after(self, states: Array, periods: int) -> Array:
         """Return the states some periods later, without those that reached a known orbit, diverged or stalled.
 
-        Motion to infinity in a finite time needs too many steps too, outside the region.
-        The first ones are followed in stretches, so that if the work is stopped it is known what they were doing.
+        Motion to infinity in a finite time needs too many steps too, outside the region. The first periods are followed
+        in short stretches, so that work that is stopped can tell what the starts were doing.
         """
         arrival, end = self._arrival(), self.periods + periods
         while self.periods < end:
@@ -169,7 +188,7 @@ class Search:
         path = _section_path(self.osc, states, self.stepper, longest)
         sizes = units_of(self.osc) + np.abs(wrapped(self.osc, path)).max(axis=0)
         distance = np.linalg.norm(wrapped(self.osc, path[1:] - path[0]) / sizes, axis=2)
-        close = distance < _RECURRENCE
+        close = distance < 1e-5
         settled = close.any(axis=0)
         for index in np.flatnonzero(settled):
             period = int(np.argmax(close[:, index])) + 1
@@ -198,8 +217,8 @@ class Search:
         if np.abs(orbit.multipliers).max() >= 1:
             return False  # the motion passes near a saddle
         points = visited(self.osc, orbit, stepper)
-        if not same_point(self.osc, point, points, _REACH):
-            return False
+        if not same_point(self.osc, point, points, 0.1):
+            return False  # Newton's method went far away
         if is_cycle(self.osc, orbit, stepper):
             return False  # its own duration is unknown here; see `_add_cycles`
         if not self._known(orbit.point, EQUAL):
@@ -241,7 +260,7 @@ class Search:
         if self.survival[0].survivors and len(survivors):
             self._add_wandering(self._add_orbits(survivors, _LONGER_PERIOD))
         elif self.survival[0].survivors:
-            self.findings.append(Finding.of(Code.CHAOTIC_TRANSIENT))
+            self.long_motion.append(Finding.of(Code.CHAOTIC_TRANSIENT))
 
     def _add_wandering(self, survivors: Array) -> None:
         """Add the chaotic and quasiperiodic attractors that survivors are on."""
@@ -256,20 +275,19 @@ class Search:
             estimate = lyapunov_exponent(osc, few, stepper, periods=periods, executor=self.executor)
             kind = kind_of(estimate)
             if kind is None:
-                self.findings.append(Finding.of(Code.SLOW_SETTLING, count=len(group), period=_LONGER_PERIOD))
+                self.long_motion.append(Finding.of(Code.SLOW_SETTLING, count=len(group), period=_LONGER_PERIOD))
                 continue
             visits = np.concatenate([clouds[index] for index in group])
             sample = visits[:: -(-len(visits) // 4096)]
             self.attractors.append(describe_wandering(osc, kind, sample, estimate, self.survival, finer))
 
 
-def _rounds(wait: int) -> list[int]:
+def _rounds(wait: int) -> Iterator[int]:
     """Periods of each round, which double from 64; twice the wait together."""
-    rounds, remaining, periods = [], 2 * wait, 64
+    remaining, periods = 2 * wait, 64
     while remaining > 0:
-        rounds.append(min(periods, remaining))
-        remaining, periods = remaining - rounds[-1], 2 * periods
-    return rounds
+        yield min(periods, remaining)
+        remaining, periods = remaining - periods, 2 * periods
 
 
 def _measuring_time(osc: Oscillator) -> int:

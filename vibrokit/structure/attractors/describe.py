@@ -14,7 +14,6 @@ from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.barrier import Barrier
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.survival import Survival
@@ -25,17 +24,15 @@ from vibrokit.structure.orbits import EQUAL, SAMPLES, Orbit, visited
 from vibrokit.structure.scales import size_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_WANDERING = 64  # periods of motion that never repeats
-
 Array = NDArray[np.float64]
 
 
 def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor:
     """Describe a stable orbit or limit cycle, or the equilibrium that an orbit of an autonomous scene rests at."""
     path = _path_of(osc, orbit, stepper)
-    resting = osc.autonomous and orbit.kind != "limit cycle" and _still(osc, path)
+    resting = osc.autonomous and orbit.kind != "limit cycle" and _still(path)
     return _described(
-        osc, path, stepper,
+        path,
         kind="equilibrium" if resting else orbit.kind,
         period=orbit.period,
         duration=0.0 if resting else orbit.duration,
@@ -50,7 +47,7 @@ def describe_orbit(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Attractor
 
 def is_cycle(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> bool:
     """Whether an orbit of an autonomous scene moves: a limit cycle that nearly repeats after section intervals."""
-    return osc.autonomous and not _still(osc, _path_of(osc, orbit, stepper))
+    return osc.autonomous and not _still(_path_of(osc, orbit, stepper))
 
 
 def describe_wandering(
@@ -61,9 +58,16 @@ def describe_wandering(
     survival: tuple[Survival, ...],
     stepper: Stepper,
 ) -> Attractor:
-    """Describe motion that never repeats, from a sample (count, n) of its points on the section."""
+    """Describe motion that never repeats, from a sample (count, n) of its points on the section.
+
+    Its hits are per period. Each period is started from the section as by the section map, whose attractor this is.
+    """
+    periods, point, pieces, spacing = 64, sample[0], list[Array](), osc.section_interval / SAMPLES
+    for _ in range(periods):
+        pieces.append(record(osc, Flow.STATE, stepper, point, 0.0, spacing, SAMPLES)[:-1])
+        point = run_ensemble(osc, Flow.STATE, stepper, point[None], 1).states[0]
     found = _described(
-        osc, _wandering_path(osc, sample[0], stepper), stepper,
+        Path(osc, stepper, np.concatenate([*pieces, point[None]]), 0.0, spacing),
         kind=kind,
         period=0,
         duration=np.nan,
@@ -75,13 +79,12 @@ def describe_wandering(
         error=np.nan,
         survival=survival,
     )  # fmt: skip
-    # Hits are per orbit; those of motion that never repeats are per period.
-    return dataclasses.replace(found, hits={side: hits / _WANDERING for side, hits in found.hits.items()})
+    return dataclasses.replace(found, hits={side: hits / periods for side, hits in found.hits.items()})
 
 
-def _described(osc: Oscillator, path: Path, stepper: Stepper, *, exponent_error: float = 0.0, **own: Any) -> Attractor:
+def _described(path: Path, *, exponent_error: float = 0.0, **own: Any) -> Attractor:
     """Return the record of an attractor, with its contacts along a path on it; label and basin are set later."""
-    seen = {barrier.side: contacts_along(osc, path, stop, stepper) for stop, barrier in enumerate(osc.barriers)}
+    seen = {barrier.side: _Contacts(path, stop) for stop, barrier in enumerate(path.osc.barriers)}
     return Attractor(
         label=UNSETTLED,
         orbit=path.states[:, :2],
@@ -98,113 +101,95 @@ def _described(osc: Oscillator, path: Path, stepper: Stepper, *, exponent_error:
 def _path_of(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Path:
     """Samples along an orbit, so many in a section interval."""
     count = SAMPLES * max(1, round(orbit.duration / osc.section_interval))
-    return _path(osc, wrapped(osc, orbit.point), orbit.duration, count, stepper)
+    return Path.recorded(osc, stepper, wrapped(osc, orbit.point), 0.0, orbit.duration / count, count)
 
 
-def _still(osc: Oscillator, path: Path) -> bool:
-    return bool(np.ptp(path.states, axis=0).max() < EQUAL * (size_of(osc) + np.abs(path.states).max()))
-
-
-def _path(osc: Oscillator, point: Array, duration: float, count: int, stepper: Stepper) -> Path:
-    spacing = duration / count
-    return Path(record(osc, Flow.STATE, stepper, point, 0.0, spacing, count), 0.0, spacing)
-
-
-def _wandering_path(osc: Oscillator, point: Array, stepper: Stepper) -> Path:
-    """Return some periods, each started from the section as by the section map, whose attractor this is."""
-    interval, pieces = osc.section_interval, []
-    for _ in range(_WANDERING):
-        pieces.append(_path(osc, point, interval, SAMPLES, stepper).states[:-1])
-        point = run_ensemble(osc, Flow.STATE, stepper, point[None], 1).states[0]
-    return Path(np.concatenate([*pieces, point[None]]), 0.0, interval / SAMPLES)
+def _still(path: Path) -> bool:
+    size = size_of(path.osc) + np.abs(path.states).max()
+    return bool(np.ptp(path.states, axis=0).max() < EQUAL * size)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Path:
     """A recorded stretch of motion: states (count, n), the time of the first, and that from one to the next (s)."""
 
+    osc: Oscillator
+    stepper: Stepper
     states: Array
     start: float
     spacing: float
 
+    @classmethod
+    def recorded(
+        cls, osc: Oscillator, stepper: Stepper, point: Array, start: float, spacing: float, count: int
+    ) -> Path:
+        """Integrate from a point at a time."""
+        return cls(osc, stepper, record(osc, Flow.STATE, stepper, point, start, spacing, count), start, spacing)
 
-@dataclasses.dataclass(frozen=True)
-class Contacts:
-    """The contacts of an orbit with a stop: entries into contact, largest depth (m), largest push (m s⁻²)."""
+    def between(self, first: int, last: int) -> Path:
+        """Return the stretch between two samples, with enough samples for its peaks."""
+        begin, states = self.start + first * self.spacing, self.states[first : last + 1]
+        if last - first >= 32 or first == last:
+            return dataclasses.replace(self, states=states, start=begin)
+        finer = self.spacing * (last - first) / 64
+        return Path.recorded(self.osc, self.stepper, states[0], begin, finer, 64)
 
-    hits: int
-    depth: float
-    force: float
+    def around(self, first: int, last: int) -> Path:
+        """Return the stretch from the sample before one to that after another."""
+        return self.between(max(first - 1, 0), min(last + 1, len(self.states) - 1))
 
-
-def contacts_along(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> Contacts:
-    """Find the contacts with one stop in a path, sampled along a whole orbit by a stepper.
-
-    A contact shorter than the spacing of the samples shows by a velocity that turns next to the stop; such a stretch is
-    integrated again with finer samples.
-    """
-    barrier = osc.barriers[stop]
-    depth, _ = _depth_and_rate(path.states, barrier)
-    entries, touching = int(np.sum((depth[:-1] <= 0) & (depth[1:] > 0))), np.flatnonzero(depth > 0)
-    runs = [run for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1) if run.size]
-    last, unseen = len(depth) - 1, _hidden(osc, path, barrier, stepper, 6)
-    around = [_around(osc, path, max(run[0] - 1, 0), min(run[-1] + 1, last), stepper) for run in runs]
-    peaks = [_peak(osc, each, stop, stepper) for each in (*around, *unseen)]
-    deepest, hardest = np.max([(0.0, 0.0), *peaks], axis=0).tolist()
-    return Contacts(entries + len(unseen), deepest, hardest)
-
-
-def _depth_and_rate(states: Array, barrier: Barrier) -> tuple[Array, Array]:
-    return barrier.sign * (states[:, 0] - barrier.position), barrier.sign * states[:, 1]
-
-
-def _around(osc: Oscillator, path: Path, first: int, last: int, stepper: Stepper) -> Path:
-    """Return the stretch between two samples, with enough samples for its peaks."""
-    if last - first >= 32 or first == last:
-        return Path(path.states[first : last + 1], path.start + first * path.spacing, path.spacing)
-    finer = path.spacing * (last - first) / 64
-    begin = path.start + first * path.spacing
-    return Path(record(osc, Flow.STATE, stepper, path.states[first], begin, finer, 64), begin, finer)
+    def greatest(self, measure: Callable[[Array], Array]) -> float:
+        """Return the largest value of a function of the state, from ever finer samples around it."""
+        path, best = self, 0.0
+        for _ in range(5):
+            values = measure(path.states)
+            top = int(np.argmax(values))
+            best = max(best, float(values[top]))
+            path = path.around(top, top)
+            if len(path.states) < 2:
+                break
+        return best
 
 
-def _hidden(osc: Oscillator, path: Path, barrier: Barrier, stepper: Stepper, finer: int) -> list[Path]:
-    """Stretches in which the stop is touched between two samples that are both clear of it."""
-    depth, rate = _depth_and_rate(path.states, barrier)
-    clear, turns = (depth[:-1] <= 0) & (depth[1:] <= 0), (rate[:-1] > 0) & (rate[1:] < 0)
-    reachable = depth[:-1] + rate[:-1] * path.spacing > 0
-    found = []
-    for index in np.flatnonzero(clear & turns & reachable):
-        closer = _around(osc, path, int(index), int(index) + 1, stepper)
-        inside, _ = _depth_and_rate(closer.states, barrier)
-        if inside.max() > 0:
-            found.append(closer)
-        elif finer > 0:
-            found += _hidden(osc, closer, barrier, stepper, finer - 1)
-    return found
+class _Contacts:
+    """The contacts with one stop along a whole orbit: entries, largest depth (m), largest push (m s⁻²)."""
 
+    def __init__(self, path: Path, stop: int) -> None:
+        self.barrier, theta = path.osc.barriers[stop], theta_of(path.osc)
+        law = kernel_for(path.osc, Flow.STATE, path.stepper).module.law
+        depth = self._depth(path.states)
+        touching = np.flatnonzero(depth > 0)
+        runs = [run for run in np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1) if run.size]
+        unseen = self._unseen(path, 6)
+        stretches = [*(path.around(run[0], run[-1]) for run in runs), *unseen]
 
-def _peak(osc: Oscillator, path: Path, stop: int, stepper: Stepper) -> tuple[float, float]:
-    """Return the greatest depth and the greatest push along a stretch."""
-    law, theta = kernel_for(osc, Flow.STATE, stepper).module.law, theta_of(osc)
+        def pushes(states: Array) -> Array:
+            pairs = zip(self._depth(states), self._rate(states), strict=True)
+            return np.array([float(law(stop, depth, rate, theta)) if depth > 0 else 0.0 for depth, rate in pairs])
 
-    def depths(states: Array) -> Array:
-        return _depth_and_rate(states, osc.barriers[stop])[0]
+        self.hits = int(np.sum((depth[:-1] <= 0) & (depth[1:] > 0))) + len(unseen)
+        self.depth = max((each.greatest(self._depth) for each in stretches), default=0.0)
+        self.force = max((each.greatest(pushes) for each in stretches), default=0.0)
 
-    def pushes(states: Array) -> Array:
-        pairs = zip(*_depth_and_rate(states, osc.barriers[stop]), strict=True)
-        return np.array([float(law(stop, depth, rate, theta)) if depth > 0 else 0.0 for depth, rate in pairs])
+    def _depth(self, states: Array) -> Array:
+        return self.barrier.sign * (states[:, 0] - self.barrier.position)
 
-    return _greatest(osc, path, depths, stepper), _greatest(osc, path, pushes, stepper)
+    def _rate(self, states: Array) -> Array:
+        return self.barrier.sign * states[:, 1]
 
+    def _unseen(self, path: Path, finer: int) -> list[Path]:
+        """Stretches with a contact between two samples that are clear of the stop: the velocity turns next to it.
 
-def _greatest(osc: Oscillator, path: Path, measure: Callable[[Array], Array], stepper: Stepper) -> float:
-    """Return the largest value of a function of the state along a path, from ever finer samples around it."""
-    best = 0.0
-    for _ in range(5):
-        values = measure(path.states)
-        top = int(np.argmax(values))
-        best = max(best, float(values[top]))
-        path = _around(osc, path, max(top - 1, 0), min(top + 1, len(values) - 1), stepper)
-        if len(path.states) < 2:
-            break
-    return best
+        Such a stretch is integrated again with finer samples, at most so many times.
+        """
+        depth, rate = self._depth(path.states), self._rate(path.states)
+        clear, turns = (depth[:-1] <= 0) & (depth[1:] <= 0), (rate[:-1] > 0) & (rate[1:] < 0)
+        reachable = depth[:-1] + rate[:-1] * path.spacing > 0
+        found = []
+        for index in np.flatnonzero(clear & turns & reachable):
+            closer = path.between(int(index), int(index) + 1)
+            if self._depth(closer.states).max() > 0:
+                found.append(closer)
+            elif finer > 0:
+                found += self._unseen(closer, finer - 1)
+        return found

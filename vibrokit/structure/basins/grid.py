@@ -20,9 +20,9 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
 from vibrokit.structure.along_x import states_at
 from vibrokit.structure.basins.classifier import CELLS, BasinClassifier
+from vibrokit.structure.basins.landings import on_circle
 from vibrokit.structure.basins.stop_cells import FINEST, MARGIN, agreeing
 from vibrokit.structure.persistence import persistent_stepper
-from vibrokit.structure.regions import on_circle
 from vibrokit.structure.validation import DEFAULT_CELLS
 from vibrokit.symbolic.flow_kind import Flow
 

@@ -1,9 +1,10 @@
-"""Motion until it arrives at an attractor, and which one that is, where states a turn apart have the same motion."""
+"""Attractors and their copies whole turns away along x, and motion until it arrives at one of them."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,11 +17,64 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import AT_COPY, UNSETTLED, Basins
 from vibrokit.results.region import Region
+from vibrokit.results.saddle import Saddle
 from vibrokit.structure.along_x import shifted, turn_of, turns_to, wrapped
+from vibrokit.structure.scales import units_of
 from vibrokit.symbolic.flow_kind import Flow
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
+
+
+def without_copies(osc: Oscillator, attractors: Sequence[Attractor]) -> list[Attractor]:
+    """Return attractors of which none is another one moved along x by whole turns; those nearest to x = 0."""
+    kept = list[Attractor]()
+    for one in sorted(attractors, key=lambda each: abs(float(each.points[:, 0].mean()))):
+        if not any(_is_copy(osc, one, other) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _is_copy(osc: Oscillator, one: Attractor, other: Attractor) -> bool:
+    if not turn_of(osc) or one.points.shape != other.points.shape:
+        return False
+    return bool(np.all(np.abs(wrapped(osc, one.points - other.points)) < 1e-6 * units_of(osc)))
+
+
+def copies_in(osc: Oscillator, attractors: Sequence[Attractor], region: Region, *, one_each: bool) -> list[Attractor]:
+    """Return each attractor in the turn around the middle of a region, or once for each turn in which it is there.
+
+    Motion that turns over, and motion that never repeats, is one attractor however often it is met.
+    """
+    turn = turn_of(osc)
+    if not turn:
+        return list(attractors)
+    middle, found = float(np.mean(region.x)), list[Attractor]()
+    most = 0 if one_each else math.ceil(region.widths[0] / turn)
+    for one in without_copies(osc, attractors):
+        anywhere = bool(one.turns) or not one.repeats
+        nearest = _moved(one, -turn * float(turns_to(osc, one.points[:1], middle)[0]))
+        moved = [_moved(nearest, turn * away) for away in range(-most, most + 1)]
+        found += [nearest] if anywhere else [each for each in moved if lies_in(region, each)] or [nearest]
+    return found
+
+
+def _moved(one: Attractor, distance: float) -> Attractor:
+    """Return an attractor moved along x."""
+    return dataclasses.replace(one, points=shifted(one.points, distance), orbit=shifted(one.orbit, distance))
+
+
+def on_circle(osc: Oscillator, attractors: Sequence[Attractor], region: Region | None) -> bool:
+    """Whether states a turn apart along x count as one: motion turns over, and the region is one turn or none."""
+    turn = turn_of(osc)
+    narrow = region is None or region.widths[0] <= turn * (1 + 1e-6)
+    return bool(turn) and narrow and any(each.turns for each in attractors)
+
+
+def lies_in(region: Region, orbit: Attractor | Saddle) -> bool:
+    """Whether some point of an orbit on the section is in a region; of a limit cycle, whether any of its points is."""
+    points = orbit.orbit if isinstance(orbit, Attractor) and orbit.kind == "limit cycle" else orbit.points
+    return bool(region.contains(points).any())
 
 
 class Landings:
@@ -37,17 +91,11 @@ class Landings:
         self.middle = float(np.mean(region.x))
         homes = [int(turns_to(osc, each.points[:1], self.middle)[0]) for each in attractors]
         self.entries = list(enumerate(homes))  # of each label: which attractor, and how many turns away
-        self._first = [self._copy_of(label) for label in range(len(attractors))]
+        self._first = [  # of the copies of each
+            next((n for n, other in enumerate(attractors[:label]) if _is_copy(osc, one, other)), label)
+            for label, one in enumerate(attractors)
+        ]
         self._at = {(self._first[label], home): label for label, home in reversed(self.entries)}
-
-    def _copy_of(self, label: int) -> int:
-        """The first attractor of which one is a copy."""
-        here = self._wrapped(self.attractors[label].points)
-        for other in range(label if turn_of(self.osc) else 0):
-            there = self._wrapped(self.attractors[other].points)
-            if here.shape == there.shape and self.region.apart(here, there).max() < 1e-6:
-                return other
-        return label
 
     def samples(self, points: Sequence[Array]) -> Iterator[tuple[int, Array]]:
         """Yield labels and points (…, 2) of each attractor given by some of its points, and of its copies.

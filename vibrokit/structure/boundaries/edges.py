@@ -71,8 +71,7 @@ class Straddles:
     `trackers` pairs for each pair of labels. `only` are the pairs of labels to start between, the lower first; by
     default all that meet. Pairs without a change of label between them are dropped. Between two sections they are
     brought together `parts` times. Labels that `groups` has, of cells too, are replaced. None are brought together any
-    more once classifying states has taken `budget` sections, or with the first cut so many that more are to be
-    expected.
+    more once classifying states has taken `budget` sections.
     """
 
     def __init__(
@@ -99,7 +98,6 @@ class Straddles:
         self.end_labels = np.zeros(self.ends.shape[:2], dtype=np.int64)
         self.numbers = np.arange(len(self.ends))  # of each pair among the initial ones
         self.sections = 0  # that classifications took
-        self._too_long = False
         self.strips: list[Strip] = []  # that hide the boundary
         self._points: list[Array] = []  # at each section, of all pairs
         self._stretches: list[Array] = []
@@ -110,8 +108,8 @@ class Straddles:
 
     @property
     def spent(self) -> bool:
-        """Whether the budget is spent, or is expected to be before the ends are together for the first time."""
-        return self.sections >= self.budget or self._too_long
+        """Whether the budget is spent."""
+        return self.sections >= self.budget
 
     @property
     def interval(self) -> float:
@@ -172,23 +170,17 @@ class Straddles:
         for _ in range(60):
             if not wide.size or self.spent:
                 break
-            cuts = 0.0 if self.sections else self._cuts(wide)
             shrunk = self._cut(wide)
-            self._too_long |= self.sections * cuts > self.budget
             straddling[wide[~shrunk]] = False
             wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * _WIDTH)]
         straddling[wide] = False
         self.keep(straddling)
         self._points.append(self.ends.mean(axis=1))
 
-    def _cuts(self, wide: NDArray[np.intp]) -> float:
-        """Cuts until the ends of some pairs are together."""
-        return math.log(max(1.0, self._widths()[wide].max() / (_TOGETHER * _WIDTH))) / math.log(_pieces(len(wide)))
-
     def _cut(self, wide: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Cut lines into pieces and keep of each a piece whose ends differ; return which lines have one."""
         low, high = self.ends[wide, 0], self.ends[wide, 1]
-        pieces = _pieces(len(wide))
+        pieces = int(np.clip(512 // len(wide) - 1, 3, 63))  # about 512 states are classified at once
         corners = low[:, None] + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (high - low)[:, None]
         corners[:, -1] = high
         labels = self._labels(corners.reshape(-1, low.shape[-1])).reshape(corners.shape[:2])
@@ -214,8 +206,3 @@ class Straddles:
 
     def _widths(self) -> Array:
         return self.classifier.region.apart(self.ends[:, 1], self.ends[:, 0])
-
-
-def _pieces(lines: int) -> int:
-    """Pieces of each of so many lines between two ends: about 512 states are classified at once."""
-    return int(np.clip(512 // lines - 1, 3, 63))

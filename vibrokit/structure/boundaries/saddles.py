@@ -29,13 +29,12 @@ from vibrokit.structure.boundaries.edges import EdgeTrack, Straddles, Strip
 from vibrokit.structure.boundaries.meetings import Pair, first_few, groups_of, meeting_cells, pairs_apart
 from vibrokit.structure.boundaries.motions import NEAR, almost_repeats, chaotic_set, closing, recurrence, same_place
 from vibrokit.structure.boundaries.unstable import RESIDUAL, branch_limits, describe_unstable, in_turn, refine_unstable
-from vibrokit.structure.orbits import EQUAL, Orbit
+from vibrokit.structure.orbits import EQUAL, LONGEST_PERIOD, Orbit
 from vibrokit.structure.unstable_orbits import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
 
 SOON = 128
 """Sections within which motions on most boundaries converge."""
-_LONGEST_PERIOD = 16
 _FARTHEST = 1e-2  # of the region's widths: largest distance from a motion to the orbit that it converges to
 _LAST = 12  # points of a motion that must all be near a saddle
 _SHARE = 0.1  # of the budget: spent by then, only two motions go on between two labels, and motions count as wandering
@@ -188,7 +187,7 @@ class SaddleSearch:
         ended = run(np.array([strip.state for strip in strips]), self.classifier.budget)
         visits = run(ended.states, 64, visits=64).visits
         for strip, points in zip(strips, visits, strict=True):
-            period = recurrence(self.region.scaled(points), _LONGEST_PERIOD)
+            period = recurrence(self.region.scaled(points), LONGEST_PERIOD)
             if period and self._reached_orbit(EdgeTrack(strip.labels, points, np.empty(0)), period):
                 self._explained.add(strip.labels)
 
@@ -206,7 +205,7 @@ class SaddleSearch:
         if self.osc.autonomous:
             rests = recurrence(points, 1)
             return self._reached_orbit(track, 1) if rests else self._reached_cycle(track, straddles.interval)
-        period = recurrence(points, _LONGEST_PERIOD) if tries[number] < 4 else 0
+        period = recurrence(points, LONGEST_PERIOD) if tries[number] < 4 else 0
         tries[number] += period > 0
         return period > 0 and self._reached_orbit(track, period)
 
@@ -263,7 +262,7 @@ class SaddleSearch:
             tracks[track.labels].append(track)
         for pair, motions in tracks.items():
             scaled = [self.region.scaled(motion.points) for motion in motions]
-            repeating = [almost_repeats(points, _LAST, _LONGEST_PERIOD) for points in scaled]
+            repeating = [almost_repeats(points, _LAST, LONGEST_PERIOD) for points in scaled]
             wandering = list(itertools.compress(motions, np.logical_not(repeating)))
             if any(repeating):
                 self._findings.append(_on_boundary(Code.MOTIONS_NOT_CONVERGED, pair, count=sum(repeating)))
@@ -282,7 +281,7 @@ class SaddleSearch:
         Those next to which all states lead to one attractor do not lie on the boundary.
         """
         before = len(self._found)
-        for orbit in orbits_inside(self.osc, chaotic.points, self.orbit_stepper, 8, _LONGEST_PERIOD):
+        for orbit in orbits_inside(self.osc, chaotic.points, self.orbit_stepper, 8, LONGEST_PERIOD):
             limits = branch_limits(self.classifier, orbit)
             if len(set(limits)) > 1 and not self._known(self.region.scaled(orbit.point[None]), EQUAL):
                 self._add(orbit, limits, embedded=True)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from vibrokit.errors import StepperError, StructureError
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.saddle import Saddle
@@ -18,7 +17,16 @@ from vibrokit.structure.along_x import shifted, turn_of, turns_to, wrapped
 from vibrokit.structure.autonomous import equilibrium_exponents, refine_equilibrium
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.meetings import settled
-from vibrokit.structure.orbits import SAMPLES, Orbit, least_period, nodes_from, refine_orbit, states_along, visited
+from vibrokit.structure.orbits import (
+    SAMPLES,
+    Orbit,
+    least_period,
+    nodes_from,
+    refine_orbit,
+    sampled,
+    states_along,
+    visited,
+)
 from vibrokit.symbolic.flow_kind import Flow
 
 RESIDUAL = 1e-10
@@ -83,13 +91,9 @@ def _along(osc: Oscillator, orbit: Orbit, stepper: Stepper) -> Array:
     """(x, v) along an orbit at equal times, its start repeated at the end; each piece starts at a node."""
     if orbit.kind == "equilibrium":
         return orbit.nodes[:, :2]
-    pieces = -(-SAMPLES * max(1, round(orbit.duration / osc.section_interval)) // len(orbit.nodes))
-    span = orbit.duration / len(orbit.nodes)
-    each = [
-        record(osc, Flow.STATE, stepper, node, at * span, span / pieces, pieces)[:pieces]
-        for at, node in enumerate(orbit.nodes)
-    ]
-    return np.concatenate([*each, orbit.nodes[:1]])[:, :2]
+    each = -(-SAMPLES * max(1, round(orbit.duration / osc.section_interval)) // len(orbit.nodes))
+    states = sampled(osc, orbit.nodes, orbit.duration, stepper, each)
+    return np.concatenate([states, orbit.nodes[:1]])[:, :2]
 
 
 def _kind_of(multipliers: NDArray[np.complex128]) -> str:
