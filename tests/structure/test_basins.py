@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.stats import beta
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.progress import working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
@@ -17,6 +18,7 @@ from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import BasinGrid, classify_grid, with_fractions
+from vibrokit.structure.basins.stop_cells import agreeing
 from vibrokit.structure.orbits import refine_orbit
 
 PAPER_STATES = ((0.466551, 0.002566), (0.023582, -0.049071))
@@ -94,7 +96,7 @@ def test_no_share_is_without_an_error(cells, count):
 def test_a_softening_spring_lets_go_beyond_its_saddles():
     """x″ + 0.1x′ + x − x³ = 0: energy ¼ at the saddles x = ±1; it falls, so that below it the side decides."""
     spring = vk.CubicSpring(linear=1.0, cubic=-1.0)
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=spring)
+    osc = scene(damping_ratio=0.05, spring=spring)
     escaping = classifier(osc, [(0.0, 0.0)], ((-1.6, 1.6), (-1.2, 1.2)))
     for margin in (None, 2):
         basins = classify_grid(escaping, (80, 80), margin=margin)
@@ -110,7 +112,7 @@ def test_a_softening_spring_lets_go_beyond_its_saddles():
 def circles():
     """x″ + x = −¼ x′ (r² − 1)(r² − 4), r² = x² + x′²: rest, and the circle r = 2, parted by the circle r = 1."""
     spring = vk.CustomSpring("x + v*(x**2 + v**2 - 1)*(x**2 + v**2 - 4)/4")
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=spring)
+    osc = scene(damping_ratio=0.0, spring=spring)
     angles = np.linspace(0, 2 * np.pi, 401)
     circle = attractor((2.0, 0.0), "limit cycle", 2 * np.stack([np.cos(angles), -np.sin(angles)], axis=1))
     rest = attractor((0.0, 0.0), "equilibrium")
@@ -126,10 +128,11 @@ def test_a_limit_cycle_is_reached_wherever_it_is_met(margin):
 
 def test_chaos_is_told_from_the_orbit_beside_it():
     """Ueda's oscillator, x″ + 0.1x′ + x³ = 12 cos t: a chaotic attractor, and a small orbit of period 1."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(linear=0.0, cubic=1.0),
+    osc = scene(
+        damping_ratio=0.05,
+        spring=vk.CubicSpring(linear=0.0, cubic=1.0),
         excitations=(vk.Harmonic(amplitude=12.0, frequency=1.0),),
-    )  # fmt: skip
+    )
     orbit = refine_orbit(osc, np.array([0.892, -1.291]), 1, vk.RK4(256))
     many = osc.section_map(np.random.default_rng(0).uniform(2.5, 3.5, (256, 2)), 500)
     many = many[np.linalg.norm(many - orbit.point, axis=1) > 1e-3][:128]
@@ -144,7 +147,7 @@ def test_chaos_is_told_from_the_orbit_beside_it():
 
 def test_a_curve_that_is_crossed_is_not_reached():
     """A spiral to rest crosses a circle that is given out for a quasiperiodic attractor."""
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.001)
+    osc = scene(damping_ratio=0.001)
     angles = np.random.default_rng(0).uniform(0, 2 * np.pi, 4096)
     circle = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     records = [attractor((0.0, 0.0), "equilibrium"), attractor(circle, "quasiperiodic")]
@@ -250,6 +253,20 @@ def test_an_interrupt_leaves_what_was_done(duffing):
     assert (done[0], done[-1], done) == (0, total, sorted(done))
 
 
+def test_an_interrupt_while_a_grid_is_refined_keeps_the_other_cells(duffing):
+    coarse, fine = (classify_grid(duffing, (60, 60), refine=refine).labels for refine in (0, 1))
+    away = agreeing(coarse, 2).repeat(2, axis=0).repeat(2, axis=1)  # from the boundary: these are not followed again
+    _, seen = interrupted(BasinGrid(duffing, (60, 60), refine=1), math.inf)
+    known = []
+    for call in [call for call, update in enumerate(seen, start=1) if 60**2 < update.done < update.total]:
+        partial, _ = interrupted(BasinGrid(duffing, (60, 60), refine=1), call)
+        followed = partial != NOT_FOLLOWED
+        assert followed[away].all()
+        np.testing.assert_array_equal(partial[followed], fine[followed])
+        known.append(followed.mean())
+    assert away.mean() <= min(known) < max(known) < 1
+
+
 def test_a_grid_whose_finer_one_would_take_too_many_sections_is_the_last(duffing, monkeypatch):
     fine = BasinGrid(duffing, None)
     fine.fill()
@@ -284,7 +301,7 @@ def test_attractors_own_their_places_on_any_grid(scene, cells, request):
 def test_an_attractor_in_a_large_grid_is_found_by_splitting_few_cells():
     """A well at x = 1 that is narrower than a cell: those around it are split, and the others keep their labels."""
     spring = vk.CustomSpring("x + 500*(x - 1)*exp(-((x - 1)/w)**2)", w=0.01)
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=spring)
+    osc = scene(damping_ratio=0.05, spring=spring)
     places = [(0.0, 0.0), (0.9979155389726735, 0.0)]  # the second by Brent's method
     grid = BasinGrid(classifier(osc, places, ((-2, 2), (-2, 2)), settling=1e-4, stepper=vk.RK4(512)), (80, 80))
     labels, seen = interrupted(grid, math.inf)

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
 import vibrokit as vk
+from tests.scenes import double_well, scene
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import find_cycle
@@ -40,69 +41,66 @@ def only(followed, kind):
     return found
 
 
-def rayleigh(*, spring="x + v*(v**2 - m)", m=0.2, excitations=(), barriers=()):
+def rayleigh(*stops, spring="x + v*(v**2 - m)", m=0.2, excitations=()):
     """x″ + x + v³ + (0.1 − m) v: damped at rest for m < 0.1."""
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(spring, m=m), excitations=excitations,
-        barriers=barriers,
-    )  # fmt: skip
+    return scene(*stops, damping_ratio=0.05, spring=vk.CustomSpring(spring, m=m), excitations=excitations)
 
 
-def test_both_gaps_tied_graze_at_the_amplitude_of_the_linear_response():
-    osc = vk.Oscillator(
-        natural_frequency=2.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.7, 2.9),),
-        barriers=(vk.Barrier(vk.Linear(30.0), 0.4, "right"), vk.Barrier(vk.Linear(30.0), -0.8, "left")),
-    )  # fmt: skip
+def both_gaps():
+    """A linear response between two stops that do not touch it, and its amplitude."""
+    stops = vk.Barrier(vk.Linear(30.0), 0.4, "right"), vk.Barrier(vk.Linear(30.0), -0.8, "left")
+    osc = scene(*stops, natural_frequency=2.0, damping_ratio=0.05, excitations=(vk.Harmonic(0.7, 2.9),))
     response = 0.7 / (4 - 2.9**2 + 2j * 0.05 * 2 * 2.9)
-    state = (response.real, -2.9 * response.imag)
-    for tied, gap in (
-        ({"barriers.0.position": 1.0, "barriers.1.position": -2.0}, abs(response)),
-        ({"barriers.1.position": -1.0, "barriers.0.position": 0.5}, 2 * abs(response)),
-    ):
-        found = only(passed(osc, tied, state, 0.8 * gap), "grazing")
-        assert (found.side, found.value) == ("right", pytest.approx(gap, rel=1e-9))
+    return osc, (response.real, -2.9 * response.imag), abs(response)
 
 
-def test_grazing_of_the_clear_state_is_where_the_linear_response_reaches_the_stop():
-    osc = vk.load_scene("hertz-0.570")
-
-    def reach(frequency, amplitude):
-        return 0.2 + amplitude / math.hypot(1 - frequency**2, 0.02 * frequency)
-
-    in_frequency = brentq(lambda frequency: reach(frequency, 0.18) - 0.5, 0.57, 0.7, xtol=1e-15)
-    in_amplitude = 0.3 * math.hypot(1 - 0.57**2, 0.02 * 0.57)
-    found = only(passed(osc, FREQUENCY, CLEAR, 0.66), "grazing")
-    assert found.value == pytest.approx(in_frequency, abs=1e-8)
-    assert found.side == "right"
-    assert only(passed(osc, AMPLITUDE, CLEAR, 0.203), "grazing").value == pytest.approx(in_amplitude, abs=1e-8)
-
-
-@pytest.mark.parametrize("stiffness", [1e6, 1e9])
-def test_grazing_that_ends_the_clear_state_at_a_stiff_stop(stiffness):
-    stiff = {"barriers.0.law.stiffness": stiffness, "barriers.1.law.stiffness": stiffness}
-    followed = passed(vk.load_scene("hertz-0.570").replace(stiff), AMPLITUDE, CLEAR, 0.25)
-    exact = 0.3 * math.hypot(1 - 0.57**2, 0.02 * 0.57)
-    assert only(followed, "grazing").value == pytest.approx(exact, abs=1e-8)
-    assert followed.end is None
+BETWEEN, STATE, GAP = both_gaps()
+PAPER = vk.load_scene("hertz-0.570")
+REACHED = 0.3 * math.hypot(1 - 0.57**2, 0.02 * 0.57)  # amplitude of PAPER with which the linear response is a gap wide
+FASTER = brentq(lambda frequency: 0.18 / math.hypot(1 - frequency**2, 0.02 * frequency) - 0.3, 0.57, 0.7, xtol=1e-15)
+PUSHED = scene(
+    vk.Barrier(vk.Hertz(50.0), 0.5, "right"), natural_frequency=2.0, damping_ratio=0.05,
+    excitations=(vk.Constant(0.2),),
+)  # fmt: skip
+TILTED = double_well(excitations=(vk.Constant(0.0),))
+SINGLE = TILTED.replace({"spring.linear": 0.5})
+FORCE = "excitations.0.force"
+RIGHT, LEFT = "barriers.0.position", "barriers.1.position"
+WIDE = (4.0, 4.0)
 
 
-def test_an_equilibrium_grazes_where_the_spring_balances_the_force_at_the_stop():
-    stop = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
-    osc = vk.Oscillator(
-        natural_frequency=2.0, damping_ratio=0.05, excitations=(vk.Constant(0.2),), barriers=(stop,)
-    )  # fmt: skip
-    followed = passed(osc, "excitations.0.force", (0.05, 0.0), 3.0)
-    assert only(followed, "grazing").value == pytest.approx(2.0, abs=1e-10)  # ω_n² · 0.5
-    assert followed.stable
+def stiff(stiffness):
+    return PAPER.replace({"barriers.0.law.stiffness": stiffness, "barriers.1.law.stiffness": stiffness})
+
+
+@pytest.mark.parametrize(
+    ("osc", "path", "state", "target", "kind", "value", "end"),
+    [
+        (BETWEEN, {RIGHT: 1.0, LEFT: -2.0}, STATE, 0.8 * GAP, "grazing", GAP, "none"),
+        (BETWEEN, {LEFT: -1.0, RIGHT: 0.5}, STATE, 1.6 * GAP, "grazing", 2 * GAP, "none"),
+        (PAPER, FREQUENCY, CLEAR, 0.66, "grazing", FASTER, "stable"),
+        (PAPER, AMPLITUDE, CLEAR, 0.203, "grazing", REACHED, "stable"),
+        (stiff(1e6), AMPLITUDE, CLEAR, 0.25, "grazing", REACHED, "none"),
+        (stiff(1e9), AMPLITUDE, CLEAR, 0.25, "grazing", REACHED, "none"),
+        (PUSHED, FORCE, (0.05, 0.0), 3.0, "grazing", 2.0, "stable"),  # ω_n² · 0.5
+        (TILTED, FORCE, (-1.0, 0.0), 0.8, "fold", 2 / math.sqrt(27), "none"),  # maximum of x − x³
+        (SINGLE, "spring.linear", (0.0, 0.0), -0.7, "pitchfork or transcritical", 0.0, "unstable"),
+        (rayleigh(m=-0.3), "spring.m", (0.0, 0.0), 0.4, "Hopf", 0.1, "unstable"),  # the damping at rest vanishes
+    ],
+)
+def test_bifurcations_in_closed_form(osc, path, state, target, kind, value, end):
+    followed = passed(osc, path, state, target, size=WIDE if osc.autonomous else (2.0, 2.0))
+    found = only(followed, kind)
+    assert found.value == pytest.approx(value, abs=1e-10)
+    assert found.side == ("right" if kind == "grazing" else "")
+    assert end == ("none" if followed.end is None else "stable" if followed.stable else "unstable")
 
 
 def pressed(law, *, side="right", damping=0.1, amplitude=0.7, frequency=1.5):
     """A mass that a constant force 1 presses against a stop at 0."""
     push = 1.0 if side == "right" else -1.0
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping, barriers=(vk.Barrier(law, 0.0, side),),
-        excitations=(vk.Harmonic(push * amplitude, frequency), vk.Constant(push)),
-    )  # fmt: skip
+    forces = vk.Harmonic(push * amplitude, frequency), vk.Constant(push)
+    return scene(vk.Barrier(law, 0.0, side), damping_ratio=damping, excitations=forces)
 
 
 @pytest.mark.parametrize(("stiffness", "side"), [(9.0, "right"), (9.0, "left"), (1e4, "left")])
@@ -164,7 +162,7 @@ def test_a_preloaded_dash_pot_lets_go_where_its_force_falls_to_zero(k, c, freque
 
 def test_a_limit_cycle_in_contact_grazes_where_an_independent_integration_lifts_off():
     stop = vk.Barrier(vk.Linear(3.0), 0.0, "right")
-    osc = rayleigh(excitations=(vk.Constant(1.0),), barriers=(stop,), m=0.25)
+    osc = rayleigh(stop, excitations=(vk.Constant(1.0),), m=0.25)
     found = only(passed(osc, "spring.m", (0.4, 0.0), 0.32, cycle=True), "grazing")
     # Least x of the cycle of x″ + 0.1 x′ + x + x′(x′² − m) + 3 max(x, 0) = 1 by DOP853 (1e-11), its root in m by Brent.
     assert found.value == pytest.approx(0.2872094587296512, abs=1e-9)
@@ -187,7 +185,7 @@ def hertz_map(state, frequency):
 
 
 def test_at_a_period_doubling_a_multiplier_is_minus_one():
-    found = only(passed(vk.load_scene("hertz-0.570"), FREQUENCY, HAMMERING, 0.53), "period doubling")
+    found = only(passed(PAPER, FREQUENCY, HAMMERING, 0.53), "period doubling")
     state = found.point
     for _ in range(3):
         image, derivative = hertz_map(state, found.value)
@@ -199,9 +197,8 @@ def test_at_a_period_doubling_a_multiplier_is_minus_one():
 
 
 def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
-    osc = vk.load_scene("hertz-0.570")
+    osc, found = PAPER, []
     stepper = single_stepper(osc, Flow.STATE_VARIATIONAL)
-    found = []
     for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
         there = osc.replace({FREQUENCY: frequency})
         found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
@@ -256,28 +253,9 @@ def test_duffing_folds_where_collocation_says():
         assert abs(found.value - target) > 0.1  # it turned back on the way
 
 
-def test_equilibria_of_a_double_well():
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Constant(0.0),)
-    )  # fmt: skip
-    tilted = passed(osc, "excitations.0.force", (-1.0, 0.0), 0.8, size=(4.0, 4.0))
-    assert tilted.end is None
-    assert only(tilted, "fold").value == pytest.approx(2 / math.sqrt(27), abs=1e-10)  # max of x − x³
-    single = osc.replace({"spring.linear": 0.5})
-    crossed = passed(single, "spring.linear", (0.0, 0.0), -0.7, size=(4.0, 4.0))
-    assert only(crossed, "pitchfork or transcritical").value == pytest.approx(0.0, abs=1e-10)
-    assert not crossed.stable
-
-
-def test_hopf_where_the_damping_at_rest_vanishes():
-    followed = passed(rayleigh(m=-0.3), "spring.m", (0.0, 0.0), 0.4)
-    assert only(followed, "Hopf").value == pytest.approx(0.1, abs=1e-10)
-    assert not followed.stable
-
-
 def test_a_limit_cycle_grazes_where_it_reaches_the_stop():
     stop = vk.Barrier(vk.Hertz(50.0), 0.5, "right")
-    followed = passed(rayleigh(barriers=(stop,)), "spring.m", (0.36, 0.0), 0.4, cycle=True)
+    followed = passed(rayleigh(stop), "spring.m", (0.36, 0.0), 0.4, cycle=True)
     found = only(followed, "grazing")
 
     def rates(t, y):

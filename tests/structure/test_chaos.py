@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.scenes import Coloured
+from tests.scenes import Coloured, scene
 from vibrokit.errors import StructureError
 from vibrokit.results.basins import ESCAPED
 from vibrokit.structure.attractors.wandering import (
@@ -42,7 +42,7 @@ def cubic(parameter, count, start):
 
 @pytest.mark.parametrize("damping_ratio", [0.05, 2.0])
 def test_the_exponent_of_a_linear_oscillator(damping_ratio):
-    osc = vk.Oscillator(
+    osc = scene(
         natural_frequency=2.0, damping_ratio=damping_ratio, excitations=(vk.Harmonic(amplitude=1.0, frequency=1.3),)
     )
     found = lyapunov_exponent(osc, starts(8, -1, 1), vk.RK4(256), periods=400, skipped=50)
@@ -55,8 +55,7 @@ def test_the_exponent_of_a_linear_oscillator(damping_ratio):
 
 
 def test_the_exponent_of_three_states():
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
+    osc = scene(
         damping_ratio=0.2,
         excitations=(vk.Harmonic(amplitude=1.0, frequency=1.3),),
         noise=Coloured(intensity=0.0, rate=0.05),
@@ -67,8 +66,7 @@ def test_the_exponent_of_three_states():
 
 def test_the_exponent_of_a_chaotic_double_well_is_that_of_an_independent_integration():
     # x″ + 0.3 x′ − x + x³ = 0.5 cos 1.2t, the textbook's chaotic Duffing oscillator
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
+    osc = scene(
         damping_ratio=0.15,
         spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
         excitations=(vk.Harmonic(amplitude=0.5, frequency=1.2),),
@@ -109,8 +107,7 @@ def shadowed_exponent(states, periods, skipped, steps, distance=1e-7):
 
 
 def test_motion_on_an_invariant_circle_is_quasiperiodic():
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
+    osc = scene(
         damping_ratio=0.0,
         spring=vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=0.2),
         excitations=(vk.Harmonic(amplitude=0.3, frequency=1.618),),

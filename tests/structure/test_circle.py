@@ -7,16 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
 from vibrokit.structure.along_x import turn_of
 
 
 def pendulum(*excitations, damping=0.1, force="sin(x)", **constants):
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping / 2, spring=vk.CustomSpring(force, **constants),
-        excitations=excitations,
-    )  # fmt: skip
+    return scene(damping_ratio=damping / 2, spring=vk.CustomSpring(force, **constants), excitations=excitations)
 
 
 @pytest.mark.parametrize(

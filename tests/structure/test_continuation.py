@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.results.codes import Code
 from vibrokit.structure import continuation as module
@@ -149,7 +150,7 @@ def test_processes_give_the_same_to_the_last_bit():
 
 
 def test_cells_without_an_attractor_are_one_finding_at_each_value():
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
+    osc = scene(damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
     region = ((-1.5, 1.5), (-1.5, 1.5))
     result = continuation(osc, "damping_ratio", [0.1, 0.2], region=region, cells=(15, 15), starts=(6, 6))
     for at in result.states:
@@ -252,7 +253,7 @@ def test_bad_parameters_and_values(parameter, values, words):
 
 
 def test_bad_arguments():
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring("x + e*x**5", e=0.2))
+    osc = scene(damping_ratio=0.05, spring=vk.CustomSpring("x + e*x**5", e=0.2))
     with pytest.raises(ParameterError, match="shapes the equations"):
         continuation(osc, "spring.formula", ["x", "x**3"])
     for bad in ({"cells": (0, 3)}, {"starts": 5}, {"region": ((1, 0), (0, 1))}):

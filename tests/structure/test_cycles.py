@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.autonomous import equilibrium_exponents, find_cycle, refine_cycle
@@ -95,9 +96,7 @@ def test_a_cycle_that_hits_a_stop():
 @pytest.mark.slow
 def test_a_cycle_of_three_states_with_two_turns():
     still = vk.CustomSpring("0*x")
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=DAMPING)
-    )
+    osc = scene(damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=DAMPING))
     cycle = find_cycle(osc, np.array([0.1, 0.0, 0.0]), vk.Order8(1e-11), longest=150.0)
 
     def rates(_, z):
@@ -121,7 +120,7 @@ def test_a_cycle_of_three_states_with_two_turns():
 @pytest.mark.parametrize("damping_ratio", [0.01, 0.3, 2.0, 100.0])
 @pytest.mark.parametrize("frequency", [1.0, 300.0])
 def test_exponents_of_the_linear_oscillator(damping_ratio, frequency):
-    osc = vk.Oscillator(natural_frequency=frequency, damping_ratio=damping_ratio)
+    osc = scene(natural_frequency=frequency, damping_ratio=damping_ratio)
     root = np.sqrt(complex(damping_ratio**2 - 1))
     expected = frequency * np.array([-damping_ratio + root, -damping_ratio - root])
     found = equilibrium_exponents(osc, np.zeros(2))
@@ -132,7 +131,7 @@ def test_exponents_of_the_linear_oscillator(damping_ratio, frequency):
 
 def test_exponents_at_critical_damping():
     # A double eigenvalue is known to the root of the rounding error; sum and product of both as well as ever.
-    found = equilibrium_exponents(vk.Oscillator(natural_frequency=2.0, damping_ratio=1.0), np.zeros(2))
+    found = equilibrium_exponents(scene(natural_frequency=2.0, damping_ratio=1.0), np.zeros(2))
     np.testing.assert_allclose(found, [-2.0, -2.0], atol=1e-5)
     assert (found.sum(), found.prod()) == (pytest.approx(-4.0, rel=1e-11), pytest.approx(4.0, rel=1e-11))
 
@@ -140,9 +139,7 @@ def test_exponents_at_critical_damping():
 def test_exponents_at_rest_on_a_very_stiff_stop():
     stiffness = 1e12
     stop = vk.Barrier(vk.Linear(stiffness=stiffness), position=0.0, side="right")
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.01, barriers=(stop,), excitations=(vk.Constant(force=0.5),)
-    )
+    osc = scene(stop, excitations=(vk.Constant(force=0.5),))
     found = equilibrium_exponents(osc, np.array([0.5 / (1.0 + stiffness), 0.0]))
     expected = -0.01 + 1j * np.sqrt(1.0 + stiffness - 1e-4) * np.array([1.0, -1.0])
     np.testing.assert_allclose(found[np.argsort(-found.imag)], expected, rtol=0, atol=1e-12 * 1e6)
@@ -150,14 +147,14 @@ def test_exponents_at_rest_on_a_very_stiff_stop():
 
 def test_the_noise_state_decays_at_its_own_rate():
     still = vk.CustomSpring("0*x")
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=0.5))
+    osc = scene(damping_ratio=0.0, spring=still, noise=Jerk(intensity=0.0, damping=0.5))
     found = equilibrium_exponents(osc, np.zeros(3))
     expected = np.roots([1.0, 0.5, 1.1, 1.0])
     np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), atol=1e-11)
 
 
 def test_what_is_no_cycle_is_refused():
-    spiral = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.001)
+    spiral = scene(damping_ratio=0.001)
     with pytest.raises(StructureError, match="does not repeat within 30 s"):
         find_cycle(spiral, np.array([1.0, 0.0]), vk.RK4(256), longest=30.0)
     with pytest.raises(StructureError, match="equilibrium"):
@@ -171,7 +168,7 @@ def test_what_is_no_cycle_is_refused():
 def test_a_cycle_that_finer_steps_do_not_have_is_described_with_an_infinite_error():
     """x″ + v(0.08 x² − 0.04 x⁴ − 2ζ) + x = 0 has cycles for ζ < 0.01; eight steps a turn damp by θ⁵/144 = 0.002."""
     spring = vk.CustomSpring("x + v*(0.08*x**2 - 0.04*x**4 - 2*z)", z=0.011)
-    osc, coarse = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=spring), vk.RK4(8)
+    osc, coarse = scene(damping_ratio=0.0, spring=spring), vk.RK4(8)
     described = describe_orbit(osc, cycle := find_cycle(osc, np.array([1.2, 0.0]), coarse, longest=20.0), coarse)
     assert (described.kind, described.error, described.residual) == ("limit cycle", np.inf, cycle.residual)
 
@@ -207,7 +204,7 @@ def averaged(al, be):
 
 def amplitudes(formula, starts=(8, 8), frequency=1.0, **values):
     """Of all attractors that are found."""
-    osc = vk.Oscillator(
+    osc = scene(
         natural_frequency=frequency, damping_ratio=0.0, spring=vk.CustomSpring(formula, w2=frequency**2, **values)
     )
     found = vk.find_structure(osc, cells=(10, 10), starts=starts, saddles=False)
@@ -248,7 +245,7 @@ def test_a_weak_cycle_of_van_der_pol_counts_once():
     ],
 )
 def test_cells_are_followed_as_long_as_the_slowest_deviation_takes(formula, damping):
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=damping, spring=vk.CustomSpring(formula, mu=0.002))
+    osc = scene(damping_ratio=damping, spring=vk.CustomSpring(formula, mu=0.002))
     found = vk.find_structure(osc, region=((-3.0, 3.0), (-3.0, 3.0)), cells=(20, 20), starts=(6, 6), saddles=False)
     (only,) = found.attractors
     assert found.budget > 2000

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import vibrokit as vk
-from tests.scenes import double_well
+from tests.scenes import double_well, scene
 from vibrokit.errors import NoSectionError, ParameterError, StructureError
 from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
@@ -70,12 +70,8 @@ def test_labels_are_where_the_flow_leads(paper):
 
 
 UNDAMPED = vk.load_scene("hertz-0.570").replace({"damping_ratio": 0.0})
-TWO_TONES = vk.Oscillator(
-    natural_frequency=1.0, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5))
-)
-CHAOTIC = vk.Oscillator(
-    natural_frequency=1.0, damping_ratio=0.15, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Harmonic(0.5, 1.2),)
-)
+TWO_TONES = scene(damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5)))
+CHAOTIC = scene(damping_ratio=0.15, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Harmonic(0.5, 1.2),))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +110,7 @@ def test_bad_arguments(name, error, value):
 def van_der_pol():
     """x″ + (x² − 1)x′ + x = 0."""
     spring = vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=1.0)
-    return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=spring)
+    return scene(damping_ratio=0.0, spring=spring)
 
 
 def test_a_limit_cycle():
@@ -135,7 +131,7 @@ def test_a_scene_whose_noise_depends_on_the_state():
 
 
 def test_what_escapes_is_said_to_have_left():
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
+    osc = scene(damping_ratio=0.1, spring=vk.CubicSpring(linear=1.0, cubic=-1.0))
     structure = vk.find_structure(osc, region=((-1.5, 1.5), (-1.5, 1.5)), cells=(30, 30), starts=(8, 8))
     assert structure.basins.fraction(ESCAPED) > 0.1
     assert structure.basins.fraction(0) + structure.basins.fraction(ESCAPED) == pytest.approx(1.0)
@@ -375,10 +371,10 @@ def test_units_change_nothing(paper, length, rate):
 def test_a_symmetric_orbit_meets_both_stops_alike():
     """A force that damps is largest before the deepest point; the numbers are SciPy's (DOP853, 1e-12)."""
     law = vk.CustomLaw("k*depth + c*rate", k=100.0, c=2.0)
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
+    osc = scene(
+        vk.Barrier(law, 0.3, "right"),
+        vk.Barrier(law, -0.3, "left"),
         damping_ratio=0.02,
-        barriers=(vk.Barrier(law, 0.3, "right"), vk.Barrier(law, -0.3, "left")),
         excitations=(vk.Harmonic(0.5, 0.8),),
     )
     (orbit,) = vk.find_structure(osc, cells=(4, 4), starts=(6, 6), saddles=False).attractors

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.results.codes import Code
 from vibrokit.structure.known_motions import balances_of, known_motions
 from vibrokit.structure.regions import search_region
@@ -14,19 +15,25 @@ from vibrokit.structure.scales import length_of
 
 def beam(linear=1.0, cubic=-0.48, damping=0.009, force=0.007, frequency=0.84, unit=1.0):
     """The rotating cantilever of arXiv 2305.19459 by default; lengths in some unit (m)."""
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping / 2, spring=vk.CubicSpring(linear, cubic / unit**2),
+    return scene(
+        damping_ratio=damping / 2,
+        spring=vk.CubicSpring(linear, cubic / unit**2),
         excitations=(vk.Harmonic(force * unit, frequency),),
-    )  # fmt: skip
+    )
 
 
 def tube(hertz=58.0, *more):
     """A heat-exchanger tube between two stops (SI units)."""
     stops = tuple(vk.Barrier(vk.Linear(5.714286e6), s * 0.25e-3, n) for s, n in ((1, "right"), (-1, "left")))
-    return vk.Oscillator(
-        natural_frequency=250.7133, damping_ratio=0.008, barriers=stops,
+    return scene(
+        *stops,
+        natural_frequency=250.7133,
+        damping_ratio=0.008,
         excitations=(vk.Harmonic(17.142857, 2 * math.pi * hertz), *more),
-    )  # fmt: skip
+    )
+
+
+SMALL = {"cells": (10, 10), "starts": (8, 8), "saddles": False}
 
 
 @pytest.mark.parametrize(
@@ -87,9 +94,7 @@ def test_the_softening_beam_has_two_orbits_and_escape(unit):
 def test_both_cycles_of_a_birhythmic_oscillator_are_in_the_default_region():
     """Averaging: 2.639 and 4.840 stable, 3.962 unstable (Yamapi, Filatrella et al., doi 10.1063/1.4766678)."""
     force = "x - mu*(1 - x**2 + al*x**4 - be*x**6)*v"
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.0, spring=vk.CustomSpring(force, mu=0.1, al=0.144, be=0.005)
-    )
+    osc = scene(damping_ratio=0.0, spring=vk.CustomSpring(force, mu=0.1, al=0.144, be=0.005))
     found = vk.find_structure(osc, cells=(50, 50), manifolds=False)
     assert [one.orbit[:, 0].max() for one in found.attractors] == pytest.approx([2.63902, 4.83953], rel=1e-3)
     assert found.saddles[0].points[0, 0] == pytest.approx(3.96164, rel=1e-3)
@@ -106,14 +111,14 @@ def test_the_quiet_state_of_a_tube_is_found():
     assert len(found.attractors) == 5
 
 
-@pytest.mark.slow
-def test_a_region_that_is_too_small_is_said():
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring("x*(x - 3)*(x - 40)/120"))
-    found = vk.find_structure(osc, region=((-1.0, 4.0), (-1.0, 1.0)), cells=(30, 30), saddles=False)
+def test_an_attractor_outside_the_region_is_said():
+    """Over the top at 3 motion comes to rest at 40."""
+    osc = scene(damping_ratio=0.1, spring=vk.CustomSpring("x*(x - 3)*(x - 40)/120"))
+    found = vk.find_structure(osc, region=((-1.0, 4.0), (-1.0, 1.0)), **SMALL)
     (small,) = found.found(Code.REGION_TOO_SMALL)
     assert small.values["count"] == 1
     assert small.values["x_max"] > 40.0
-    wide = vk.find_structure(osc, cells=(30, 30), saddles=False)
+    wide = vk.find_structure(osc, **SMALL)
     assert sorted(round(float(one.points[0, 0]), 9) for one in wide.attractors) == [0.0, 40.0]
     assert not wide.found(Code.REGION_TOO_SMALL)
 
@@ -123,10 +128,7 @@ def test_a_region_that_is_too_small_is_said():
 def test_grazing_is_located_by_the_frequency_as_by_the_amplitude(law, frequency):
     """The clear orbit touches the stop at 1 where A² = (1 − ω²)² + (0.1 ω)², whatever the law."""
     amplitude = math.hypot(1 - frequency**2, 0.1 * frequency)
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(law, 1.0, "right"),),
-        excitations=(vk.Harmonic(amplitude, frequency),),
-    )  # fmt: skip
+    osc = scene(vk.Barrier(law, 1.0, "right"), damping_ratio=0.05, excitations=(vk.Harmonic(amplitude, frequency),))
     for parameter, there in (("frequency", frequency), ("amplitude", amplitude)):
         values = there * (1 + 0.02 * np.array([-1.53, -0.61, 0.37, 1.33]))
         found = vk.continuation(osc, parameter, values, cells=(8, 8), starts=(6, 6))
@@ -139,9 +141,7 @@ def test_a_structure_says_how_motion_without_an_attractor_ended():
     """Over the tops of the softening beam motion leaves for good; of an overdamped pendulum it ends at copies."""
     (beyond,) = vk.find_structure(beam(), cells=(30, 30), saddles=False).found(Code.FOLLOWED_ON)
     assert beyond.values["diverged"] == beyond.values["followed"] > 10
-    steep = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=1.0, spring=vk.CustomSpring("2*sin(x)"), excitations=(vk.Constant(1.8),)
-    )
+    steep = scene(damping_ratio=1.0, spring=vk.CustomSpring("2*sin(x)"), excitations=(vk.Constant(1.8),))
     found = vk.find_structure(steep, cells=(30, 30), saddles=False)
     (copies,) = found.found(Code.CELLS_AT_COPIES)
     assert copies.values["fraction"] > 0.1

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.results.manifold import ManifoldEnd
@@ -73,7 +74,7 @@ def _loop_length():
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 2.0])
 def test_a_linear_saddle_has_straight_lines_to_the_edge(ratio):
     """x″ + 2ζx′ − x = 0: v = λx with λ = −ζ ± √(ζ² + 1), to |x| = 3 or |v| = 3, the region widened by its size."""
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=ratio, spring=vk.CubicSpring(-1.0, 0.0))
+    osc = scene(damping_ratio=ratio, spring=vk.CubicSpring(-1.0, 0.0))
     for branch in grow_manifolds(osc, 0, saddle([0.0, 0.0]), region=SQUARE):
         rate = -ratio + (-1 if branch.stable else 1) * math.hypot(ratio, 1.0)
         x, v = branch.curve.T

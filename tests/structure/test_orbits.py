@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.structure.orbits import (
     Orbit,
@@ -19,10 +20,11 @@ from vibrokit.structure.orbits import (
 )
 
 ORDER8 = vk.Order8(tolerance=1e-12)
-DUFFING = vk.Oscillator(
-    natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(linear=1.0, cubic=0.3),
+DUFFING = scene(
+    damping_ratio=0.05,
+    spring=vk.CubicSpring(linear=1.0, cubic=0.3),
     excitations=(vk.Harmonic(amplitude=0.4, frequency=1.4),),
-)  # fmt: skip
+)
 
 
 def turned_steps(rates, count):

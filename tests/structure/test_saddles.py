@@ -67,7 +67,7 @@ def test_the_double_well_has_one_saddle_at_its_top():
 
 def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
     # Deviations grow by exp(2π · 4.5) = 2e12 in 2π/ω_n: what is 1e-10 apart is wells apart after it.
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.5, spring=vk.CubicSpring(linear=-25.0, cubic=25.0))
+    osc = scene(damping_ratio=0.5, spring=vk.CubicSpring(linear=-25.0, cubic=25.0))
     (saddle,), _ = saddles_of(osc, stable_orbits(osc, (-1, 0.1), (1, -0.1)), ((-2, 2), (-10, 10)), cells=(40, 40))
     np.testing.assert_allclose(saddle.points, [[0, 0]], atol=1e-10)
     np.testing.assert_allclose(saddle.exponents, hilltop(0.5, 25.0), rtol=1e-9)
@@ -77,11 +77,10 @@ def test_a_hilltop_too_fast_to_be_straddled_for_a_turn():
 @pytest.mark.slow
 def test_a_saddle_that_presses_on_a_stop():
     # A softening spring, x − x³, whose hilltop at x = 1 a weak stop at 0.9 moves outwards; beyond it the mass escapes.
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
+    osc = scene(
+        vk.Barrier(vk.Hertz(stiffness=1.0), position=0.9, side="right"),
         damping_ratio=0.1,
         spring=vk.CubicSpring(linear=1.0, cubic=-1.0),
-        barriers=(vk.Barrier(vk.Hertz(stiffness=1.0), position=0.9, side="right"),),
     )
     found, findings = saddles_of(osc, stable_orbits(osc, (0.1, 0)), ((-1.3, 1.3), (-1, 1)), cells=(60, 60), budget=200)
     top = brentq(lambda x: x - x**3 + (x - 0.9) ** 1.5, 1.0, 1.3, xtol=1e-15)
@@ -163,10 +162,7 @@ def test_the_duffing_oscillator_has_one_boundary_saddle():
 
 def test_a_weakly_damped_boundary_takes_long_to_reach_its_saddle():
     # An island of period 3 beside the small oscillation: its boundary closes in by exp(−0.02 · 2π/3.3) in a period.
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.01, spring=vk.CubicSpring(linear=1.0, cubic=0.2),
-        excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),),
-    )  # fmt: skip
+    osc = scene(spring=vk.CubicSpring(linear=1.0, cubic=0.2), excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),))
     structure = vk.find_structure(osc, manifolds=False)
     assert [attractor.period for attractor in structure.attractors] == [1, 1, 3]
     assert [(saddle.kind, saddle.period, set(saddle.leads_to)) for saddle in structure.saddles] == [
@@ -222,10 +218,7 @@ def test_the_paper_scene_has_one_boundary_saddle(stops):
 @pytest.mark.slow
 def test_an_unstable_limit_cycle_parts_rest_from_motion():
     # x″ + v (2ζ − a x² + b x⁴) + x = 0 averages to 2ζ/2 − a A²/8 + b A⁴/16 = 0 on its cycles (first order in these).
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.005,
-        spring=vk.CustomSpring("x + v*(-a*x**2 + b*x**4)", a=0.08, b=0.04),
-    )  # fmt: skip
+    osc = scene(damping_ratio=0.005, spring=vk.CustomSpring("x + v*(-a*x**2 + b*x**4)", a=0.08, b=0.04))
     inner, outer = np.sort(np.sqrt(np.roots([0.04 / 16, -0.08 / 8, 0.005])))
     exact = single_stepper(osc, Flow.STATE_VARIATIONAL)
     cycle = find_cycle(osc, osc.section_map([[outer, 0.0]], 200)[0], exact, longest=20.0)
@@ -294,10 +287,7 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
 @pytest.mark.slow
 def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
     """Nearer to the saddle of period 6, fixed steps across this stop have a stable orbit that the scene has not."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.03, barriers=(vk.Barrier(vk.Linear(1000.0), 0.2, "right"),),
-        excitations=(vk.Harmonic(0.4, 2.6),),
-    )  # fmt: skip
+    osc = scene(vk.Barrier(vk.Linear(1000.0), 0.2, "right"), damping_ratio=0.03, excitations=(vk.Harmonic(0.4, 2.6),))
     structure = vk.find_structure(osc, manifolds=False)
     periods = {attractor.period: attractor.label for attractor in structure.attractors}
     (saddle,) = (saddle for saddle in structure.saddles if saddle.period == 6)
@@ -309,9 +299,7 @@ def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
 def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_strip():
     """Nothing settles near a symmetric orbit with a multiplier of 1.008, so that the boundary cannot be followed."""
     stops = vk.Barrier(vk.Hertz(2000.0), 0.5, "right"), vk.Barrier(vk.Hertz(2000.0), -0.5, "left")
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.1, barriers=stops, excitations=(vk.Harmonic(0.4, 0.8),)
-    )  # fmt: skip
+    osc = scene(*stops, damping_ratio=0.1, excitations=(vk.Harmonic(0.4, 0.8),))
     structure = vk.find_structure(osc, manifolds=False, rng=0)
     (saddle,) = structure.saddles
     assert set(saddle.leads_to) == {0, 1}
@@ -336,10 +324,9 @@ def test_boundaries_that_an_edge_budget_is_too_small_for_are_named():
 def test_basins_that_a_saddle_connects_count_as_one_where_a_saddle_to_others_is_missing():
     """Two orbits in each of two wells: next to the hilltop, motion on the boundary of any pair ends inside a well."""
     damping, slope, force, frequency = 0.1, 5.0, 0.3, 2.5
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping, spring=vk.CubicSpring(-slope, slope),
-        excitations=(vk.Harmonic(force, frequency),),
-    )  # fmt: skip
+    osc = scene(
+        damping_ratio=damping, spring=vk.CubicSpring(-slope, slope), excitations=(vk.Harmonic(force, frequency),)
+    )
     structure = vk.find_structure(osc, cells=(100, 100), starts=(12, 12), manifolds=False, rng=0)
     assert [attractor.period for attractor in structure.attractors] == [1, 1, 1, 1]
     linear = force / (-slope - frequency**2 + 2j * damping * frequency)

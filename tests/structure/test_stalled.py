@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
@@ -20,11 +21,10 @@ LAW = vk.CustomLaw("k*depth + c*rate", k=1e11, c=6e3)
 def table(side):
     """A ball on a table: at rest it makes 5e4 oscillations of the contact in a period, which is 2e6 steps."""
     down = -1.0 if side == "left" else 1.0
-    return vk.Oscillator(
-        natural_frequency=1.0,
+    return scene(
+        vk.Barrier(LAW, 0.0, side),
         damping_ratio=0.0,
         spring=vk.LinearSpring(0.0),
-        barriers=(vk.Barrier(LAW, 0.0, side),),
         excitations=(vk.Constant(down), vk.Harmonic(0.78, 1.0)),
     )
 
@@ -62,7 +62,7 @@ def test_a_search_in_which_all_stall_says_so():
 @pytest.mark.slow
 def test_motion_to_infinity_in_a_finite_time_has_diverged():
     """x″ = −0.1 x′ − x + x³ beyond its tops at ±1; the steps of such motion become too many too."""
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CubicSpring(1.0, -1.0))
+    osc = scene(damping_ratio=0.05, spring=vk.CubicSpring(1.0, -1.0))
     found = vk.find_structure(osc, region=((-3.0, 3.0), (-3.0, 3.0)), cells=(20, 20), stepper=vk.Order8(1e-8))
     (diverged,) = found.found(Code.STARTS_DIVERGED)
     assert 0 < diverged.values["count"] < diverged.values["starts"]

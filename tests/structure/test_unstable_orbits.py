@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from tests.structure.stable import stable_orbits
 from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper
@@ -81,7 +82,7 @@ def test_a_classifier_finds_where_the_branches_lead():
 def test_equilibria_of_a_scene_without_forcing():
     # A spring with five equilibria, x (x² − 1) (x² − 4): those at ±1 are hilltops, the others wells.
     spring = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)")
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=spring)
+    osc = scene(damping_ratio=0.05, spring=spring)
     found = unstable_orbits(osc, 1, region=((-3, 3), (-3, 3)))
     np.testing.assert_allclose([orbit.points[0] for orbit in found], [[-1, 0], [1, 0]], atol=1e-12)
     rates = -0.05 + np.array([1, -1]) * np.sqrt(0.05**2 + 6)  # the slope of the spring there is −6
@@ -93,7 +94,7 @@ def test_equilibria_of_a_scene_without_forcing():
 def test_a_repeller():
     # x″ − μ (1 − x²) x′ + x = 0 leaves the origin spirally, at μ/2 ± i √(1 − μ²/4).
     spring = vk.CustomSpring("x + mu*(x**2 - 1)*v", mu=1.0)
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=spring)
+    osc = scene(damping_ratio=0.0, spring=spring)
     (orbit,) = unstable_orbits(osc, 1, region=((-3, 3), (-3, 3)), starts=(9, 9))
     assert orbit.kind == "repeller"
     np.testing.assert_allclose(orbit.points, [[0, 0]], atol=1e-12)
