@@ -7,6 +7,7 @@ and those of the constants above all, which `Stepper.driver_part` writes.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,12 +15,14 @@ from pathlib import Path
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
+@functools.cache
 def read_template(name: str) -> str:
     """Read a template without its docstring."""
     text = (_TEMPLATES / f"{name}.py").read_text(encoding="utf-8")
     return "\n".join(text.split("\n")[ast.parse(text).body[0].end_lineno :])
 
 
+@functools.lru_cache(maxsize=64)  # the drivers of many scenes are one text
 def with_needed_imports(text: str) -> str:
     """Gather the imports of all pieces where the first stands; names that nothing uses are left out."""
     tree = ast.parse(text)
