@@ -1,7 +1,7 @@
 # make demo   the main job on a bundled scene, in a virtual environment of its own
 # make test   style, types and layers (alone: make lint), and the tests of seconds (alone: make test-fast)
 # make test-slow   the tests that take longer; CI runs them too
-# make test-long   slow tests of half a minute each that CI leaves out: before a release, and after changes near to them
+# make test-long   slow tests of ten seconds and more that CI leaves out: before a release, and after changes near to them
 # make docs   the manual, in docs/_build/html
 # make clean  remove what these made
 
@@ -9,7 +9,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Python compiles a module when it is first imported; to compile all of them takes longer than to install them.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: demo test lint test-fast test-slow test-long docs clean
 
