@@ -22,6 +22,7 @@ from vibrokit.results.energy import Bound
 pytestmark = pytest.mark.slow
 
 BARRIER = 0.25  # of −x²/2 + x⁴/4
+WELLS = [0.01, 0.1, pytest.param(0.5, marks=pytest.mark.long), 2.0]  # their damping
 SMALL = vk.ActionGraph(nodes=(64, 64))
 
 
@@ -68,7 +69,7 @@ def misses(found, damping):
     return np.abs(values - 4 * damping * energy)[inside] / (4 * damping * BARRIER)
 
 
-@pytest.mark.parametrize("damping", [0.01, 0.1, 0.5, 2.0])
+@pytest.mark.parametrize("damping", WELLS)
 def test_barrier_of_the_double_well_by_default(damping):
     found = solved(damping)
     exact = 4 * damping * BARRIER
@@ -80,7 +81,7 @@ def test_barrier_of_the_double_well_by_default(damping):
     assert found.energies == found.estimates
 
 
-@pytest.mark.parametrize("damping", [0.01, 0.1, 0.5, 2.0])
+@pytest.mark.parametrize("damping", WELLS)
 def test_the_whole_well_by_default(damping):
     assert misses(solved(damping), damping).max() <= 0.02
 
@@ -124,7 +125,7 @@ def test_candidates_lead_from_the_attractor_over_the_exit_and_polish_to_the_barr
 # --- linear scene: Ψ = ½ δqᵀ Σ⁻¹ δq = 2ζω_n (ω_n² δx² + δv²), first touch 2ζω_n³ (b − max x_s)²
 
 STOP, AMPLITUDE, FREQUENCY = 1.0, 0.3, 0.57
-SCENES = [(0.05, 1.0), (0.5, 1.0), (2.0, 1.0), (0.05, 1.7)]
+SCENES = [(0.05, 1.0), pytest.param(0.5, 1.0, marks=pytest.mark.long), (2.0, 1.0), (0.05, 1.7)]
 
 
 @functools.cache
@@ -174,7 +175,7 @@ def test_first_touch_of_the_linear_scene(damping, natural):
     assert abs(energy.value - exact) <= energy.numerical_error
 
 
-@pytest.mark.parametrize("damping", [0.05, 0.5])
+@pytest.mark.parametrize("damping", [0.05, pytest.param(0.5, marks=pytest.mark.long)])
 def test_a_candidate_of_a_touch_touches_and_polishes(damping):
     osc, structure, clear, found = touching(damping)
     candidate, *_ = found.candidates
@@ -358,7 +359,7 @@ BOXES = [
 ]
 
 
-@pytest.mark.parametrize("scene", [(0.05, 1.0), (0.5, 1.7)])
+@pytest.mark.parametrize("scene", [(0.05, 1.0), pytest.param((0.5, 1.7), marks=pytest.mark.long)])
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_a_box_costs_what_its_cheapest_face_costs(scene, box):
     """2ζω_n³ b² for |x| = b, at rest; 2ζω_n c² for |v| = c, at x = 0."""

@@ -72,6 +72,7 @@ def test_starts_lie_on_the_quadratic_quasi_potential(paper):
     np.testing.assert_allclose(starts[:, -1], 0.02 * 1e-6, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_same_bits_on_every_run(paper, domain):
     again = vk.ActionPlot(points=3000, source=0).run(*paper)
     np.testing.assert_array_equal(again.data["action"], domain[0].data["action"])
@@ -256,6 +257,7 @@ def test_first_contact_of_the_linear_scene():
     assert energy.value - energy.numerical_error <= exact <= energy.upper
 
 
+@pytest.mark.slow
 def test_a_state_that_touches_without_noise_has_energy_zero(paper):
     osc, structure = paper
     result = vk.ActionPlot(points=300, rounds=0, exit=vk.FirstContact("right")).run(osc, structure)

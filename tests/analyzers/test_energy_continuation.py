@@ -38,6 +38,7 @@ def test_the_wells_of_a_potential_cost_what_they_must_at_any_damping(wells):
     assert wells.found(Code.ENERGY_BRANCHES)
 
 
+@pytest.mark.slow
 def test_the_cheapest_exit_changes_where_two_stops_are_equally_far():
     """Of a forced linear oscillator, ΔU = 2ζω_n³ (b ∓ f − A)² for stops at ±b under a force f: equal at f = 0."""
     amplitude, frequency, zeta = 0.1, 0.57, 0.1
@@ -60,6 +61,7 @@ def test_the_cheapest_exit_changes_where_two_stops_are_equally_far():
     assert finding.values["value"] == change.value
 
 
+@pytest.mark.slow
 def test_a_path_that_ends_is_said_to_end():
     """A constant force beyond 2/√27 leaves one well of −x²/2 + x⁴/4."""
     osc = WELLS.replace(excitations=(vk.Constant(0.3),))
@@ -188,6 +190,7 @@ def test_a_time_limit_before_the_first_path_leaves_an_incomplete_record(tmp_path
     assert vk.load_result(tmp_path / "c.nc").branches == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stopped_in", ["attractors", "action plot"])
 def test_an_interrupt_in_a_search_ends_the_work(stopped_in):
     """What is called keeps what it has and returns; nothing more may be searched for or followed after that."""

@@ -154,6 +154,7 @@ def test_escapes_end_in_the_other_core(result):
     assert np.isfinite(starts).any()
 
 
+@pytest.mark.slow
 def test_the_way_to_a_bound_is_a_motion():
     """Tests of the exit are closer than the states that are kept: x changes by the mean of the velocities."""
     osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=0.05))
@@ -201,15 +202,16 @@ def test_where_no_excursion_leaves_there_is_no_rate(structure, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("splitting", [False, True])
-def test_any_executor_gives_the_same_bits(splitting, structure):
+@pytest.mark.parametrize(
+    ("splitting", "pool"), [(False, futures.ThreadPoolExecutor), (True, futures.ProcessPoolExecutor)]
+)
+def test_any_executor_gives_the_same_bits(splitting, pool, structure):
     analyzer = vk.MFET(
         intensities=(0.05,), source=0, target_error=0.3, splitting=splitting, replicas=16, escapes=2, seed=5
     )
     alone = analyzer.run(WELL, structure)
-    for pool in (futures.ThreadPoolExecutor, futures.ProcessPoolExecutor):
-        with pool(2) as executor:
-            assert analyzer.run(WELL, structure, executor=executor).data.identical(alone.data)
+    with pool(2) as executor:
+        assert analyzer.run(WELL, structure, executor=executor).data.identical(alone.data)
 
 
 @pytest.mark.slow

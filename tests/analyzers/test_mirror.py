@@ -38,7 +38,12 @@ def both(kind):
 
 
 @pytest.mark.parametrize(
-    "kind", ["forced", "unforced", pytest.param("third harmonic", marks=[pytest.mark.slow, pytest.mark.long])]
+    "kind",
+    [
+        pytest.param("forced", marks=pytest.mark.slow),
+        "unforced",
+        pytest.param("third harmonic", marks=[pytest.mark.slow, pytest.mark.long]),
+    ],
 )
 def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     osc, structure = wells(kind)
@@ -53,6 +58,7 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     assert second.certificate.residual < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["forced", *OTHERS])
 def test_other_scenes_have_none(kind):
     """Whatever path is known, only in the symmetric scene is there a mirror image of it."""
@@ -78,6 +84,7 @@ def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():
     assert (image.source, image.target) == (right.label, left.label)
 
 
+@pytest.mark.slow
 def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
     spring = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/4")
     osc = vk.Oscillator(

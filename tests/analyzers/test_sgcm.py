@@ -54,7 +54,9 @@ def test_mean_exit_time_of_the_saddle_is_half_that_of_the_attractor(result):
     assert float(times.interp(x=0.0, v=0.0)) == pytest.approx(0.5 * rate.mean_time, rel=0.02)
 
 
-@pytest.mark.parametrize("pool", [futures.ThreadPoolExecutor, futures.ProcessPoolExecutor])
+@pytest.mark.parametrize(
+    "pool", [futures.ThreadPoolExecutor, pytest.param(futures.ProcessPoolExecutor, marks=pytest.mark.slow)]
+)
 def test_any_executor_gives_the_same_bits(pool, structure):
     analyzer = vk.SGCM(source=0, intensities=(2e-2,), nodes=(48, 48), steps=8)
     alone = analyzer.run(WELL, structure)
@@ -65,6 +67,7 @@ def test_any_executor_gives_the_same_bits(pool, structure):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_deeper_well_has_the_higher_barrier():
     tilted = double_well(noise=vk.WhiteNoise(intensity=1e-3), excitations=(vk.Constant(0.1),))
     structure = vk.find_structure(tilted, cells=(40, 40), manifolds=False, rng=0)
@@ -159,6 +162,7 @@ def test_too_little_memory(structure):
     assert "GiB" in failed.values["reason"]
 
 
+@pytest.mark.slow
 def test_noise_with_states_of_its_own(structure):
     coloured = WELL.replace(noise=Coloured(intensity=1e-3, rate=2.0))
     with pytest.raises(vk.errors.SceneError, match="3 dimensions"):
@@ -181,6 +185,7 @@ def left_by_position(noise, **exit_):
     return vk.SGCM(intensities=(1e-2,), exit=LeaveStrip(**exit_), nodes=(64, 64), steps=8).run(osc, structure)
 
 
+@pytest.mark.slow
 def test_an_equilibrium_alone_is_left_by_position():
     (rate,) = left_by_position(vk.WhiteNoise(intensity=1e-2)).rates
     assert rate.event == "contact"

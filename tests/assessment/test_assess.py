@@ -104,7 +104,7 @@ def test_a_second_result_of_a_method_stands_beside_the_first(calls):
     assert [name for name in found.results if name.startswith("mfet")] == ["mfet", "mfet 2"]
 
 
-@pytest.mark.parametrize("number", [1, 4])
+@pytest.mark.parametrize("number", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     ran, stop = calls
     path = tmp_path / "a.nc"
@@ -275,6 +275,7 @@ WELL = vk.Oscillator(
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_double_well_lasts_as_long_as_its_spectrum_says():
     """ΔU/D = 8, exact rate by the spectrum of the Klein–Kramers operator."""
     both = vk.assess(WELL, accuracy=0.3, time_limit=None, methods=["least-action", "sgcm"])

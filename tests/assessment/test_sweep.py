@@ -110,6 +110,7 @@ def between_stops(gap=0.3, zeta=0.1, **more):
     return scene(*stops, damping_ratio=zeta, excitations=(vk.Harmonic(0.1, 0.6),), **more)
 
 
+@pytest.mark.slow
 def test_linear_response_and_grazing_along_a_frequency_in_hertz():
     """The amplitude is that of the linear response, and grazing where it reaches the gap: a quadratic in ω²."""
     zeta, gap = 0.1, 0.3

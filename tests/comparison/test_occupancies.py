@@ -256,11 +256,12 @@ TUBE = vk.Oscillator(
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "analyzer",
     [
         vk.MFET(escapes=0, target_error=0.2, intensities=(4.0816e-3,)),
-        pytest.param(vk.SGCM(nodes=(160, 160), steps=64, intensities=(4.0816e-3,)), marks=pytest.mark.long),
+        vk.SGCM(nodes=(160, 160), steps=64, intensities=(4.0816e-3,)),
     ],
     ids=["MFET", "SGCM"],
 )

@@ -18,9 +18,9 @@ CERTIFIED = 1e-9  # residual
 SHOOTING = vk.Shooting(points=2000)
 
 
-def by_name(scenes, *names):
+def by_name(scenes, *names, marks=()):
     known = {scene.name: scene for scene in scenes}
-    return [pytest.param(known[name], id=name) for name in names]
+    return [pytest.param(known[name], id=name, marks=marks) for name in names]
 
 
 def structure_of(scene):
@@ -38,6 +38,10 @@ MILD = [
     *by_name(damped_wells(), *(f"double well, zeta={z:g}" for z in (0.01, 2.0))),
     *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
     *by_name(tilted_wells(), "tilted well, 0.001 from its fold"),
+]
+GRAZING = [
+    *by_name(first_contact("hertz"), *(f"first contact, hertz, gap {gap:g}" for gap in (1e-4, 1e-6))),
+    *by_name(first_contact("hertz"), "first contact, hertz, gap 0.01", marks=pytest.mark.long),
 ]
 STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05")
 
@@ -84,9 +88,7 @@ def test_wells_at_a_stiff_stop_are_certified_or_found_not_to_be(scene):
             check_certified(energy, exact)
 
 
-@pytest.mark.parametrize(
-    "scene", by_name(first_contact("hertz"), *(f"first contact, hertz, gap {d:g}" for d in (1e-2, 1e-4, 1e-6)))
-)
+@pytest.mark.parametrize("scene", GRAZING)
 def test_the_first_contact_of_an_orbit_near_grazing(scene):
     structure = vk.find_structure(
         scene.oscillator, region=scene.region, cells=(16, 16), starts=(4, 4), saddles=False, manifolds=False

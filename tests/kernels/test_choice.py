@@ -109,6 +109,7 @@ def test_noise_with_stops_too_stiff_for_any_step_warns():
         one_stop(vk.Linear(1e12)).section_map([[0.0, 0.0]], rng=0)
 
 
+@pytest.mark.slow
 def test_second_process_needs_no_sympy():
     lines = [
         "import sys",

@@ -58,6 +58,7 @@ print(json.dumps(digests))
 """
 
 
+@pytest.mark.long
 def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     """In a process that compiles its kernels, and in one that loads them."""
     environment = {**os.environ, "VIBROKIT_CACHE": str(tmp_path)}

@@ -103,7 +103,8 @@ def test_the_first_state_in_another_basin_is_that_of_simulated_trajectories():
     assert abs(found - simulated) <= crossed.log_error + 3 * standard_error
 
 
-@pytest.mark.parametrize("damping", [0.2, pytest.param(1.0, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("damping", [0.2, 1.0])
 def test_rates_of_a_double_well(damping):
     barrier = damping  # ΔU = 4ζ times the barrier of 1/4
     intensities = tuple(barrier / ratio for ratio in (8.0, 12.0, 16.0, 20.0, 25.0))

@@ -45,7 +45,7 @@ def test_the_limit_contains_the_certified_energy_if_the_target_is_not_metastable
         assert limit.lower <= energy <= limit.upper < 2 * energy
 
 
-@pytest.mark.parametrize(("length", "side"), [(1.0, "right"), (1e-3, "left")])
+@pytest.mark.parametrize(("length", "side"), [pytest.param(1.0, "right", marks=pytest.mark.long), (1e-3, "left")])
 def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side):
     """The clear state, ΔU/D = 10 and 20: its basin has 1.4 % of the cells of the region."""
     osc, simulated = one_sided(length, side), {4.2e-5: (12.96, 0.05), 2.1e-5: (23.41, 0.06)}  # by MFET, in periods
@@ -75,6 +75,7 @@ def test_rates_are_exact_wherever_states_are_committed(damping, depth, monkeypat
     assert committed[0] > committed[1] > committed[2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("length", "side"), [(1.0, "right"), (1e-3, "left")])
 def test_motion_beyond_the_region_of_the_structure_comes_back(length, side):
     """Between the states the mass is faster than in the region of the structure: what left it there was lost.
@@ -107,7 +108,14 @@ class Beyond(vk.LeaveRegion):
         return np.array([[-np.inf, self.place], [-np.inf, np.inf]])
 
 
-@pytest.mark.parametrize(("capacity", "current"), [(1.25, 0.9), (0.5, 0.9), (1.25, 0.7)])
+@pytest.mark.parametrize(
+    ("capacity", "current"),
+    [
+        (1.25, 0.7),
+        pytest.param(0.5, 0.9, marks=pytest.mark.long),
+        pytest.param(1.25, 0.9, marks=pytest.mark.long),
+    ],
+)
 def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
     """A current-biased Josephson junction, β φ″ + φ′ + sin φ = I: closed forms of ΔU and of Kramers' prefactor."""
     well = math.asin(current)
@@ -134,7 +142,7 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
     assert energy.value == pytest.approx(barrier, rel=0.01)
 
 
-@pytest.mark.parametrize("damping", [0.2, 1.0])
+@pytest.mark.parametrize("damping", [0.2, pytest.param(1.0, marks=pytest.mark.long)])
 def test_rates_of_states_that_do_not_last_are_those_of_simulations_all_the_same(damping):
     """Wells as deep as ΔU/D = 1 and 2, core to core: what counts as an exit decides the rate, and is no error of it."""
     osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))

@@ -59,7 +59,8 @@ def agree(found, right, deviations=3.0, formula=0.0):
     return abs(math.log(time / right)) <= deviations * error + formula
 
 
-@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.long)])
 def test_escape_from_the_only_well_is_that_of_kramers(sign):
     osc = softening(0.1, 6.0, sign)
     right = kramers_time(0.2, 1.0, 1.0, 1 / 6, 1 / 36, 0.2 * 6 / 5)
@@ -70,7 +71,10 @@ def test_escape_from_the_only_well_is_that_of_kramers(sign):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("damping_ratio", "ratio"), [(0.02, 6.0), (0.5, 8.0), (2.0, 6.0)])
+@pytest.mark.parametrize(
+    ("damping_ratio", "ratio"),
+    [(0.02, 6.0), pytest.param(0.5, 8.0, marks=pytest.mark.long), pytest.param(2.0, 6.0, marks=pytest.mark.long)],
+)
 def test_escape_at_weak_and_strong_damping(damping_ratio, ratio):
     osc = softening(damping_ratio, ratio)
     right = kramers_time(2 * damping_ratio, 1.0, 1.0, 1 / 6, 1 / 6 / ratio, 2 * damping_ratio * 6 / 5)
@@ -128,7 +132,7 @@ def test_escape_under_a_periodic_force():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("for_good", [True, False])
+@pytest.mark.parametrize("for_good", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_two_wells_of_which_one_is_also_left_by_escape(for_good):
     """Wells at 0 and 2, barriers at 1 and 3; density and simulation agree about both ways out of the second."""
     spring = vk.CustomSpring("-x*(x - 1)*(x - 2)*(x - 3)/6")
@@ -146,6 +150,7 @@ def test_two_wells_of_which_one_is_also_left_by_escape(for_good):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_pull_in_has_a_mean_time():
     """The actuator of tests/physics/test_pull_in.py at 450 V."""
     from tests.physics.test_pull_in import actuator, strength
@@ -205,6 +210,7 @@ def pendulum(damping, *excitations, intensity):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_running_pendulum_comes_to_rest():
     osc = pendulum(0.1, vk.Constant(0.2), intensity=0.04)
     structure = vk.find_structure(osc, **QUICK)

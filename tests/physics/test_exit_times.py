@@ -145,7 +145,10 @@ CONTACTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("drift", "more"), CONTACTS.values(), ids=CONTACTS)
+@pytest.mark.parametrize(
+    ("drift", "more"),
+    [pytest.param(*made, id=name, marks=[pytest.mark.long] * ("noise" in made[1])) for name, made in CONTACTS.items()],
+)
 def test_first_contact_of_a_linear_scene_is_that_of_the_exact_process(drift, more):
     """Samples of the exact linear process, tested 512 times in 2π: what happens in the stop does not matter."""
     osc = scene(**{"damping_ratio": 0.05, "noise": vk.WhiteNoise(intensity=0.02)} | more)

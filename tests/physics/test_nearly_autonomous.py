@@ -15,10 +15,8 @@ from tests.physics.reference_guesses import sampled
 
 pytestmark = pytest.mark.slow
 
-NAMES = (
-    "duffing, hardening", "duffing, softening", "duffing, weak forcing", "duffing, weakly damped",
-    "double well, forced",
-)  # fmt: skip
+NAMES = ("duffing, hardening", "duffing, weak forcing", "double well, forced")
+FURTHER = ("duffing, softening", "duffing, weakly damped")
 
 
 @functools.cache
@@ -37,7 +35,11 @@ def minimized(osc, structure, energy):
 
 @pytest.mark.parametrize(
     ("name", "label"),
-    [(name, 0) for name in NAMES] + [pytest.param(name, 1, marks=pytest.mark.long) for name in NAMES],
+    [
+        *((name, 0) for name in NAMES),
+        *(pytest.param(name, 1, marks=pytest.mark.long) for name in NAMES),
+        *(pytest.param(name, label, marks=pytest.mark.long) for name in FURTHER for label in (0, 1)),
+    ],
 )
 def test_each_state_is_certified_and_its_action_is_least(name, label):
     osc, structure = SCENES[name], structure_of(name)

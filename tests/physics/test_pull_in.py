@@ -49,12 +49,13 @@ def structure(voltage, mirrored=False):
     return osc, vk.find_structure(osc, **COARSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("voltage", "rest", "saddle", "energy"),
     [
         (400.0, 21.4231e-6, 85.7230e-6, 1.102786),
-        pytest.param(450.0, 32.4256e-6, 69.9493e-6, 0.2138763, marks=pytest.mark.slow),
-        pytest.param(300.0, 10.1922e-6, 106.8129e-6, 3.943319, marks=pytest.mark.slow),
+        (450.0, 32.4256e-6, 69.9493e-6, 0.2138763),
+        (300.0, 10.1922e-6, 106.8129e-6, 3.943319),
     ],
 )
 def test_one_state_and_its_escape_into_the_pole(voltage, rest, saddle, energy):
@@ -117,6 +118,7 @@ def test_pull_in_is_a_fold():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_switch_latches_before_the_pole():
     stiffness, stop = 1e10, 1.4e-4
     osc = actuator(400.0, barriers=(vk.Barrier(vk.Linear(stiffness), stop, "right"),))
@@ -184,6 +186,7 @@ def test_two_wells_between_the_poles_of_a_tangent():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_no_exit_leads_across_a_pole():
     """Behind the pole the formula has another state, which has no meaning for the motion before it."""
     osc = actuator(400.0)
@@ -195,6 +198,7 @@ def test_no_exit_leads_across_a_pole():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_rates_between_two_poles_agree():
     """By simulation and by the density, neither of which crosses a pole, and by symmetry."""
     osc = vk.Oscillator(

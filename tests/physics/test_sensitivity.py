@@ -100,14 +100,8 @@ def test_units_of_length_and_of_time_change_the_energy_of_the_paper_as_they_must
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "excitations.0.frequency",
-        pytest.param("barriers.0.law.stiffness", marks=pytest.mark.long),
-        pytest.param("damping_ratio", marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["excitations.0.frequency", "barriers.0.law.stiffness", "damping_ratio"])
 def test_differences_of_energies_solved_for_anew(hertz, name):
     """Central differences of two sizes, extrapolated; the energies are solved for from the search on."""
     osc, energy = hertz

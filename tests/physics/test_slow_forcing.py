@@ -155,7 +155,7 @@ def minimized(frequency, path, step):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frequency", SLOW)
+@pytest.mark.parametrize("frequency", [0.1, *(pytest.param(each, marks=pytest.mark.long) for each in (0.3, 0.05))])
 def test_minimized_directly_it_is_the_same(frequency):
     energy = energies(frequency)[0]
     coarse, fine = (minimized(frequency, energy.path, step) for step in (0.02, 0.01))

@@ -79,6 +79,7 @@ def test_what_leaves_a_running_state_is_refused(driven):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_mirrored_pendulum_runs_the_other_way():
     found = vk.find_structure(
         pendulum(vk.Constant(-0.25), force="-sin(k*x)/k", k=2.0), cells=(40, 40), manifolds=False

@@ -48,6 +48,7 @@ def test_a_region_contains_the_tops_of_a_softening_spring(cubic):
     assert not structure.found(Code.TOPS_OUTSIDE)
 
 
+@pytest.mark.slow
 def test_a_well_with_one_top_and_a_well_beyond_a_top():
     one_sided = found_in(shaken(polynomial(a=1.0, b=-1.0)))
     assert one_sided.region.x[0] < 0 < 1 < one_sided.region.x[1]
@@ -80,6 +81,7 @@ def test_a_mass_needs_the_speed_of_the_potential_to_reach_a_place():
     assert SteadyForce(shaken(polynomial(a=4.0))).speed_to_reach(-1.0, 3.0) == pytest.approx(6.0, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_libration_is_recorded_where_its_points_are():
     """A pendulum that came to rest after turns is listed within its region, with its orbit."""
     structure = found_in(shaken(vk.CustomSpring("sin(x)"), force=1e-3), cells=(20, 20), starts=(12, 12))
@@ -89,6 +91,7 @@ def test_a_libration_is_recorded_where_its_points_are():
     assert not structure.found(Code.TOPS_OUTSIDE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("k", "a", "n", "push"),
     [
@@ -130,8 +133,13 @@ def relaxing(name, friction=0.0):
     return scene(*barriers, damping_ratio=damping, spring=spring)
 
 
+FEW = [("double well", None), ("escape", None), ("pendulum", None), ("pressed", None), ("double well", 2)]
+MORE = [("tilted", None), ("three wells", None), ("overdamped", None), ("both sides", None), ("one well", None)]
+
+
 @pytest.mark.parametrize(
-    ("name", "margin"), [(name, None) for name in SCENES] + [("double well", 2), ("escape", 2), ("pressed", 2)]
+    ("name", "margin"),
+    [*FEW, *(pytest.param(*each, marks=pytest.mark.slow) for each in [*MORE, ("escape", 2), ("pressed", 2)])],
 )
 def test_basins_are_those_of_motion_that_is_followed(name, margin):
     quick, plain = relaxing(name), relaxing(name, 1e-14)  # too little friction to change the motion

@@ -131,6 +131,7 @@ def test_a_soft_stop_does_not_narrow_a_region():
     assert max(search_region(free).x) == length_of(free)
 
 
+@pytest.mark.slow
 def test_a_region_contains_every_attractor():
     """A mass that is pressed into a stop rests deeper than slow motions reach."""
     osc = vk.Oscillator(

@@ -63,6 +63,7 @@ def test_the_searches_of_the_command_hold_the_defaults():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_densities_on_more_nodes_take_more_memory_and_err_less():
     osc = double_well(noise=vk.WhiteNoise(intensity=1e-2))  # a fifth of ΔU: the cores hardly matter
     structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
@@ -75,6 +76,7 @@ def test_densities_on_more_nodes_take_more_memory_and_err_less():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_exit_times_err_by_what_is_estimated():
     """The chance of more than four standard errors is 6e-5."""
     osc = scene(damping_ratio=0.2, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(intensity=0.04))

@@ -20,6 +20,7 @@ REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"
 PAGES = sorted([README, *REPOSITORY.glob("docs/*.rst"), *REPOSITORY.glob("docs/how-to/*.rst")])
 QUICK = ("list", "equations", "check")  # commands of seconds at most; of the others the words are checked
+LONG = ("assess", "density", "exit-times", "least-action", "reconcile", "structure")  # their Python takes the longest
 
 
 def snippets(page, language):
@@ -39,7 +40,8 @@ def commands(page):
 
 def pages_with(language):
     """Pages that have snippets of a language."""
-    return [pytest.param(page, id=page.name) for page in PAGES if snippets(page, language)]
+    pages = [page for page in PAGES if snippets(page, language)]
+    return [pytest.param(page, id=page.name, marks=[pytest.mark.long] * (page.stem in LONG)) for page in pages]
 
 
 def run_python(page, folder):
