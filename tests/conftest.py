@@ -26,6 +26,13 @@ def clock(monkeypatch):
     return clock
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Put tutorials first: workers take the last tests from each other, and would run tutorials twice."""
+    """Count long tests among the slow ones, and put tutorials first.
+
+    Workers take the last tests from each other, and would run tutorials twice.
+    """
+    for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker("slow")
     items.sort(key=lambda item: item.path.name != "test_tutorials.py")

@@ -10,6 +10,7 @@ import pytest
 
 import vibrokit as vk
 from tests.analyzers.graph import linear
+from tests.layers import long
 from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.polishing.polish import polish
@@ -22,7 +23,7 @@ from vibrokit.results.energy import Bound
 pytestmark = pytest.mark.slow
 
 BARRIER = 0.25  # of −x²/2 + x⁴/4
-WELLS = [0.01, 0.1, pytest.param(0.5, marks=pytest.mark.long), 2.0]  # their damping
+WELLS = [0.01, 0.1, long(0.5), 2.0]  # their damping
 SMALL = vk.ActionGraph(nodes=(64, 64))
 
 
@@ -125,7 +126,7 @@ def test_candidates_lead_from_the_attractor_over_the_exit_and_polish_to_the_barr
 # --- linear scene: Ψ = ½ δqᵀ Σ⁻¹ δq = 2ζω_n (ω_n² δx² + δv²), first touch 2ζω_n³ (b − max x_s)²
 
 STOP, AMPLITUDE, FREQUENCY = 1.0, 0.3, 0.57
-SCENES = [(0.05, 1.0), pytest.param(0.5, 1.0, marks=pytest.mark.long), (2.0, 1.0), (0.05, 1.7)]
+SCENES = [(0.05, 1.0), long(0.5, 1.0), (2.0, 1.0), (0.05, 1.7)]
 
 
 @functools.cache
@@ -175,7 +176,7 @@ def test_first_touch_of_the_linear_scene(damping, natural):
     assert abs(energy.value - exact) <= energy.numerical_error
 
 
-@pytest.mark.parametrize("damping", [0.05, pytest.param(0.5, marks=pytest.mark.long)])
+@pytest.mark.parametrize("damping", [0.05, long(0.5)])
 def test_a_candidate_of_a_touch_touches_and_polishes(damping):
     osc, structure, clear, found = touching(damping)
     candidate, *_ = found.candidates
@@ -359,7 +360,7 @@ BOXES = [
 ]
 
 
-@pytest.mark.parametrize("scene", [(0.05, 1.0), pytest.param((0.5, 1.7), marks=pytest.mark.long)])
+@pytest.mark.parametrize("scene", [(0.05, 1.0), long((0.5, 1.7))])
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_a_box_costs_what_its_cheapest_face_costs(scene, box):
     """2ζω_n³ b² for |x| = b, at rest; 2ζω_n c² for |v| = c, at x = 0."""
@@ -432,7 +433,6 @@ def test_a_saddle_at_the_tip_of_a_basin_is_reached():
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_steps_become_shorter_than_a_stiff_contact():
     """Hertz stops of k = 1e4: 8 steps in a period give a quarter of the energy.
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.analyzers.agreement import compared
 from vibrokit.analyzers.paths.detailed_balance import least_actions, with_paths
 from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
@@ -84,7 +85,7 @@ def test_closed_forms(osc, source, exit_, climbs):
     assert found == {target: pytest.approx(4 * ZETA * climb, rel=1e-9) for target, climb in climbs.items()}
 
 
-@pytest.mark.parametrize("stiffness", [20.0, 1e6, pytest.param(1e12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stiffness", [20.0, 1e6, slow(1e12)])
 def test_wells_that_end_in_stiff_stops(stiffness):
     """Pressed against a stop at 0.9 by the force x − x³; the depth d solves k d^1.5 = x − x³ there."""
     _, found = least(stopped(vk.Hertz(stiffness)))

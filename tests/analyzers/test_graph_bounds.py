@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.analyzers.graph import tracing
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.whole_paths import whole_action
@@ -114,9 +115,7 @@ def wells(friction):
     return osc, vk.find_structure(osc, cells=(60, 60), starts=(8, 8), manifolds=False)
 
 
-@pytest.mark.parametrize(
-    ("friction", "right"), [(0.0, 0.5), pytest.param(0.1, 0.47525, marks=pytest.mark.long), (0.3, 0.4280)]
-)
+@pytest.mark.parametrize(("friction", "right"), [(0.0, 0.5), long(0.1, 0.47525), (0.3, 0.4280)])
 @pytest.mark.parametrize("source", [0, 1])
 def test_graph_and_action_plot_alone_agree_within_their_errors(friction, right, source):
     """0.5 by detailed balance; the others by a boundary value problem of Hamilton's equations, ±3e-4."""

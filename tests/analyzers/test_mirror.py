@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long, slow
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
@@ -40,9 +41,9 @@ def both(kind):
 @pytest.mark.parametrize(
     "kind",
     [
-        pytest.param("forced", marks=pytest.mark.slow),
+        slow("forced"),
         "unforced",
-        pytest.param("third harmonic", marks=[pytest.mark.slow, pytest.mark.long]),
+        long("third harmonic"),
     ],
 )
 def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):

@@ -9,6 +9,7 @@ import vibrokit as vk
 from tests.assessment.test_assessment import BARRIERS, SCENE, STRUCTURE, rated
 from tests.builders import energy
 from tests.klein_kramers import double_well_rate
+from tests.layers import slow
 from vibrokit.analyzers.settings import settings_of
 from vibrokit.assessment.road import barrier, ladder
 from vibrokit.errors import ParameterError, SceneError, StructureError, UnknownNameError, VibrokitError
@@ -104,7 +105,7 @@ def test_a_second_result_of_a_method_stands_beside_the_first(calls):
     assert [name for name in found.results if name.startswith("mfet")] == ["mfet", "mfet 2"]
 
 
-@pytest.mark.parametrize("number", [1, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [1, slow(4)])
 def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     ran, stop = calls
     path = tmp_path / "a.nc"
@@ -128,7 +129,7 @@ def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     assert which(ran) == [PATHS, *BOTH]
 
 
-@pytest.mark.parametrize("number", [1, 5])
+@pytest.mark.parametrize("number", [1, slow(5)])
 def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
     ran, stop = calls
     stop.append(-number)
@@ -274,7 +275,6 @@ WELL = vk.Oscillator(
 )
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_double_well_lasts_as_long_as_its_spectrum_says():
     """ΔU/D = 8, exact rate by the spectrum of the Klein–Kramers operator."""

@@ -9,11 +9,12 @@ from scipy import stats
 
 import vibrokit as vk
 from tests.brute_force import STOP, WELL
+from tests.layers import long
 from vibrokit.assessment.assessment import Assessment
 
 pytestmark = pytest.mark.slow
 
-RUNS = [4000, pytest.param(100_000, marks=pytest.mark.long)]
+RUNS = [4000, long(100_000)]
 LADDERS = {WELL: (0.11, 0.08, 0.06), STOP: (0.011, 0.008, 0.006)}
 SURE = 3.0  # standard errors of the simulated runs, of which there are some twenty numbers
 

@@ -255,7 +255,6 @@ TUBE = vk.Oscillator(
 )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(
     "analyzer",

@@ -173,7 +173,6 @@ def test_false_alarms_come_as_often_as_the_level_says(kind, sizes):
     )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_false_alarms_of_whole_results_come_as_often_as_the_level_says():
     """The same of results of MFET and SGCM, of energies, and of shares of time."""

@@ -85,7 +85,6 @@ def test_both_gaps_of_the_paper():
     assert found["gaps"].energy == pytest.approx(math.log(moved[0] / moved[1]) / math.log(1.001 / 0.999), rel=5e-4)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_gaps_of_a_heat_exchanger_tube():
     """ΔU goes like gap^5.9. It also goes like the square of a length by which gaps and forces are scaled together."""

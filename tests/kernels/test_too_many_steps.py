@@ -6,6 +6,7 @@ import math
 import pytest
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.errors import IntegrationError, TooManyStepsError
 
 
@@ -26,9 +27,7 @@ def test_friction_that_nearly_jumps_is_named(formula):
     assert all(map(math.isfinite, caught.value.state))
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "damping", "tolerance"), [pytest.param(1e8, 5105.0, 1e-12, marks=pytest.mark.slow), (1e9, 2e4, 1e-11)]
-)
+@pytest.mark.parametrize(("stiffness", "damping", "tolerance"), [slow(1e8, 5105.0, 1e-12), (1e9, 2e4, 1e-11)])
 def test_rest_on_a_stiff_table_is_followed(stiffness, damping, tolerance):
     """A mass that rests on a shaken table moves as a linear oscillator; rounding where v = 0 leaves no step short."""
     law = vk.CustomLaw("k*depth + c*rate", k=stiffness, c=damping)

@@ -54,7 +54,6 @@ def test_the_bounds_are_those_that_the_package_declares():
     assert TESTED[0] <= version_info.short < TESTED[1]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_under_a_numba_that_was_not_tested_kernels_compile_by_public_interfaces(here, tmp_path):
     found, warned = ends(sys.executable, tmp_path, UNTESTED)
@@ -62,7 +61,6 @@ def test_under_a_numba_that_was_not_tested_kernels_compile_by_public_interfaces(
     np.testing.assert_allclose(found, here, rtol=1e-10, atol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("bound", ["oldest", "newest"])
 def test_a_scene_runs_under(bound, here, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 import vibrokit as vk
 from tests.klein_kramers import double_well_rate
+from tests.layers import long
 from tests.scenes import scene
 from vibrokit.analyzers.sgcm import cores
 from vibrokit.results.codes import Code
@@ -30,7 +31,7 @@ def one_sided(length, side):
 @pytest.mark.parametrize(
     ("length", "side", "depths"),
     [
-        pytest.param(1.0, "right", (4, 8, 12, 16, 20), marks=pytest.mark.long),
+        long(1.0, "right", (4, 8, 12, 16, 20)),
         (1.0, "right", (6, 20)),
         (1e-3, "left", (6, 20)),
     ],
@@ -45,7 +46,7 @@ def test_the_limit_contains_the_certified_energy_if_the_target_is_not_metastable
         assert limit.lower <= energy <= limit.upper < 2 * energy
 
 
-@pytest.mark.parametrize(("length", "side"), [pytest.param(1.0, "right", marks=pytest.mark.long), (1e-3, "left")])
+@pytest.mark.parametrize(("length", "side"), [long(1.0, "right"), (1e-3, "left")])
 def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side):
     """The clear state, ΔU/D = 10 and 20: its basin has 1.4 % of the cells of the region."""
     osc, simulated = one_sided(length, side), {4.2e-5: (12.96, 0.05), 2.1e-5: (23.41, 0.06)}  # by MFET, in periods
@@ -112,8 +113,8 @@ class Beyond(vk.LeaveRegion):
     ("capacity", "current"),
     [
         (1.25, 0.7),
-        pytest.param(0.5, 0.9, marks=pytest.mark.long),
-        pytest.param(1.25, 0.9, marks=pytest.mark.long),
+        long(0.5, 0.9),
+        long(1.25, 0.9),
     ],
 )
 def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
@@ -142,7 +143,7 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
     assert energy.value == pytest.approx(barrier, rel=0.01)
 
 
-@pytest.mark.parametrize("damping", [0.2, pytest.param(1.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("damping", [0.2, long(1.0)])
 def test_rates_of_states_that_do_not_last_are_those_of_simulations_all_the_same(damping):
     """Wells as deep as ΔU/D = 1 and 2, core to core: what counts as an exit decides the rate, and is no error of it."""
     osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))

@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import quad
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.results.basins import ESCAPED
 
 QUICK = {"cells": (60, 60), "starts": (8, 8), "manifolds": False}
@@ -60,7 +61,7 @@ def agree(found, right, deviations=3.0, formula=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("sign", [1, long(-1)])
 def test_escape_from_the_only_well_is_that_of_kramers(sign):
     osc = softening(0.1, 6.0, sign)
     right = kramers_time(0.2, 1.0, 1.0, 1 / 6, 1 / 36, 0.2 * 6 / 5)
@@ -73,7 +74,7 @@ def test_escape_from_the_only_well_is_that_of_kramers(sign):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("damping_ratio", "ratio"),
-    [(0.02, 6.0), pytest.param(0.5, 8.0, marks=pytest.mark.long), pytest.param(2.0, 6.0, marks=pytest.mark.long)],
+    [(0.02, 6.0), long(0.5, 8.0), long(2.0, 6.0)],
 )
 def test_escape_at_weak_and_strong_damping(damping_ratio, ratio):
     osc = softening(damping_ratio, ratio)
@@ -132,7 +133,7 @@ def test_escape_under_a_periodic_force():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("for_good", [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.parametrize("for_good", [True, long(False)])
 def test_two_wells_of_which_one_is_also_left_by_escape(for_good):
     """Wells at 0 and 2, barriers at 1 and 3; density and simulation agree about both ways out of the second."""
     spring = vk.CustomSpring("-x*(x - 1)*(x - 2)*(x - 3)/6")
@@ -149,7 +150,6 @@ def test_two_wells_of_which_one_is_also_left_by_escape(for_good):
         assert abs(one.log_value - other.log_value) <= 3 * math.hypot(one.log_error, other.log_error)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_pull_in_has_a_mean_time():
     """The actuator of tests/physics/test_pull_in.py at 450 V."""
@@ -186,7 +186,6 @@ WASHBOARDS = {  # β, I, and the right mean time at ΔU/D = 8: StochasticDiffEq.
 }
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize(("beta", "tilt", "intensity", "right"), WASHBOARDS.values(), ids=WASHBOARDS)
 @pytest.mark.parametrize("sign", [1, -1])
@@ -209,7 +208,6 @@ def pendulum(damping, *excitations, intensity):
     )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_running_pendulum_comes_to_rest():
     osc = pendulum(0.1, vk.Constant(0.2), intensity=0.04)
@@ -233,7 +231,6 @@ def test_a_running_pendulum_comes_to_rest():
         assert agree(found, right, formula=0.1)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_rotating_states_of_a_forced_pendulum_are_left_alike():
     """They rotate in opposite directions, and are mirror images of each other."""

@@ -9,6 +9,7 @@ from scipy import integrate, stats
 
 import vibrokit as vk
 from tests.klein_kramers import double_well_rate
+from tests.layers import long
 from tests.scenes import Coloured, scene
 from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.mfet.importance import from_distances
@@ -37,7 +38,7 @@ def rate_at(osc, structure, ratio, **settings):
     return rate
 
 
-@pytest.fixture(scope="module", params=[0.2, pytest.param(1.0, marks=pytest.mark.long)])
+@pytest.fixture(scope="module", params=[0.2, long(1.0)])
 def scene_and_structure(request):
     osc = well(request.param)
     return osc, vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
 from vibrokit.results.codes import Code
@@ -279,7 +280,7 @@ def test_the_graph_resolves_small_islands_around_an_orbit_of_period_3():
     assert energy.numerical_error < 0.1 * energy.value
 
 
-@pytest.mark.parametrize("source", [0, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("source", [0, long(1)])
 def test_minimised_once_more_it_stays(polished, source):
     """∫ ½ (x″ + 2ζx′ + …)² dt brought to its minimum, with a grid and ends of its own, from the polished path."""
     energy, model = polished.energies[source], reference.paper(0.570)

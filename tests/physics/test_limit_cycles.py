@@ -12,6 +12,7 @@ import pytest
 import scipy.integrate
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.polish import polish
 from vibrokit.analyzers.problem import ExitProblem
@@ -91,7 +92,7 @@ def test_sensitivities_are_the_derivatives_of_the_closed_form():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", [0, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("source", [0, long(1)])
 def test_least_action_certifies_both(source):
     osc, structure = self_excited()
     (energy,) = vk.LeastAction(source=source, **QUICK).run(osc, structure).energies
@@ -101,7 +102,6 @@ def test_least_action_certifies_both(source):
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_first_contact_from_the_cycle():
     osc, structure = self_excited(stops=True)
     (energy,) = vk.LeastAction(source=1, exit=vk.FirstContact(), **QUICK).run(osc, structure).energies
@@ -116,7 +116,6 @@ def test_shots_from_rest_reach_the_cycle_although_they_pass_its_boundary_slowly(
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_energy_is_followed_along_a_parameter():
     osc, _ = self_excited()
     values, analyzer = np.linspace(OUTER, 1.1, 3), vk.LeastAction(source="cycle", **QUICK)

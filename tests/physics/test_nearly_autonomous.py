@@ -10,6 +10,7 @@ import pytest
 import vibrokit as vk
 from tests.benchmarks.action_minimized import SAMPLES, model_of
 from tests.benchmarks.gallery import SCENES
+from tests.layers import long
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
 
@@ -37,8 +38,8 @@ def minimized(osc, structure, energy):
     ("name", "label"),
     [
         *((name, 0) for name in NAMES),
-        *(pytest.param(name, 1, marks=pytest.mark.long) for name in NAMES),
-        *(pytest.param(name, label, marks=pytest.mark.long) for name in FURTHER for label in (0, 1)),
+        *(long(name, 1) for name in NAMES),
+        *(long(name, label) for name in FURTHER for label in (0, 1)),
     ],
 )
 def test_each_state_is_certified_and_its_action_is_least(name, label):

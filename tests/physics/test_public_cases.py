@@ -19,7 +19,6 @@ def test_trajectories(name):
     assert_met(name, 60.0)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in CASES if not brief(name)])
 def test_whole_scenes(name):

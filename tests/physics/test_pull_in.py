@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 
@@ -117,7 +118,6 @@ def test_pull_in_is_a_fold():
     assert fold.point[0] == pytest.approx(GAP / 3, rel=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_switch_latches_before_the_pole():
     stiffness, stop = 1e10, 1.4e-4
@@ -161,8 +161,8 @@ def test_a_comb_between_two_poles():
     ("formula", "rest"),
     [
         ("x - 2 - 0.5*x**-1.5", lambda x: x - 2 - 0.5 * x**-1.5),  # of all starts none can pass x = 0
-        pytest.param("x - 2 - 0.5/x**3", lambda x: x - 2 - 0.5 / x**3, marks=pytest.mark.slow),
-        pytest.param("0.2*(x - 2) + log(x)", lambda x: 0.2 * (x - 2) + math.log(x), marks=pytest.mark.slow),
+        slow("x - 2 - 0.5/x**3", lambda x: x - 2 - 0.5 / x**3),
+        slow("0.2*(x - 2) + log(x)", lambda x: 0.2 * (x - 2) + math.log(x)),
     ],
 )
 def test_all_motion_settles_on_one_side_of_a_wall(formula, rest):
@@ -185,7 +185,6 @@ def test_two_wells_between_the_poles_of_a_tangent():
     assert found.basins.region.x == pytest.approx((-0.5 * math.pi, 0.5 * math.pi))
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_no_exit_leads_across_a_pole():
     """Behind the pole the formula has another state, which has no meaning for the motion before it."""
@@ -197,7 +196,6 @@ def test_no_exit_leads_across_a_pole():
     assert result.energies[0].value == pytest.approx(1.102786, rel=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_rates_between_two_poles_agree():
     """By simulation and by the density, neither of which crosses a pole, and by symmetry."""
@@ -238,17 +236,10 @@ def settled(spring):
     ("formula", "values", "spring", "borders"),
     [
         ("x - b/(1-x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2, (-math.inf, 1.0)),
-        pytest.param(
-            "x + b/(1+x)**2", {"b": 0.05}, lambda x: x + 0.05 / (1 + x) ** 2, (-1.0, math.inf), marks=pytest.mark.slow
-        ),
-        pytest.param(
-            "x - b/(1-x)**2 + b/(1+x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2 + 0.05 / (1 + x) ** 2,
-            (-1.0, 1.0), marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "x - b/sqrt(1-x)", {"b": 0.2}, lambda x: x - 0.2 / math.sqrt(1 - x), (-math.inf, 1.0),
-            marks=pytest.mark.slow,
-        ),
+        slow("x + b/(1+x)**2", {"b": 0.05}, lambda x: x + 0.05 / (1 + x) ** 2, (-1.0, math.inf)),
+        slow("x - b/(1-x)**2 + b/(1+x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2 + 0.05 / (1 + x) ** 2,
+            (-1.0, 1.0)),
+        slow("x - b/sqrt(1-x)", {"b": 0.2}, lambda x: x - 0.2 / math.sqrt(1 - x), (-math.inf, 1.0)),
     ],
 )  # fmt: skip
 def test_a_weak_force_shows_nothing_behind_a_border(formula, values, spring, borders):

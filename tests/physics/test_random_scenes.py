@@ -224,14 +224,12 @@ def check_block(seeds, examples, *, limit):
     test()
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("block", range(20))
 def test_a_thousand_structures(block):
     check_block(range(50 * block, 50 * block + 50), 50, limit=False)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("block", range(10))
 def test_a_time_limit_holds(block):

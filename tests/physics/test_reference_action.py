@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.layers import long
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import blended, known_sections, pieced
 
@@ -39,7 +40,7 @@ def test_cut_off_and_grid_of_the_double_well():
     assert actions[0] > actions[1] > actions[2] >= 0.1 * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("frequency", [0.570, pytest.param(0.525, marks=pytest.mark.long)])
+@pytest.mark.parametrize("frequency", [0.570, long(0.525)])
 def test_clear_states(frequency):
     """From guesses that know nothing of the path."""
     model, source, target = (reference.paper(frequency), *ends(frequency, "clear"))

@@ -99,7 +99,6 @@ def test_units_of_length_and_of_time_change_the_energy_of_the_paper_as_they_must
     assert energy.sensitivity["excitations.0.phase"] == pytest.approx(0, abs=1e-5 * energy.value)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["excitations.0.frequency", "barriers.0.law.stiffness", "damping_ratio"])
 def test_differences_of_energies_solved_for_anew(hertz, name):

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import spsolve
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.analyzers.paths import slow_relaxation
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import pieces_of
@@ -108,7 +109,6 @@ def test_where_they_take_too_many_steps_there_are_no_guesses(monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_slower_forcing_costs_as_much_as_the_lowest_barrier():
     """4 ζ ω_n ΔV, with the barrier of the greatest force; both wells are mirror images half a period apart."""
     well, hilltop, _ = rests(TILT)
@@ -155,7 +155,7 @@ def minimized(frequency, path, step):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("frequency", [0.1, *(pytest.param(each, marks=pytest.mark.long) for each in (0.3, 0.05))])
+@pytest.mark.parametrize("frequency", [0.1, *(long(each) for each in (0.3, 0.05))])
 def test_minimized_directly_it_is_the_same(frequency):
     energy = energies(frequency)[0]
     coarse, fine = (minimized(frequency, energy.path, step) for step in (0.02, 0.01))
@@ -163,7 +163,6 @@ def test_minimized_directly_it_is_the_same(frequency):
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_the_graph_certifies_it():
     (energy,) = vk.LeastAction(source="left").run(scene(0.05), structure(0.05)).energies
     assert energy.bound is Bound.CERTIFIED

@@ -70,7 +70,6 @@ def contents(folder):
     return [one.to_dataset().drop_attrs() for one in records], ([one.findings for one in records], energies, pictures)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_work_that_was_killed_goes_on_with_the_same_bits(tmp_path):
     whole, again, rng = tmp_path / "whole", tmp_path / "again", np.random.default_rng(1)

@@ -113,7 +113,6 @@ def test_a_file_that_cannot_be_written_is_found_before_any_work(tmp_path):
     assert not (tmp_path / STEPS[0].file).exists()
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_the_paper_in_short(tmp_path):
     report = reproduce(tmp_path, quick=True)

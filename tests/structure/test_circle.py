@@ -78,7 +78,6 @@ def test_what_leaves_a_running_state_is_refused(driven):
     assert any("turns over" in str(finding) for finding in result.findings)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_mirrored_pendulum_runs_the_other_way():
     found = vk.find_structure(
@@ -155,7 +154,6 @@ def test_a_libration_is_listed_in_the_turn_of_its_region(turns):
     assert math.remainder(librating + 2.407661, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_a_forced_pendulum_librates_or_rotates_either_way():
     osc = pendulum(vk.Harmonic(1.66, 1.0), damping=0.2)

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.layers import long
 from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.structure.attractors.describe import describe_orbit
@@ -220,7 +221,7 @@ BIRHYTHMIC = "w2*x - mu*(1 - x**2 + al*x**4 - be*x**6)*v"
     ("mu", "al", "be", "starts"),
     [
         # A turn takes 2π(1 + 2e-7), so that motion nearly repeats after 2π.
-        pytest.param(0.002, 0.083, 0.0014, (24, 24), marks=pytest.mark.long),
+        long(0.002, 0.083, 0.0014, (24, 24)),
         (0.002, 0.144, 0.005, (10, 10)),
         (0.0005, 0.144, 0.005, (10, 10)),  # the cycle between these has the multiplier 1.0013
     ],

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long, slow
 from tests.scenes import scene
 from vibrokit.results.basins import UNSETTLED
 from vibrokit.results.codes import Code
@@ -96,8 +97,8 @@ def test_a_libration_is_recorded_where_its_points_are():
     ("k", "a", "n", "push"),
     [
         (1.0, 8.0, 3.0, 0.0),  # the outermost wells are 0.13 wide
-        pytest.param(1e3, 8.0, 3e3, 0.0, marks=pytest.mark.slow),
-        pytest.param(1.0, 12.0, 4.0, 1.0, marks=pytest.mark.slow),
+        long(1e3, 8.0, 3e3, 0.0),
+        (1.0, 12.0, 4.0, 1.0),
     ],
 )
 def test_all_wells_of_the_region_that_tops_widen_are_found(k, a, n, push):
@@ -139,7 +140,7 @@ MORE = [("tilted", None), ("three wells", None), ("overdamped", None), ("both si
 
 @pytest.mark.parametrize(
     ("name", "margin"),
-    [*FEW, *(pytest.param(*each, marks=pytest.mark.slow) for each in [*MORE, ("escape", 2), ("pressed", 2)])],
+    [*FEW, *(slow(*each) for each in [*MORE, ("escape", 2), ("pressed", 2)])],
 )
 def test_basins_are_those_of_motion_that_is_followed(name, margin):
     quick, plain = relaxing(name), relaxing(name, 1e-14)  # too little friction to change the motion

@@ -296,7 +296,6 @@ def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_an_orbit_that_motion_leaves_slower_than_the_budget_is_found_in_its_strip():
     """Nothing settles near a symmetric orbit with a multiplier of 1.008, so that the boundary cannot be followed."""
     stops = vk.Barrier(vk.Hertz(2000.0), 0.5, "right"), vk.Barrier(vk.Hertz(2000.0), -0.5, "left")

@@ -62,7 +62,6 @@ def test_the_searches_of_the_command_hold_the_defaults():
     assert [one for one in SEARCHES if one == type(one)()] == [vk.ActionPlot(), vk.ActionGraph()]
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_densities_on_more_nodes_take_more_memory_and_err_less():
     osc = double_well(noise=vk.WhiteNoise(intensity=1e-2))  # a fifth of ΔU: the cores hardly matter
@@ -75,7 +74,6 @@ def test_densities_on_more_nodes_take_more_memory_and_err_less():
     assert trade.reference.estimated < 0.1
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_exit_times_err_by_what_is_estimated():
     """The chance of more than four standard errors is 6e-5."""

@@ -196,7 +196,6 @@ def test_exits_of_about_one_cost_share_their_grids():
 
 
 @pytest.mark.long
-@pytest.mark.slow
 @pytest.mark.parametrize("leaves", [vk.LeaveBasin(), vk.LeaveBasin(to=0)], ids=["to any", "to one"])
 def test_small_islands_in_a_wide_region_are_resolved(leaves):
     """An orbit of period 2 in a forced double well is left for 9.129e-5, and other exits cost up to 30 times as much.
