@@ -98,6 +98,7 @@ def test_wells_that_end_in_stiff_stops(stiffness):
     assert found == {1: pytest.approx(-4 * ZETA * well, rel=1e-8)}
 
 
+@pytest.mark.slow
 def test_least_action_needs_no_other_search():
     osc = stopped(vk.Hertz(1e4))
     structure = vk.find_structure(osc, rng=0, manifolds=False)

@@ -42,7 +42,7 @@ def averaged(mu, alpha, beta):
     return between - small, between - large
 
 
-@pytest.mark.parametrize("nodes", [60, 90])
+@pytest.mark.parametrize("nodes", [60, long(90)])
 @pytest.mark.parametrize(("source", "right"), [("small-cycle", 0.0523), ("large-cycle", 0.037736)])
 def test_the_interval_contains_the_energy_of_a_weakly_damped_cycle(source, right, nodes):
     """The right values are polished ones; averaging gives 0.0524 and 0.0378."""

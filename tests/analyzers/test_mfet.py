@@ -251,6 +251,7 @@ SCRIPT = """
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_killed_at_any_moment_it_goes_on_with_the_same_bits(structure, tmp_path):
     """Killed at 3 moments, which also fall into writing; then it is resumed, and the result is that of no pause."""
     structure.save(tmp_path / "structure.nc")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import long, slow
+from tests.layers import long
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code
@@ -38,14 +38,8 @@ def both(kind):
     return LEAST.run(*wells(kind))
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        slow("forced"),
-        "unforced",
-        long("third harmonic"),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["forced", "unforced", long("third harmonic")])
 def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     osc, structure = wells(kind)
     first, second = both(kind).energies
@@ -60,7 +54,7 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["forced", *OTHERS])
+@pytest.mark.parametrize("kind", ["forced", "noise", *map(long, ("one stop", "second harmonic"))])
 def test_other_scenes_have_none(kind):
     """Whatever path is known, only in the symmetric scene is there a mirror image of it."""
     osc, structure = wells(kind)

@@ -127,6 +127,7 @@ def test_passing_a_saddle_may_cost_less_than_passing_the_attractor():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_with_forcing_too():
     osc = triple_well(0.2, excitations=(vk.Harmonic(0.05, 0.8),))
     structure = vk.find_structure(osc, cells=(60, 60), starts=(8, 8), manifolds=False)

@@ -9,7 +9,7 @@ import vibrokit as vk
 from tests.assessment.test_assessment import BARRIERS, SCENE, STRUCTURE, rated
 from tests.builders import energy
 from tests.klein_kramers import double_well_rate
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.analyzers.settings import settings_of
 from vibrokit.assessment.road import barrier, ladder
 from vibrokit.errors import ParameterError, SceneError, StructureError, UnknownNameError, VibrokitError
@@ -105,7 +105,8 @@ def test_a_second_result_of_a_method_stands_beside_the_first(calls):
     assert [name for name in found.results if name.startswith("mfet")] == ["mfet", "mfet 2"]
 
 
-@pytest.mark.parametrize("number", [1, slow(4)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, long(4)])
 def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     ran, stop = calls
     path = tmp_path / "a.nc"
@@ -129,7 +130,8 @@ def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     assert which(ran) == [PATHS, *BOTH]
 
 
-@pytest.mark.parametrize("number", [1, slow(5)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, long(5)])
 def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
     ran, stop = calls
     stop.append(-number)
@@ -142,7 +144,8 @@ def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
     assert which(ran) == [[PATHS, *BOTH][number - 1]]
 
 
-@pytest.mark.parametrize("number", [1, 4])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, long(4)])
 def test_a_finer_assessment_that_was_stopped_keeps_the_coarser_one(calls, tmp_path, number):
     ran, stop = calls
     path = tmp_path / "a.nc"

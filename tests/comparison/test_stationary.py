@@ -20,6 +20,7 @@ def wells():
     return vk.SGCM(intensities=(0.02,), nodes=(80, 80), steps=40).run(osc, structure)
 
 
+@pytest.mark.slow
 def test_density_of_the_double_well_is_the_one_of_boltzmann(wells):
     found = vk.StationaryDensity.of(wells, nodes=(81, 81))
     np.testing.assert_allclose(found.occupancies.values, [[0.5, 0.5]], rtol=0.01)

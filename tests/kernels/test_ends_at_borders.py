@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.layers import slow
 from tests.scenes import scene
 from vibrokit.errors import IntegrationError
 from vibrokit.kernels.ensemble import run_ensemble
@@ -147,7 +148,7 @@ def test_section_maps_name_the_pole():
 
 
 @pytest.mark.parametrize("stepper", [vk.RK4(64), vk.Order8(1e-10)], ids=named)
-@pytest.mark.parametrize("amplitude", ["sqrt(c - x**2)", "sqrt(c - x**2)*exp(x/9)"])
+@pytest.mark.parametrize("amplitude", ["sqrt(c - x**2)", slow("sqrt(c - x**2)*exp(x/9)")])
 def test_noise_has_no_covariance_and_no_action_where_it_is_not_real(stepper, amplitude):
     osc = scene(noise=vk.StateDependentNoise(1e-3, amplitude, c=0.5))
     inside, beyond, out = [0.1, 0.1], [1.2, 0.0], [0.5, 3.0]  # out: it crosses the edge within the time

@@ -54,6 +54,7 @@ def test_order_in_hamiltons_equations(extremals, kind, steps, order, least):
     np.testing.assert_allclose(-np.diff(np.log2(errors)), order, atol=order / 8)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_flow():
     """Of many equations, whose stages are computed in another way."""
     module = kernel_for(DUFFING, Flow.HAMILTONIAN_VARIATIONAL, vk.RK8(64)).module

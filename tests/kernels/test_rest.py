@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -31,7 +31,7 @@ def ball(stiffness, damping, side, adhesive=False):
     [
         (1e4, 0.074355, "left", False),
         (1e6, 0.074355, "right", False),
-        slow(1e8, 0.074355, "left", False),
+        long(1e8, 0.074355, "left", False),
         (1e6, 0.3, "left", True),
         (1e6, 1.5, "right", False),
     ],

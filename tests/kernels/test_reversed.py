@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from vibrokit_hunt_crossley import HuntCrossley
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.structure.manifolds import FlowMap
@@ -102,6 +103,7 @@ class Coloured(vk.NoiseModel):
         return (-self.rate * y + v / 5,)
 
 
+@pytest.mark.slow
 def test_states_of_the_noise_run_backwards_too():
     osc = scene(excitations=(), noise=Coloured(intensity=1e-3, rate=0.4))
     matrix = expm(-osc.section_interval * np.array([[0.0, 1.0, 0.0], [-1.0, -0.04, 1.0], [0.0, 0.2, -0.4]]))
@@ -143,7 +145,7 @@ def test_located_contacts(name):
         assert errors.max() < 1e4 * tolerance  # near grazing
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", ["hertz", "jumping", *map(slow, ("linear", "damping", "adhesive"))])
 def test_fixed_steps_converge_as_they_do_forwards(name):
     law, adhesive, order = LAWS[name]
     osc = scene(law, adhesive)

@@ -46,7 +46,8 @@ def test_the_limit_contains_the_certified_energy_if_the_target_is_not_metastable
         assert limit.lower <= energy <= limit.upper < 2 * energy
 
 
-@pytest.mark.parametrize(("length", "side"), [long(1.0, "right"), (1e-3, "left")])
+@pytest.mark.long
+@pytest.mark.parametrize(("length", "side"), [(1.0, "right"), (1e-3, "left")])
 def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side):
     """The clear state, ΔU/D = 10 and 20: its basin has 1.4 % of the cells of the region."""
     osc, simulated = one_sided(length, side), {4.2e-5: (12.96, 0.05), 2.1e-5: (23.41, 0.06)}  # by MFET, in periods

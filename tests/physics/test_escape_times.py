@@ -118,6 +118,7 @@ def simulated(force, damping, intensity, start, has_left, count=2000, step=0.01,
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_escape_under_a_periodic_force():
     osc = vk.Oscillator(
         natural_frequency=1.0, damping_ratio=0.1, spring=vk.CubicSpring(1.0, -1.0), noise=vk.WhiteNoise(0.02),

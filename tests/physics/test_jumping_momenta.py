@@ -150,6 +150,7 @@ def test_derivatives_are_those_of_the_flow(adhesive, start):
     assert np.abs(matrix.T @ SYMPLECTIC @ matrix - SYMPLECTIC).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_fixed_steps_have_the_derivatives_without_momentum_only():
     """There to first order of the step, 1e-4, times the rate of the stop: the slope of its force jumps."""
     stop, steps = vk.Barrier(vk.Linear(K), -WALL, "left"), vk.RK4(65536)

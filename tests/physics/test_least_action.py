@@ -139,8 +139,8 @@ MISSED = pytest.param(
     (2.0,), marks=pytest.mark.xfail(strict=True, reason="shots at strong damping reach one stop only")
 )
 TOUCHES = [
-    (0.01,), (0.1,), (0.5,), (1.0,), MISSED, (0.05, 1.7), (0.05, 1.0, 0.1, 0.8),
-    (0.2, 1.0, 0.1, 1.3), (0.1, 1.0, 0.2, 0.4, -0.1),
+    (0.1,), (1.0,), MISSED, (0.05, 1.0, 0.1, 0.8), (0.1, 1.0, 0.2, 0.4, -0.1),
+    long((0.01,)), long((0.5,)), long((0.05, 1.7)), long((0.2, 1.0, 0.1, 1.3)),
 ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long, slow
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 
@@ -55,8 +55,8 @@ def structure(voltage, mirrored=False):
     ("voltage", "rest", "saddle", "energy"),
     [
         (400.0, 21.4231e-6, 85.7230e-6, 1.102786),
-        (450.0, 32.4256e-6, 69.9493e-6, 0.2138763),
-        (300.0, 10.1922e-6, 106.8129e-6, 3.943319),
+        long(450.0, 32.4256e-6, 69.9493e-6, 0.2138763),
+        long(300.0, 10.1922e-6, 106.8129e-6, 3.943319),
     ],
 )
 def test_one_state_and_its_escape_into_the_pole(voltage, rest, saddle, energy):

@@ -134,13 +134,14 @@ def relaxing(name, friction=0.0):
     return scene(*barriers, damping_ratio=damping, spring=spring)
 
 
-FEW = [("double well", None), ("escape", None), ("pendulum", None), ("pressed", None), ("double well", 2)]
-MORE = [("tilted", None), ("three wells", None), ("overdamped", None), ("both sides", None), ("one well", None)]
-
-
 @pytest.mark.parametrize(
     ("name", "margin"),
-    [*FEW, *(slow(*each) for each in [*MORE, ("escape", 2), ("pressed", 2)])],
+    [
+        *((name, None) for name in ("double well", "escape", "pendulum", "pressed")),
+        ("double well", 2),
+        *map(slow, ("tilted", "escape", "pressed"), (None, 2, 2)),
+        *(long(name, None) for name in ("three wells", "overdamped", "both sides", "one well")),
+    ],
 )
 def test_basins_are_those_of_motion_that_is_followed(name, margin):
     quick, plain = relaxing(name), relaxing(name, 1e-14)  # too little friction to change the motion

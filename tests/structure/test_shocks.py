@@ -45,6 +45,7 @@ def test_the_wells_mirror_each_other(well):
     assert left.basin_fraction == right.basin_fraction
 
 
+@pytest.mark.slow
 def test_a_fatal_kick_is_fatal_and_a_smaller_one_is_not(paper):
     osc, structure = paper
     for stability in vk.shape_stability(osc, structure, phases=4, directions=16):

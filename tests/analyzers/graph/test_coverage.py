@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.analyzers.graph import value_iteration
 from vibrokit.analyzers.graph.coverage import WholeRegion
 from vibrokit.analyzers.graph.grids import Grids
@@ -35,7 +35,8 @@ def problem(which):
     return ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
 
 
-@pytest.mark.parametrize("which", ["cuts the basin", slow("leaves the saddle out")])
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["cuts the basin", long("leaves the saddle out")])
 def test_grids_reach_beyond_the_region_where_a_known_path_does(which):
     states = np.array([[-0.5, 0.0], [1.0, 0.0]])
     path = ExitPath(np.arange(2.0), states, np.zeros((2, 2)), np.array([0.0, EXACT]), np.array([0, 1]))
