@@ -20,24 +20,20 @@ from vibrokit.plots.axes import axes_or_new
 from vibrokit.progress import Stats
 from vibrokit.registry import Group
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.attractor import Attractor
+from vibrokit.results.attractor import Attractor, Survival
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
-from vibrokit.results.bifurcation import Bifurcation
 from vibrokit.results.codes import Code
-from vibrokit.results.continuation import Continuation
+from vibrokit.results.continuation import Bifurcation, Continuation, SteadyStates
 from vibrokit.results.data import joined as joined_data
 from vibrokit.results.energy import ActivationEnergy, Bound, Certificate, ExitPath
 from vibrokit.results.finding import Finding
 from vibrokit.results.least_action import LeastActionResult
-from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.record import Record
 from vibrokit.results.region import Region
 from vibrokit.results.result import Result
-from vibrokit.results.saddle import Saddle
+from vibrokit.results.saddle import Manifold, ManifoldEnd, Saddle
 from vibrokit.results.section import Section
-from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.structure import Structure
-from vibrokit.results.survival import Survival
 
 REGION = Region((-0.75, 0.8), (-1 / 3, 0.1 + 0.2))
 SCENE = {

@@ -18,8 +18,8 @@ from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 from vibrokit.results.finding import Finding
 from vibrokit.results.least_action import LeastActionResult
-from vibrokit.results.merging import merged, part_of
 from vibrokit.results.mfet import MFETResult
+from vibrokit.results.one_scene import merged, part_of
 from vibrokit.results.sgcm import SGCMResult
 
 D = np.array([4e-5, 2e-5, 1.2e-5])

@@ -9,7 +9,7 @@ import vibrokit as vk
 from tests.scenes import double_well
 from vibrokit.comparison.quantities import Kind
 from vibrokit.comparison.verdicts import Agreement
-from vibrokit.results.merging import part_of
+from vibrokit.results.one_scene import part_of
 
 
 @pytest.fixture(scope="module")

@@ -27,11 +27,9 @@ from vibrokit import registry
 from vibrokit.errors import UnknownNameError
 from vibrokit.registry import Group, names
 from vibrokit.results.codes import Code, Severity
-from vibrokit.results.files import ResultFileError
+from vibrokit.results.files import PlainRecord, ResultFileError, nested, records_in
 from vibrokit.results.finding import Finding
-from vibrokit.results.nested import nested, records_in
 from vibrokit.results.pictures import save_figure
-from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 

@@ -12,8 +12,7 @@ import vibrokit as vk
 from tests.scenes import scene
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Stop, run_ensemble
-from vibrokit.results.manifold import ManifoldEnd
-from vibrokit.results.saddle import Saddle
+from vibrokit.results.saddle import ManifoldEnd, Saddle
 from vibrokit.structure.curves import Domain, Limits, grow
 from vibrokit.structure.manifolds import grow_manifolds
 from vibrokit.structure.orbits import refine_orbit

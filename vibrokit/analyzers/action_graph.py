@@ -10,8 +10,8 @@ from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.action_graph import ActionGraphResult
 from vibrokit.results.energy import Bound
+from vibrokit.results.least_action import ActionGraphResult
 from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable
 

@@ -8,8 +8,8 @@ from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import FINDER
 from vibrokit.analyzers.shooting.shooting import Shooting
-from vibrokit.results.action_plot import ActionPlotResult
 from vibrokit.results.energy import Bound
+from vibrokit.results.least_action import ActionPlotResult
 from vibrokit.results.result import Result
 
 

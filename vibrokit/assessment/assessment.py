@@ -27,9 +27,9 @@ from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.files import nested, records_in
 from vibrokit.results.labels import goal_of, label_of
-from vibrokit.results.merging import analyzed_labels, part_of
-from vibrokit.results.nested import nested, records_in
+from vibrokit.results.one_scene import analyzed_labels, part_of
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure

@@ -14,9 +14,8 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.comparison.reconcile import numbered
 from vibrokit.errors import StructureError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.comparable import check_comparable, check_scene, differences
 from vibrokit.results.files import load_result
-from vibrokit.results.merging import analyzed_labels, part_of
+from vibrokit.results.one_scene import analyzed_labels, check_comparable, check_scene, differences, part_of
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section

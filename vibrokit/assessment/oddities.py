@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from vibrokit.results.sentenced import Sentenced
+from vibrokit.results.codes import Sentenced
 
 
 class OddityCode(Sentenced):

@@ -18,7 +18,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Work, stage
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
-from vibrokit.results.merging import merged, part_of
+from vibrokit.results.one_scene import merged, part_of
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure

@@ -19,9 +19,9 @@ from vibrokit.comparison.verdicts import Verdict
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, StructureError, shown
 from vibrokit.results.codes import Code
-from vibrokit.results.comparable import check_comparable
 from vibrokit.results.files import load_result
 from vibrokit.results.finding import Finding
+from vibrokit.results.one_scene import check_comparable
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from vibrokit.comparison.quantities import Kind
 from vibrokit.documented import documented
+from vibrokit.results.codes import Sentenced
 from vibrokit.results.labels import exit_between
 from vibrokit.results.rated import HELD, METASTABLE
-from vibrokit.results.sentenced import Sentenced
 
 
 class Agreement(Sentenced):

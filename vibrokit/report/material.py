@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from vibrokit.assessment.assessment import Assessment
 from vibrokit.comparison.reconcile import numbered
 from vibrokit.errors import ArgumentError, shown
-from vibrokit.results.comparable import check_comparable, check_scene
+from vibrokit.results.one_scene import check_comparable, check_scene
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.section import Section

@@ -23,8 +23,8 @@ from vibrokit.report.tables import (
     sensitivity_table,
 )
 from vibrokit.results.codes import Severity
+from vibrokit.results.files import PlainRecord
 from vibrokit.results.finding import Finding, together
-from vibrokit.results.plain import PlainRecord
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure

@@ -11,13 +11,13 @@ from vibrokit.errors import StructureError
 from vibrokit.reproduction.published import STATES, Method, Published, paper, published_energies, target_of
 from vibrokit.reproduction.steps import METHODS, Records
 from vibrokit.results.arrhenius import ArrheniusFit
+from vibrokit.results.codes import Sentenced
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
-from vibrokit.results.merging import merged
+from vibrokit.results.one_scene import merged
 from vibrokit.results.rated import RatedResult
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
-from vibrokit.results.sentenced import Sentenced
 from vibrokit.results.sgcm import SGCMResult
 
 _SAMPLES = 1e9  # the states of a simulation that fills a histogram, at most

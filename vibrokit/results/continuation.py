@@ -11,22 +11,69 @@ import xarray
 from numpy.typing import NDArray
 
 from vibrokit.construction import called
+from vibrokit.documented import documented
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor, attractor_variables, read_attractors
 from vibrokit.results.basins import UNSETTLED, read_region, region_variables
-from vibrokit.results.bifurcation import Bifurcation
-from vibrokit.results.fields import LARGEST, Field, Number, Variable, Whole, Word
+from vibrokit.results.fields import LARGEST, STATE, Field, Length, Number, Variable, Vectors, Whole, Word
+from vibrokit.results.finding import Finding
 from vibrokit.results.labels import label_of
 from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
 from vibrokit.results.region import Region
-from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
     from vibrokit.plots.bifurcation import BifurcationArtists, FractionArtists
+
+
+@documented
+@dataclasses.dataclass(frozen=True, eq=False)
+class SteadyStates:
+    """The steady states at one value of the parameter.
+
+    Orbits are thinned to some 1000 samples; basin fractions are NaN if the work was stopped before them.
+    """
+
+    value: Annotated[float, "of the parameter"]
+    attractors: Annotated[tuple[Attractor, ...], "labelled by their places"]
+    branches: Annotated[tuple[int, ...], "the branch that each attractor belongs to"]
+    findings: Annotated[tuple[Finding, ...], "what was found and what was not, or why nothing was found"] = ()
+
+
+_KIND = Word(
+    '"fold", where the branch turns back; "pitchfork or transcritical", where another branch crosses it; "period '
+    'doubling", "Neimark–Sacker", "Hopf"; "grazing", where one more turn of the orbit touches a stop, leaves it or '
+    "lets go of it, or an equilibrium does",
+    known=("fold", "pitchfork or transcritical", "period doubling", "Neimark–Sacker", "Hopf", "grazing"),
+)
+_ERROR = Number(
+    "change of the value when the integration is tightened; half the interval if it is only known to lie between two "
+    "values; the distance of the nearest orbit if it can be approached from one side only",
+    "", 0.0, LARGEST,
+)  # fmt: skip
+_POINT = Vectors("a point of the orbit there, on the section", length=Length("point", "points"), columns=STATE)
+_SIDE = Word("side of the stop that is grazed; empty for other kinds", known=("", "left", "right"))
+
+
+@documented
+@dataclasses.dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """A value of the parameter at which a branch of steady states changes in kind."""
+
+    kind: Annotated[str, _KIND]
+    value: Annotated[float, Number("value of the parameter", "", -LARGEST, LARGEST)]
+    error: Annotated[float, _ERROR]
+    branch: Annotated[int, "number of the branch"]
+    period: Annotated[int, Whole("period in forcing periods, 1 for motion without them; before it doubles", low=1)]
+    point: Annotated[NDArray[np.float64], _POINT]
+    side: Annotated[str, _SIDE] = ""
+
+    def __str__(self) -> str:
+        side = f" at the {self.side} stop" if self.side else ""
+        return f"{self.kind}{side} of branch {self.branch} at {self.value:.8g} ± {self.error:.1g}"
 
 
 @dataclasses.dataclass(frozen=True)

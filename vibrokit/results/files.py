@@ -1,24 +1,91 @@
-"""load_result: opens a saved record."""
+"""Opens saved records: alone, inside another record, and of a kind that no installed package registers."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
 
 import xarray
 
 from vibrokit.arguments import path_of
 from vibrokit.construction import called
-from vibrokit.errors import NoSuchFileError, ResultFileError, UnknownNameError, nearest_form, reason, shown
+from vibrokit.errors import NoSuchFileError, ResultFileError, UnknownNameError, counted, nearest_form, reason, shown
 from vibrokit.registry import Group, load
-from vibrokit.results.arrays import taken
+from vibrokit.results.arrays import Arrays, taken
+from vibrokit.results.codes import Code
+from vibrokit.results.energy import ActivationEnergy, read_energies
+from vibrokit.results.finding import Finding
 from vibrokit.results.netcdf import arrays_in, opened
-from vibrokit.results.plain import PlainRecord
-from vibrokit.results.provenance import FORMAT, provenance_from
+from vibrokit.results.provenance import FORMAT, json_data, json_text, provenance_from
 from vibrokit.results.record import Record
+from vibrokit.results.summary import Summary
 
 __all__ = ["ResultFileError", "load_result", "record_from"]
+
+
+class PlainRecord(Record):
+    """The arrays and the provenance of a file whose kind is unknown here."""
+
+    kind: ClassVar[str] = "plain"
+
+    dataset: Annotated[xarray.Dataset, "the arrays"]
+    unknown_kind: Annotated[str, "the kind that the file names"]
+    content: Annotated[bytes, "of the file, saved again as it is; empty for a part of another record"] = b""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the attractors, if the file has them in the usual place."""
+        try:
+            return tuple(Arrays(self.dataset).words("attractor_name", (None,)))
+        except ResultFileError:
+            return ()
+
+    @property
+    def energies(self) -> tuple[ActivationEnergy, ...]:
+        """Activation energies, if the file has them in the usual place."""
+        try:
+            return read_energies(Arrays(self.dataset), len(self.names))[0]
+        except ResultFileError:
+            return ()
+
+    @called
+    def plot(self, ax: Any = None) -> Any:
+        """Raise UnknownNameError: only the package that registers the kind can draw it."""
+        raise UnknownNameError(
+            f"there is no picture of kind {self.unknown_kind!r}: no installed package registers it; install the "
+            "package that wrote the file, or draw the arrays in its dataset."
+        )
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the arrays."""
+        return self.dataset
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Provenance as plain data, with the kind that the file names."""
+        return super().provenance | {"kind": self.unknown_kind}
+
+    def _content(self) -> bytes:
+        return self.content or super()._content()
+
+    @classmethod
+    def from_dataset(
+        cls, dataset: xarray.Dataset, *, unknown_kind: str = "", findings: tuple[Finding, ...] = (), **provenance: Any
+    ) -> Self:
+        """Make a record of arrays, of the name of their kind, and of the content of their file."""
+        unknown = Finding.of(Code.UNKNOWN_KIND, kind=unknown_kind)
+        known = findings if unknown in findings else (*findings, unknown)
+        return cls(dataset=dataset, unknown_kind=unknown_kind, findings=known, **provenance)
+
+    @property
+    def summary(self) -> Summary:
+        """The unknown kind and the arrays."""
+        arrays = [(str(name), " × ".join(map(str, array.shape))) for name, array in self.dataset.data_vars.items()]
+        title = f"PlainRecord of unknown kind {self.unknown_kind!r}: {counted(len(arrays), 'array')}"
+        return Summary(title, tuple(arrays))
+
 
 _NO_WRITER = "Give a file written by save."
 
@@ -86,3 +153,34 @@ def _advice(header: Any) -> str:
     except ResultFileError:
         return _NO_WRITER
     return f"It was written by vibrokit {writer}: open it with that version, or compute it again."
+
+
+_CONTENTS = "records"  # attribute: names of the records, in the order of their prefixes
+
+
+def nested(records: Mapping[str, Record]) -> xarray.Dataset:
+    """Return the arrays of several records, by name, as one dataset; raises ResultFileError."""
+    whole = xarray.Dataset(attrs={_CONTENTS: json_text(list(records))})
+    for number, record in enumerate(records.values()):
+        own = record.to_dataset()
+        if own.attrs:
+            raise ResultFileError(f"a {type(record).__name__} with attributes of its own cannot be part of a record")
+        prefixed = own.rename({name: f"r{number}_{name}" for name in {*own.variables, *own.dims}})
+        whole = whole.assign(prefixed.data_vars).assign_coords(prefixed.coords)
+        whole.attrs[f"r{number}_provenance"] = json_text(record.provenance)
+    return whole
+
+
+def records_in(dataset: xarray.Dataset) -> dict[str, Record]:
+    """Return the records that `nested` put together; raises ResultFileError."""
+    names = json_data(dataset.attrs.get(_CONTENTS))
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ResultFileError(f"its records are {shown(names)}, and a list of names is needed")
+    found = {}
+    for number, name in enumerate(names):
+        prefix = f"r{number}_"
+        own = dataset[[one for one in dataset.variables if str(one).startswith(prefix)]]
+        own = own.rename({one: str(one).removeprefix(prefix) for one in {*own.variables, *own.dims}})
+        own.attrs = {}
+        found[name] = record_from(own, json_data(dataset.attrs.get(f"{prefix}provenance")))
+    return found

@@ -14,8 +14,8 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import grid_variables, read_grid
 from vibrokit.results.fields import Variable
-from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region, centres
+from vibrokit.results.saddle import Manifold
 from vibrokit.results.structure import Structure
 from vibrokit.results.table import Table, fields_of
 

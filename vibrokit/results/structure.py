@@ -9,15 +9,13 @@ import xarray
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.attractor import Attractor, attractor_variables, read_attractors
+from vibrokit.results.attractor import Attractor, Survival, attractor_variables, read_attractors
 from vibrokit.results.basins import Basins, grid_variables, read_grid
 from vibrokit.results.labels import label_of
-from vibrokit.results.manifold import Manifold
 from vibrokit.results.record import Record
 from vibrokit.results.region import Region
-from vibrokit.results.saddle import Saddle
+from vibrokit.results.saddle import Manifold, Saddle
 from vibrokit.results.summary import Summary
-from vibrokit.results.survival import Survival
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:

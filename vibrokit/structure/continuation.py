@@ -21,10 +21,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, current, put_off, stage, working
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
-from vibrokit.results.continuation import Continuation
+from vibrokit.results.continuation import Continuation, SteadyStates
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
-from vibrokit.results.steady_states import SteadyStates
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.scene_file import scene_data
 from vibrokit.structure.attractors.names import labelled, order_of

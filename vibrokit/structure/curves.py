@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.results.manifold import ManifoldEnd
+from vibrokit.results.saddle import ManifoldEnd
 
 MARGIN = 1.0
 """Fraction of its width and height by which a region is widened on every side; beyond that a curve is outside."""

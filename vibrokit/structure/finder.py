@@ -21,8 +21,8 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, UNSETTLED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
-from vibrokit.results.manifold import Manifold
 from vibrokit.results.region import Region
+from vibrokit.results.saddle import Manifold
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data

@@ -28,9 +28,8 @@ from vibrokit.kernels.tasks import carry
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance
-from vibrokit.results.manifold import Manifold, ManifoldEnd
 from vibrokit.results.region import Region
-from vibrokit.results.saddle import Saddle
+from vibrokit.results.saddle import Manifold, ManifoldEnd, Saddle
 from vibrokit.structure.autonomous import refine_equilibrium
 from vibrokit.structure.curves import Domain, Limits, grow
 from vibrokit.structure.newton import Evaluation, newton

@@ -15,12 +15,11 @@ from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import report, stage
-from vibrokit.results.attractor import Attractor
+from vibrokit.results.attractor import Attractor, Survival
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.results.region import Region
-from vibrokit.results.survival import Survival
 from vibrokit.structure.along_x import shifted, turn_of, wrapped
 from vibrokit.structure.attractors.describe import describe_orbit, describe_wandering, is_cycle
 from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_exponent, separate, watch

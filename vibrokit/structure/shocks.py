@@ -18,8 +18,7 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, advance, stage, working
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.basins import UNSETTLED
-from vibrokit.results.shock import ShapeStability, Shock
+from vibrokit.results.basins import UNSETTLED, ShapeStability, Shock
 from vibrokit.results.structure import Structure
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.validation import check_belongs, check_means

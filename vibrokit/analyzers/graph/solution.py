@@ -90,7 +90,7 @@ class GraphSolution:
     def dataset(self) -> xarray.Dataset:
         """Return the potential on the section, and the cheapest path.
 
-        The variables are those of `vibrokit.results.action_graph.ActionGraphResult`, without ``source``.
+        The variables are those of `vibrokit.results.least_action.ActionGraphResult`, without ``source``.
         """
         nodes, values = self.potential.on_section()
         known = np.where(values < self.potential.ceiling, values, np.nan)

@@ -14,9 +14,8 @@ from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
-from vibrokit.results.attractor import Attractor
+from vibrokit.results.attractor import Attractor, Survival
 from vibrokit.results.basins import UNSETTLED
-from vibrokit.results.survival import Survival
 from vibrokit.structure.along_x import turns_to, wrapped
 from vibrokit.structure.attractors.wandering import LyapunovEstimate
 from vibrokit.structure.autonomous import equilibrium_exponents

@@ -19,8 +19,8 @@ from vibrokit.kernels.ensemble import Stop
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, REACHED, STALLED
 from vibrokit.oscillator import Oscillator
+from vibrokit.results.attractor import Survival
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED
-from vibrokit.results.survival import Survival
 from vibrokit.structure.along_x import wrapped
 from vibrokit.structure.basins.landings import followed
 from vibrokit.structure.linear_map import linear_map

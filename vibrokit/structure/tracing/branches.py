@@ -17,8 +17,8 @@ from vibrokit.kernels.stepper import Stepper
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
-from vibrokit.results.bifurcation import Bifurcation
 from vibrokit.results.codes import Code
+from vibrokit.results.continuation import Bifurcation
 from vibrokit.results.finding import Finding
 from vibrokit.structure.attractors.describe import describe_orbit
 from vibrokit.structure.attractors.names import names_of
