@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,9 +20,7 @@ from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import axes_or_new, colour, scientific
 
 _PARTS = 360
-_SHOWN = 10.0  # times the least action, up to which colours tell actions apart
-_COLOURS = "viridis"
-_ANGLE, _ACTION = r"angle of the start $\theta$ (°)", r"action at the exit $S$ (m$^2$ s$^{-3}$)"
+_ACTION = r"action at the exit $S$ (m$^2$ s$^{-3}$)"
 _BELOW = 1.4  # the axis begins at the least action divided by this: room for the numbers under the lines
 _TOP = 300.0  # times the largest energy, up to which actions are shown
 
@@ -74,23 +73,16 @@ def action_plot(
     energies : sequence of (int, float)
         Label of the attractor and value (m² s⁻³) of each energy: drawn as a horizontal line.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    ActionPlotArtists
     """
     axes = axes_or_new(ax, 6.4, 4.4)
-    starts: list[Line2D] = []
-    least: list[Line2D] = []
-    for label, name, one_angle, radius, one_action in zip(labels, names, angles, radii, actions, strict=True):
-        angle, action = np.asarray(one_angle, dtype=float), np.asarray(one_action, dtype=float)
+    starts, least = list[Line2D](), list[Line2D]()
+    for label, name, angle, radius, action in zip(labels, names, angles, radii, actions, strict=True):
         several = bool(np.any(np.asarray(radius, dtype=float) > 0))
-        starts += axes.plot(
-            np.degrees(angle), action, ".", markersize=1.4 if several else 1.5, color=colour(label), rasterized=True,
-            alpha=0.5 if several else 1.0, markeredgewidth=0, label=f"leaving {name}",
-        )  # fmt: skip
+        look = {"markersize": 1.4, "alpha": 0.5} if several else {"markersize": 1.5}
+        style: dict[str, Any] = {"color": colour(label), "rasterized": True, "label": f"leaving {name}", **look}
+        starts += axes.plot(np.degrees(angle), np.asarray(action, dtype=float), ".", markeredgewidth=0, **style)
         if several:
-            middle, lowest = _least_by_angle(angle, action)
+            middle, lowest = _least_by_angle(np.asarray(angle, dtype=float), np.asarray(action, dtype=float))
             least += axes.plot(np.degrees(middle), lowest, color=colour(label), linewidth=0.9, label="_least")
     lines = [axes.axhline(value, color=colour(label), linewidth=0.8) for label, value in energies]
     numbers = [
@@ -126,10 +118,6 @@ def action_map(
     name : str
         Of the attractor that is left.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    ActionMapArtists
     """
     axes = axes_or_new(ax, 7.2, 3.6)
     theta, r, s = (np.asarray(values, dtype=float) for values in (angle, radius, action))
@@ -140,8 +128,8 @@ def action_map(
     order = np.flatnonzero(out)[np.argsort(-s[out], kind="stable")]  # those of small action are drawn last
     least = float(s[out].min()) if out.any() else 1.0
     points = axes.scatter(
-        np.degrees(theta[order]), r[order], c=s[order], s=2.5, linewidths=0, rasterized=True, cmap=_COLOURS,
-        norm=LogNorm(least, _SHOWN * least), zorder=2,
+        np.degrees(theta[order]), r[order], c=s[order], s=2.5, linewidths=0, rasterized=True, cmap="viridis",
+        norm=LogNorm(least, 10 * least), zorder=2,
     )  # fmt: skip
     best = None
     if out.any():
@@ -159,7 +147,7 @@ def action_map(
 
 def _angle_axis(axes: Axes) -> None:
     axes.set_xlim(0, 360)
-    axes.set_xlabel(_ANGLE)
+    axes.set_xlabel(r"angle of the start $\theta$ (°)")
     axes.xaxis.set_major_locator(MultipleLocator(60))
 
 

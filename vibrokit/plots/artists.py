@@ -1,11 +1,13 @@
-"""Artists: what a picture consists of."""
+"""Artists: what a picture consists of, and a picture as SVG that stands inside a page."""
 
 from __future__ import annotations
 
 import dataclasses
+import io
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
@@ -44,3 +46,29 @@ class Artists:
 def attractor_name(label: int, names: Sequence[str]) -> str:
     """Return what pictures call an attractor."""
     return names[label] if 0 <= label < len(names) else f"attractor {label}"
+
+
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "path",  # a page may have no font of the same widths
+    "svg.hashsalt": "vibrokit",  # the same picture gives the same bytes
+}
+
+
+def inline_svg(artists: Artists, name: str) -> str:
+    """Return a picture as an element ``svg``.
+
+    Parameters
+    ----------
+    artists : Artists
+    name : str
+        Begins the identifiers of the picture, so that they differ from those of the page's other pictures.
+    """
+    content = io.StringIO()
+    with matplotlib.rc_context(_STYLE):
+        metadata = {"Date": None, "Creator": None}
+        artists.printable.savefig(content, format="svg", metadata=metadata, bbox_inches="tight")
+    svg = content.getvalue()
+    svg = svg[svg.index("<svg") :]
+    for mark in ('id="', 'xlink:href="#', "url(#"):
+        svg = svg.replace(mark, f"{mark}{name}-")
+    return svg

@@ -15,7 +15,18 @@ from matplotlib.patches import Patch, Rectangle
 from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import DENSE, DOTS, add_legend, axes_or_new, colour, draw, named, phase_plane, rows
+from vibrokit.plots.axes import (
+    DOTS,
+    add_legend,
+    axes_or_new,
+    cell_image,
+    colour,
+    draw,
+    draw_all,
+    named,
+    phase_plane,
+    rows,
+)
 from vibrokit.plots.clipping import clipped
 
 Style = dict[str, Any]
@@ -25,8 +36,6 @@ UNSETTLED, ESCAPED, NOT_FOLLOWED, AT_COPY = -1, -2, -3, -4
 _GREY, _DARK, _CLEAR = (0.8, 0.8, 0.8, 1.0), (0.42, 0.42, 0.42, 1.0), (1.0, 1.0, 1.0, 0.0)
 _PAPER = (0.96, 0.93, 0.86, 1.0)
 _HATCH: Style = {"facecolor": "white", "edgecolor": "0.72", "hatch": "////", "linewidth": 0}
-_PALE = 0.35
-_FEW = 4  # points of an orbit that are drawn large
 
 STABLE, UNSTABLE = "#101010", "#c4007a"
 _EDGED: Style = {"linestyle": "none", "markeredgecolor": "white"}
@@ -93,25 +102,13 @@ def basin_map(
         Kind of each attractor, which chooses its marker: ``"periodic"`` (circle), ``"equilibrium"`` (square),
         ``"limit cycle"`` (diamond), ``"chaotic"`` or ``"quasiperiodic"`` (dots). All periodic by default.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    BasinArtists
     """
     axes = axes_or_new(ax, 5.4, 4.6)
     cells = np.asarray(labels)
     (x_low, x_high), (v_low, v_high) = np.asarray(bounds, dtype=float)
-    pale = [(*(_PALE * np.array(to_rgb(colour(k))) + 1 - _PALE), 1.0) for k in range(len(points))]
-    image = axes.imshow(
-        cells.T,
-        origin="lower",
-        extent=(x_low, x_high, v_low, v_high),
-        cmap=ListedColormap([_PAPER, _DARK, _CLEAR, _GREY, *pale]),
-        vmin=AT_COPY - 0.5,
-        vmax=len(points) - 0.5,
-        aspect="auto",
-        interpolation="nearest",
-    )
+    shades = [(*(0.35 * np.array(to_rgb(colour(k))) + 0.65), 1.0) for k in range(len(points))]
+    colours = ListedColormap([_PAPER, _DARK, _CLEAR, _GREY, *shades])
+    image = cell_image(axes, cells, bounds, cmap=colours, vmin=AT_COPY - 0.5, vmax=len(points) - 0.5)
     hatching = None
     if (cells == ESCAPED).any():  # seen through the image where that is clear
         hatching = Rectangle((x_low, v_low), x_high - x_low, v_high - v_low, zorder=-1, **_HATCH)
@@ -156,16 +153,14 @@ def section_portrait(
         Limit cycles as curves, by label of the attractor.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
-
-    Returns
-    -------
-    SectionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.8)
     box = np.asarray(bounds, dtype=float)
     basins = basin_map(labels, box, points, names=names, kinds=kinds, ax=axes)
-    inwards = _draw_curves(axes, [clipped(curve, box) for curve in stable], STABLE, "stable manifold")
-    outwards = _draw_curves(axes, [clipped(curve, box) for curve in unstable], UNSTABLE, "unstable manifold")
+    inwards, outwards = (
+        draw_all(axes, [clipped(curve, box) for curve in curves], name, color=ink, linewidth=0.8, zorder=3)
+        for curves, name, ink in ((stable, "stable manifold", STABLE), (unstable, "unstable manifold", UNSTABLE))
+    )
     loops = tuple(
         draw(axes, curve, color=colour(label), linewidth=1.4, zorder=4, label="_cycle")
         for label, curve in (cycles or {}).items()
@@ -174,17 +169,7 @@ def section_portrait(
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
     add_legend(axes, ax, [*named((*basins.attractors, *inwards, *outwards, *marks)), *cell_samples(labels)])
-    return SectionArtists(
-        axes, basins.image, basins.hatching, basins.attractors, inwards, outwards, loops, marks
-    )  # fmt: skip
-
-
-def _draw_curves(axes: Axes, curves: Sequence[NDArray[np.float64]], ink: str, name: str) -> tuple[Line2D, ...]:
-    lines: list[Line2D] = []
-    for curve in curves:
-        label, dense = "_more" if lines else name, len(curve) > DENSE
-        lines.append(draw(axes, curve, color=ink, linewidth=0.8, zorder=3, rasterized=dense, label=label))
-    return tuple(lines)
+    return SectionArtists(axes, basins.image, basins.hatching, basins.attractors, inwards, outwards, loops, marks)
 
 
 def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]) -> tuple[Line2D, ...]:
@@ -193,7 +178,7 @@ def _draw_saddles(axes: Axes, saddles: Sequence[ArrayLike], kinds: Sequence[str]
         kind = kinds[index] if kinds else "saddle"
         name = "chaotic saddle" if kind == "chaotic" else kind
         style = _EDGED | _style_of(_SADDLE_MARKERS, kinds, index)
-        if len(rows(visits)) > _FEW and kind != "chaotic":  # so that many points do not hide what they lie on
+        if len(rows(visits)) > 4 and kind != "chaotic":  # so that many points do not hide what they lie on
             style |= {"markersize": 4, "markeredgewidth": 0.4}
         label = "_more" if kind in kinds[:index] or (index and not kinds) else name
         marks.append(draw(axes, visits, color="black", zorder=6, label=label, **style))

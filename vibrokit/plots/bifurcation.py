@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import add_legend, axes_or_new, colour, named
+from vibrokit.plots.axes import ACTION, add_legend, axes_or_new, colour, named
 
 _MARKS: Mapping[str, Mapping[str, Any]] = {
     "fold": {"marker": "s", "color": "black"},
@@ -71,10 +71,6 @@ def bifurcation_diagram(
         Symbol and unit of the parameter, such as ``r"forcing frequency $\\omega$ (rad s$^{-1}$)"``.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
-
-    Returns
-    -------
-    BifurcationArtists
     """
     axes = axes_or_new(ax, 7.0, 4.4)
     value, place, branch = (np.ravel(np.asarray(array)) for array in (values, x, branches))
@@ -136,10 +132,6 @@ def basin_fractions(
         Number of each branch, which chooses its colour; in order from 0 by default.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
-
-    Returns
-    -------
-    FractionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.0)
     order = np.argsort(np.ravel(np.asarray(values, dtype=float)), kind="stable")
@@ -163,3 +155,54 @@ def basin_fractions(
     axes.set_ylabel("share of the region")
     add_legend(axes, ax, [*areas, *([] if remainder is None else [remainder])])
     return FractionArtists(axes, areas, remainder)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class EnergyCurveArtists(Artists):
+    """A curve for each path."""
+
+    curves: tuple[Line2D, ...]
+
+
+def energy_curves(
+    values: ArrayLike,
+    actions: Sequence[ArrayLike],
+    names: Sequence[str],
+    *,
+    groups: Sequence[int],
+    label: str,
+    ax: Axes | None = None,
+) -> EnergyCurveArtists:
+    """Draw the actions of exit paths against a parameter, on a logarithmic scale; gaps where a path is not known.
+
+    Parameters
+    ----------
+    values : array_like (count,)
+        The parameter's values.
+    actions : sequence of array_like (count,)
+        One for each path (m² s⁻³).
+    names : sequence of str
+        What the legend calls each path.
+    groups : sequence of int
+        Group of each path, such as the attractor that it leaves: those of one group have one colour and different
+        lines.
+    label : str
+        Symbol and unit of the parameter.
+    ax : matplotlib Axes, optional
+        A legend is put beside the picture, or inside axes that are given.
+    """
+    axes = axes_or_new(ax, 7.0, 4.4)
+    curves: list[Line2D] = []
+    for number, (action, name, group) in enumerate(zip(actions, names, groups, strict=True)):
+        style = ("-", "--", ":", "-.")[list(groups[:number]).count(group) % 4]
+        curves += axes.plot(
+            np.asarray(values, dtype=float), np.asarray(action, dtype=float), style, color=colour(group), label=name,
+            marker="o", markersize=2.5, linewidth=1.2,
+        )  # fmt: skip
+    if curves:
+        axes.set_yscale("log")
+    axes.locator_params(axis="x", nbins=5)
+    axes.set_xlabel(label)
+    axes.set_ylabel(ACTION)
+    add_legend(axes, ax, curves)
+    return EnergyCurveArtists(axes, tuple(curves))

@@ -13,12 +13,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new, colour, phase_plane
+from vibrokit.plots.axes import DISPLACEMENT, VELOCITY, axes_or_new, colour, phase_plane
 
-_LABELS = {
-    "x": (r"displacement $x$ (m)", r"density of $x$ (m$^{-1}$)"),
-    "v": (r"velocity $v$ (m s$^{-1}$)", r"density of $v$ (s m$^{-1}$)"),
-}
+_LABELS = {"x": (DISPLACEMENT, r"density of $x$ (m$^{-1}$)"), "v": (VELOCITY, r"density of $v$ (s m$^{-1}$)")}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

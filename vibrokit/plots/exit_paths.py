@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
-from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import CROWD, DOTS, add_legend, axes_or_new, colour, draw, mark, named, rows, span
+from vibrokit.plots.axes import (
+    ACTION,
+    CROWD,
+    DOTS,
+    add_legend,
+    axes_or_new,
+    colour,
+    draw,
+    mark,
+    named,
+    panels_or_new,
+    powers_of_ten,
+    rows,
+    span,
+)
 from vibrokit.plots.basins import SectionArtists, cell_samples, section_portrait
-
-_BEGUN = 1e-4  # of the whole action: before, p₂ and S cannot be told from 0 in a picture
-_LONE_DOTS: Mapping[str, Any] = {
-    "linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black",
-}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -82,10 +89,6 @@ def exit_paths(
         Branches of stable manifolds as curves.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or above axes that are given, because paths cover the axes.
-
-    Returns
-    -------
-    ExitPathArtists
     """
     axes = axes_or_new(ax, 7.6, 4.8)
     kinds = ["saddle"] * len(saddles) + ["chaotic"] * len(chaotic)
@@ -126,7 +129,8 @@ def _draw_path(
     axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, look: tuple[str, Any], title: str
 ) -> tuple[tuple[Line2D, ...], Line2D, Line2D]:
     joined = strands <= CROWD
-    style = {**DOTS, "linestyle": look[1]} if joined else _LONE_DOTS
+    lone = {"linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black"}
+    style = {**DOTS, "linestyle": look[1]} if joined else lone
     lines: list[Line2D] = []
     for first in range(strands if joined else 1):
         some, label = place[first::strands] if joined else place, "_strand" if first else title
@@ -164,16 +168,12 @@ def path_history(
         Unit of the time axis (s), the time from one section to the next; seconds by default.
     ax : array of Axes (2, paths) or (2,), optional
 
-    Returns
-    -------
-    HistoryArtists
-
     Raises
     ------
-    VibrokitError
+    ArgumentError
         `ax` has another number of axes.
     """
-    panels = _panels(ax, len(histories))
+    panels = panels_or_new(ax, (2, max(1, len(histories))), (max(5.6, 4.4 * len(histories)), 4.6))
     lines: list[list[Line2D]] = [[], []]
     dots: list[list[Line2D]] = [[], []]
     for index, (t, p, action, section) in enumerate(histories):
@@ -189,7 +189,7 @@ def path_history(
                 time[marked], value[marked], "o", color=ink, markersize=3.2, markeredgecolor="white",
                 markeredgewidth=0.4,
             )  # fmt: skip
-            axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+            powers_of_ten(axes, "y")
             axes.set_xlim(*reach)
         upper, lower = panels[:, index]
         if titles:
@@ -197,7 +197,7 @@ def path_history(
         upper.tick_params(labelbottom=False)
         lower.set_xlabel("time $t$ (s)" if period is None else "time $t / T$ (section to section)")
     panels[0, 0].set_ylabel(r"momentum $p_2$ (m s$^{-2}$)")
-    panels[1, 0].set_ylabel(r"action $S$ (m$^2$ s$^{-3}$)")
+    panels[1, 0].set_ylabel(ACTION)
     return HistoryArtists(panels[0, 0], *(tuple(some) for some in (lines[0], dots[0], lines[1], dots[1])))
 
 
@@ -205,15 +205,5 @@ def _reach(time: NDArray[np.float64], action: NDArray[np.float64]) -> tuple[floa
     """Ends of the time axis."""
     if len(time) == 0:
         return 0.0, 1.0
-    begun = np.flatnonzero(action >= _BEGUN * action[-1])
+    begun = np.flatnonzero(action >= 1e-4 * action[-1])  # before, p₂ and S cannot be told from 0
     return span([time[begun[0] if len(begun) else 0 :]])
-
-
-def _panels(ax: Any, count: int) -> NDArray[Any]:
-    if ax is not None:
-        given = np.asarray(ax, dtype=object)
-        if given.size != 2 * count:
-            raise VibrokitError(f"path_history: ax has {given.size} axes; give an array of shape (2, {count}) or None.")
-        return given.reshape(2, count)
-    figure = Figure(figsize=(max(5.6, 4.4 * count), 4.6), layout="constrained")
-    return figure.subplots(2, max(1, count), squeeze=False)

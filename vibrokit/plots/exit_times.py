@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.documented import documented
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import DASHES, MARKS, axes_or_new, colour, mark, named, span
+from vibrokit.plots.axes import DASHES, MARKS, axes_or_new, colour, legend_inside, mark, powers_of_ten, span
 
 _FILLS = ("none", "full", "left", "bottom", "right", "top")
 _POINTS: dict[str, Any] = {"marker": "o", "markersize": 4.5, "capsize": 2.5, "linewidth": 1.0}
@@ -96,7 +96,7 @@ def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTim
         style = {**_POINTS, "marker": marker, "linestyle": dashes, "color": colour(one.label)}
         points.append(axes.errorbar(inverse, log_times, errors, label=one.title, **style))
     _label_times(axes)
-    return ExitTimeArtists(axes, tuple(points), _legend(axes, points))
+    return ExitTimeArtists(axes, tuple(points), legend_inside(axes, points))
 
 
 def reconciled_times(
@@ -122,13 +122,8 @@ def reconciled_times(
     points, drawn, places = list[ErrorbarContainer](), list[Line2D](), list[float]()
     for one, method in zip(exits, methods, strict=True):
         inverse, log_times, errors = one.in_order()
-        style = {
-            **_POINTS,
-            "marker": markers[method],
-            "linestyle": "none",
-            "fillstyle": _FILLS[one.place % len(_FILLS)],
-            "markersize": 6.5,
-        }
+        fill = _FILLS[one.place % len(_FILLS)]
+        style = {**_POINTS, "marker": markers[method], "linestyle": "none", "fillstyle": fill, "markersize": 6.5}
         points.append(axes.errorbar(inverse, log_times, errors, color=colour(one.label), label=one.title, **style))
         places += inverse.tolist()
     if places:
@@ -137,13 +132,13 @@ def reconciled_times(
             style = {"color": colour(line.label), "linestyle": DASHES[line.place % len(DASHES)], "linewidth": 1.1}
             drawn += axes.plot(across, line.logarithm + line.energy * across, label=line.title, **style)
     _label_times(axes)
-    return ReconciliationArtists(axes, tuple(points), tuple(drawn), _legend(axes, [*points, *drawn]))
+    return ReconciliationArtists(axes, tuple(points), tuple(drawn), legend_inside(axes, [*points, *drawn]))
 
 
 def _label_times(axes: Axes) -> None:
     axes.set_xlabel(r"inverse noise intensity $1/D$ (m$^{-2}$ s$^{3}$)")
     axes.set_ylabel(r"mean exit time $\ln(\tau / 1\,\mathrm{s})$")
-    axes.ticklabel_format(axis="x", style="sci", scilimits=(-2, 4), useMathText=True)
+    powers_of_ten(axes, "x", largest=4)
 
 
 def exit_slopes(
@@ -184,11 +179,5 @@ def exit_slopes(
     axes.set_ylim(span(seen))
     axes.set_xlabel(r"noise intensity $D$ (m$^2$ s$^{-3}$)")
     axes.set_ylabel(r"slope $\mathrm{d}\ln\tau\,/\,\mathrm{d}(1/D)$ (m$^2$ s$^{-3}$)")
-    axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
-    return SlopeArtists(axes, tuple(points), tuple(lines), tuple(bounds), _legend(axes, [*points, *lines]))
-
-
-def _legend(axes: Axes, artists: Sequence[Any]) -> Legend | None:
-    """A legend of what has a name, if anything has."""
-    handles = named(artists)
-    return axes.legend(handles=handles, fontsize=8, frameon=False) if handles else None
+    powers_of_ten(axes)
+    return SlopeArtists(axes, tuple(points), tuple(lines), tuple(bounds), legend_inside(axes, [*points, *lines]))

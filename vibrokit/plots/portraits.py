@@ -58,10 +58,6 @@ def phase_portrait(
     label : int
         Chooses the colour.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    PortraitArtists
     """
     axes = axes_or_new(ax)
     dashes = (0, (4, 2))
@@ -93,10 +89,6 @@ def steady_motions(
         What the legend calls each motion; ``"attractor 0"`` and so on by default.
     ax : matplotlib Axes, optional
         A legend is put beside the picture, or inside axes that are given.
-
-    Returns
-    -------
-    MotionArtists
     """
     axes = axes_or_new(ax, 7.0, 4.4)
     lines: list[Line2D] = []
@@ -105,7 +97,7 @@ def steady_motions(
     for label, (path, visits) in enumerate(zip(paths, points, strict=True)):
         many, ink, name = len(path) > DENSE, colour(label), attractor_name(label, names)
         look = {"linewidth": 0.3, "alpha": 0.6} if many else {"linewidth": 1.2, "alpha": 1.0}
-        lines.append(draw(axes, path, color=ink, label=name, rasterized=many, zorder=2, **look))
+        lines.append(draw(axes, path, color=ink, label=name, zorder=2, **look))
         edge = DOTS if len(rows(visits)) > CROWD else {"markersize": 6, "markeredgecolor": "white"}
         mark = {"linestyle": "none", "marker": "o", **edge}
         marks.append(draw(axes, visits, color=ink, label="_section", zorder=3, **mark))

@@ -13,12 +13,11 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.contour import QuadContourSet
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists, attractor_name
-from vibrokit.plots.axes import axes_or_new, colour, draw, named, phase_plane
+from vibrokit.plots.axes import axes_or_new, cell_image, colour, draw, draw_all, named, phase_plane, powers_of_ten
 
-_LEVELS = 14
 _POINTS = {"linestyle": "none", "zorder": 6, "markeredgecolor": "white"}
 _ATTRACTOR: dict[str, Any] = {**_POINTS, "marker": "o", "markersize": 6}
 _SADDLE: dict[str, Any] = {**_POINTS, "marker": "X", "markersize": 7, "color": "black"}
@@ -75,41 +74,36 @@ def quasi_potential_map(
     paths : sequence of array_like (count, n)
         Points of exit paths on the section.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    QuasiPotentialArtists
     """
     axes = axes_or_new(ax, 7.6, 4.8)
     psi = np.ma.masked_invalid(np.asarray(potential, dtype=float))
     box = np.asarray(bounds, dtype=float)
-    image = axes.imshow(
-        psi.T, origin="lower", extent=tuple(box.ravel()), cmap="YlGnBu_r", vmin=0.0, vmax=top, aspect="auto",
-        interpolation="nearest",
-    )  # fmt: skip
-    contours = None
-    highest = float(psi.max() if top is None else top) if psi.count() else 0.0
-    if highest > 0 and min(psi.shape) > 1:
-        x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
-        levels = np.linspace(0.0, highest, _LEVELS)[1:-1]
-        contours = axes.contour(x, v, psi.T, levels=levels, colors="0.25", linewidths=0.4)
+    image = cell_image(axes, psi, box, cmap="YlGnBu_r", vmin=0.0, vmax=top)
+    contours = _level_lines(axes, psi, box, top)
     attractor, *more = (
         draw(axes, place, color=colour(own), label=attractor_name(own, names), **_ATTRACTOR)
         for own, place in ((label, points), *others.items())
     )
-    crosses, dots = (
-        tuple(draw(axes, place, label="_more" if k else name, **style) for k, place in enumerate(places))
-        for places, name, style in ((saddles, "saddle", _SADDLE), (paths, "exit path", _PATH))
-    )
+    crosses, dots = draw_all(axes, saddles, "saddle", **_SADDLE), draw_all(axes, paths, "exit path", **_PATH)
     axes.set_xlim(*box[0])
     axes.set_ylim(*box[1])
     phase_plane(axes)
-    bar = axes.figure.colorbar(
-        image, ax=axes, extend="neither" if top is None else "max", label=r"quasi-potential $\Psi$ (m$^2$ s$^{-3}$)"
-    )  # fmt: skip
-    bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    words, extend = r"quasi-potential $\Psi$ (m$^2$ s$^{-3}$)", "neither" if top is None else "max"
+    bar = axes.figure.colorbar(image, ax=axes, extend=extend, label=words)
+    powers_of_ten(bar.ax, "y")
     axes.legend(
         handles=named((attractor, *more, *crosses, *dots)), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4,
         fontsize=8, frameon=False,
     )  # fmt: skip
     return QuasiPotentialArtists(axes, image, contours, attractor, tuple(more), crosses, dots, bar)
+
+
+def _level_lines(
+    axes: Axes, psi: np.ma.MaskedArray[Any, Any], box: NDArray[np.float64], top: float | None
+) -> QuadContourSet | None:
+    """Draw 12 level lines; none of a potential that is flat or unknown."""
+    highest = float(psi.max() if top is None else top) if psi.count() else 0.0
+    if highest <= 0 or min(psi.shape) < 2:
+        return None
+    x, v = (low + (high - low) * (np.arange(n) + 0.5) / n for (low, high), n in zip(box, psi.shape, strict=True))
+    return axes.contour(x, v, psi.T, levels=np.linspace(0.0, highest, 14)[1:-1], colors="0.25", linewidths=0.4)

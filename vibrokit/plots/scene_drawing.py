@@ -57,10 +57,6 @@ def scene_drawing(
     forces : sequence of str
     noise : str, optional
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    SceneArtists
     """
     axes = axes_or_new(ax, 8.0, 3.9)
     if ax is None and (figure := axes.get_figure(root=True)) is not None:

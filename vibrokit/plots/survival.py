@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from vibrokit.errors import counted
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import axes_or_new, colour
+from vibrokit.plots.axes import axes_or_new, colour, legend_inside
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,5 +54,5 @@ def survival(
     axes.set_yscale("log")
     axes.set_xlabel("time $t$ (s)")
     axes.set_ylabel("share that has not left")
-    axes.legend(fontsize=8, frameon=False)
+    legend_inside(axes, [steps, law])
     return SurvivalArtists(axes, steps, law)

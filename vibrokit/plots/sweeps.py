@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
-from vibrokit.errors import VibrokitError
 from vibrokit.plots.artists import Artists
-from vibrokit.plots.axes import colour, named, span
+from vibrokit.plots.axes import colour, named, panels_or_new, powers_of_ten, span
 from vibrokit.text_units import length_unit, size_of
 
 _PANELS: Mapping[str, str] = {
@@ -24,7 +23,7 @@ _PANELS: Mapping[str, str] = {
     "log_time": "mean time, ln(τ / 1 s)",
 }
 _LINE: dict[str, Any] = {"marker": "o", "markersize": 2.8, "linewidth": 1.2}
-_DASHED = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "zorder": 0}
+_DASHED: dict[str, Any] = {"color": "0.5", "linestyle": (0, (4, 2)), "linewidth": 0.9, "zorder": 0}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -102,33 +101,21 @@ def sweep(
     ax : array of Axes, optional
         One for each panel.
 
-    Returns
-    -------
-    SweepArtists
-
     Raises
     ------
-    VibrokitError
+    ArgumentError
         `ax` has another number of axes.
     """
     shown = [
         name for name in _PANELS if name == "low" or any(np.isfinite(getattr(one, name)).any() for one in branches)
     ]
-    panels = dict(zip(shown, _panels(ax, len(shown)), strict=True))
+    grid = panels_or_new(ax, (len(shown), 1), (8.4, 0.8 + 2.2 * len(shown)))
+    panels: dict[str, Axes] = dict(zip(shown, grid[:, 0], strict=True))
     place, curves, first = np.asarray(values, dtype=float), list[Line2D](), panels["low"]
     length = length or length_unit(span([one.high for one in branches] + [one.low for one in branches])[1])
     metre = 1.0 / size_of(length, "m")
     for one in branches:
-        style = {**_LINE, "color": colour(one.number)}
-        curves += first.plot(place, metre * np.asarray(one.high), label=one.name, **style)
-        curves += first.plot(place, metre * np.asarray(one.low), label=f"_{one.name}", **style)
-        for name, panel in panels.items():
-            if panel is not first:
-                hollow = {"markerfacecolor": "white"} if name == "energy" else {}
-                panel.plot(place, getattr(one, name), label=f"_{one.name}", **style | hollow)
-        if "energy" in panels:
-            full = np.isin(place, searched)
-            panels["energy"].plot(place[full], np.asarray(one.energy)[full], **style | {"linestyle": ""})
+        curves += _draw_branch(panels, place, one, metre, np.isin(place, searched))
     for number, position in enumerate(stops):
         first.plot(place, metre * np.asarray(position), label="_stop" if number else "stops", **_DASHED)
     strength = np.broadcast_to(np.asarray(intensity, dtype=float), place.shape)
@@ -136,19 +123,30 @@ def sweep(
         panels["energy"].plot(place, np.where(strength > 0, strength, np.nan), label="_D", **_DASHED)
         beside: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": 9}
         panels["energy"].annotate("D", (1.01, strength[-1]), **beside)
-    drawn = [
-        line for kind, value, branch in marks
-        for line in first.plot(value, 0.02, "^", transform=first.get_xaxis_transform(), color=colour(branch),
-                               markersize=5, label=f"_{kind}", clip_on=False)
-    ]  # fmt: skip
-    ends = [
-        line for value, action, branch in lost if "energy" in panels
-        for line in panels["energy"].plot(value, action, "x", color=colour(branch), markersize=8, markeredgewidth=1.6,
-                                          label="_lost")
-    ]  # fmt: skip
+    drawn, ends = list[Line2D](), list[Line2D]()
+    at_foot: dict[str, Any] = {"transform": first.get_xaxis_transform(), "markersize": 5, "clip_on": False}
+    for kind, value, branch in marks:
+        drawn += first.plot(value, 0.02, "^", color=colour(branch), label=f"_{kind}", **at_foot)
+    cross: dict[str, Any] = {"markersize": 8, "markeredgewidth": 1.6, "label": "_lost"}
+    for value, action, branch in lost if "energy" in panels else ():
+        ends += panels["energy"].plot(value, action, "x", color=colour(branch), **cross)
     _label(panels, label, length)
     _explain(first, ax, drawn, ends)
     return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn), tuple(ends))
+
+
+def _draw_branch(
+    panels: Mapping[str, Axes], place: NDArray[np.float64], one: Branch, metre: float, searched: NDArray[np.bool_]
+) -> list[Line2D]:
+    """Draw one branch into all panels, with full markers where paths were searched; return its displacements."""
+    style: dict[str, Any] = {**_LINE, "color": colour(one.number)}
+    for name in panels.keys() - {"low"}:
+        hollow = {"markerfacecolor": "white"} if name == "energy" else {}
+        panels[name].plot(place, getattr(one, name), label=f"_{one.name}", **style | hollow)
+    if "energy" in panels:
+        panels["energy"].plot(place[searched], np.asarray(one.energy)[searched], **style | {"linestyle": ""})
+    upper = panels["low"].plot(place, metre * np.asarray(one.high), label=one.name, **style)
+    return upper + panels["low"].plot(place, metre * np.asarray(one.low), label=f"_{one.name}", **style)
 
 
 def _explain(first: Axes, given: Any, bifurcations: Sequence[Line2D], ends: Sequence[Line2D]) -> None:
@@ -172,15 +170,5 @@ def _label(panels: Mapping[str, Axes], label: str, length: str) -> None:
         if name == "energy":
             panel.set_yscale("log")
         else:
-            panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+            powers_of_ten(panel, "y")
     list(panels.values())[-1].set_xlabel(label)
-
-
-def _panels(ax: Any, count: int) -> NDArray[Any]:
-    if ax is None:
-        figure = Figure(figsize=(8.4, 0.8 + 2.2 * count), layout="constrained")
-        return figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    given = np.asarray(ax, dtype=object).ravel()
-    if given.size != count:
-        raise VibrokitError(f"sweep: ax has {given.size} axes; give {count}, one for each panel, or None.")
-    return given

@@ -10,7 +10,7 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.part import Part
-from vibrokit.plots.inline_svg import inline_svg
+from vibrokit.plots.artists import inline_svg
 from vibrokit.plots.scene_drawing import scene_drawing
 from vibrokit.report.blocks import Picture
 from vibrokit.report.tables import number

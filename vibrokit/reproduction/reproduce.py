@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vibrokit.construction import called
 from vibrokit.errors import VibrokitError
-from vibrokit.plots.inline_svg import inline_svg
+from vibrokit.plots.artists import inline_svg
 from vibrokit.progress import Progress, put_off, working
 from vibrokit.report.blocks import Chapter, Picture, Sentences, Table
 from vibrokit.report.chapters import work_chapter

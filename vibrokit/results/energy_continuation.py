@@ -20,7 +20,7 @@ from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
-    from vibrokit.plots.energy_curves import EnergyCurveArtists
+    from vibrokit.plots.bifurcation import EnergyCurveArtists
 
 Array = NDArray[np.float64]
 
@@ -155,8 +155,8 @@ class EnergyContinuation(AlongParameter):
 
     @called
     def plot(self, ax: Any = None) -> EnergyCurveArtists:
-        """Draw the actions along the parameter; see `vibrokit.plots.energy_curves.energy_curves`."""
-        from vibrokit.plots.energy_curves import energy_curves
+        """Draw the actions along the parameter; see `vibrokit.plots.bifurcation.energy_curves`."""
+        from vibrokit.plots.bifurcation import energy_curves
 
         sources = list(dict.fromkeys(branch.source for branch in self.branches))
         return energy_curves(
