@@ -26,15 +26,19 @@ def names(axes):
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+def lies_at(*pairs):
+    """Each artist lies at its points."""
+    for artist, points in pairs:
+        np.testing.assert_array_equal(artist.get_xydata(), points)
+
+
 def test_a_path_is_joined_point_by_point():
     two = [[[0.0, 0.0]], [[0.5, 0.0]]]
     artists = exit_paths(LABELS, BOX, two, [LONG], sources=[0], titles=["a path"], names=["clear", "hammering"])
     ((strand,),) = artists.strands
-    np.testing.assert_array_equal(strand.get_xydata(), LONG)
-    assert (strand.get_linestyle(), strand.get_color()) == ("-", colour(0))
     (start,), (end,) = artists.starts, artists.ends
-    np.testing.assert_array_equal(start.get_xydata(), LONG[:1])
-    np.testing.assert_array_equal(end.get_xydata(), LONG[-1:])
+    lies_at((strand, LONG), (start, LONG[:1]), (end, LONG[-1:]))
+    assert (strand.get_linestyle(), strand.get_color()) == ("-", colour(0))
     assert start.get_marker() != end.get_marker()
     ends = ["start of a path", "end of a path"]
     assert names(artists.ax) == ["clear", "hammering", "a path", "not settled", *ends]
@@ -43,10 +47,7 @@ def test_a_path_is_joined_point_by_point():
 def test_a_path_from_an_orbit_of_period_four_is_four_strands_unless_it_is_given_all_along():
     four, whole = exit_paths(LABELS, BOX, [FOUR], [LONG, -LONG], sources=[0, 0], curves=[False, True]).strands
     assert [strand.get_marker() for strand in (four[0], *whole)] == [MARKS[0], ""]
-    for first, strand in enumerate(four):
-        np.testing.assert_array_equal(strand.get_xydata(), LONG[first::4])
-    np.testing.assert_array_equal(whole[0].get_xydata(), -LONG)
-    assert len(four) == 4
+    lies_at(*zip(four, (LONG[first::4] for first in range(4)), strict=True), (whole[0], -LONG))
     assert [name for name in names(four[0].axes) if "exit path" in name] == ["exit path from attractor 0"] * 2
 
 
@@ -65,9 +66,8 @@ def test_paths_from_rest_are_shown_whole_and_others_on_the_section(swing, shown)
 
 
 def test_a_path_from_chaos_is_dots():
-    artists = exit_paths(LABELS, BOX, [CROWD], [LONG], sources=[0])
-    ((dots,),) = artists.strands
-    np.testing.assert_array_equal(dots.get_xydata(), LONG)
+    ((dots,),) = exit_paths(LABELS, BOX, [CROWD], [LONG], sources=[0]).strands
+    lies_at((dots, LONG))
     assert dots.get_linestyle() == "None"
 
 
@@ -76,8 +76,7 @@ def test_saddles_and_manifolds_lie_under_the_path():
     assert (artists.ax.get_xlim(), artists.ax.get_ylim()) == BOX
     (manifold,), (saddle, chaotic) = artists.section.stable, artists.section.saddles
     np.testing.assert_allclose(manifold.get_xydata(), [[0.9, -0.5], [0.9, 0.5]])
-    np.testing.assert_array_equal(saddle.get_xydata(), SADDLE)
-    np.testing.assert_array_equal(chaotic.get_xydata(), CROWD)
+    lies_at((saddle, SADDLE), (chaotic, CROWD))
     assert (saddle.get_label(), chaotic.get_label()) == ("saddle", "chaotic saddle")
 
 
@@ -92,8 +91,7 @@ def test_two_ways_out_of_one_attractor_look_different():
 def test_the_legend_is_outside_of_the_picture(tmp_path):
     figure = Figure(layout="constrained")
     axes = figure.subplots(1, 2)
-    drawings = [None, axes[0]]
-    for ax in drawings:
+    for ax in (None, axes[0]):
         own = exit_paths(LABELS, BOX, [FOUR], [LONG], sources=[0], ax=ax).ax
         own.get_figure().savefig(tmp_path / "p.png", dpi=60)
         box, legend = own.get_window_extent(), own.get_legend().get_window_extent()
@@ -110,19 +108,17 @@ def test_without_paths_the_section_is_drawn():
 
 def test_histories_carry_momentum_action_and_section_points():
     artists = path_history([HISTORY], sources=[1], titles=["out"], period=2.0)
-    (line,), (dots,), (action,), (action_dots,) = (
-        artists.momenta, artists.momentum_points, artists.actions, artists.action_points,
+    momentum, action = np.stack([TIME / 2, HISTORY[1]], axis=1), np.stack([TIME / 2, ACTION], axis=1)
+    lies_at(
+        (artists.momenta[0], momentum), (artists.momentum_points[0], momentum[::20]),
+        (artists.actions[0], action), (artists.action_points[0], action[::20]),
     )  # fmt: skip
-    np.testing.assert_array_equal(line.get_xydata(), np.stack([TIME / 2, HISTORY[1]], axis=1))
-    np.testing.assert_array_equal(dots.get_xdata(), np.arange(21))
-    np.testing.assert_array_equal(action.get_ydata(), ACTION)
-    np.testing.assert_array_equal(action_dots.get_ydata(), ACTION[::20])
-    upper, lower = artists.ax, action.axes
-    assert line.axes is upper
+    upper, lower = artists.ax, artists.actions[0].axes
+    assert artists.momenta[0].axes is upper
     labels = (upper.get_ylabel(), lower.get_ylabel(), upper.get_title())
     assert labels == (r"momentum $p_2$ (m s$^{-2}$)", r"action $S$ (m$^2$ s$^{-3}$)", "out")
     assert upper.get_xlim() == lower.get_xlim()
-    assert line.get_color() == colour(1)
+    assert artists.momenta[0].get_color() == colour(1)
 
 
 def test_the_time_axis_begins_where_the_action_does():
@@ -161,21 +157,16 @@ def test_the_quasi_potential_lies_where_it_belongs():
         psi, BOX, FOUR[:1], label=1, names=["clear", "hammering"], saddles=[SADDLE], paths=[LONG], top=0.5,
         others={0: FOUR[1:]},
     )  # fmt: skip
-    image, levels, point, (saddle,), (path,) = (
-        artists.image, artists.contours, artists.attractor, artists.saddles, artists.paths,
-    )  # fmt: skip
+    image, levels = artists.image, artists.contours
+    lies_at((artists.attractor, FOUR[:1]), (artists.saddles[0], SADDLE), (artists.paths[0], LONG))
     assert names(artists.ax) == ["hammering", "clear", "saddle", "exit path"]
     assert [line.get_color() for line in (artists.attractor, *artists.others)] == [colour(1), colour(0)]
     assert image.get_extent() == [-1, 1, -0.5, 0.5]
-    np.testing.assert_array_equal(image.get_array().mask.T, np.isinf(psi))
     np.testing.assert_array_equal(image.get_array().filled(np.inf).T, psi)
     assert image.get_clim() == (0, 0.5)
     for value, lines in zip(levels.levels, levels.allsegs, strict=True):
         for segment in lines:  # of x² + v², up to what linear interpolation between cells leaves
             np.testing.assert_allclose((segment**2).sum(axis=1), value, atol=0.25 * 0.05**2)
-    np.testing.assert_array_equal(point.get_xydata(), FOUR[:1])
-    np.testing.assert_array_equal(saddle.get_xydata(), SADDLE)
-    np.testing.assert_array_equal(path.get_xydata(), LONG)
 
 
 @pytest.mark.parametrize("psi", [np.full((3, 3), np.inf), np.zeros((3, 3)), np.ones((1, 4))])

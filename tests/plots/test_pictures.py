@@ -28,6 +28,12 @@ def names(axes):
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+def lies_at(*pairs):
+    """Each artist lies at its points."""
+    for artist, points in pairs:
+        np.testing.assert_array_equal(artist.get_xydata(), points)
+
+
 def pixel(image, place):
     """Colour that an image of cells shows at (x, v)."""
     (left, right, low, high), data = image.get_extent(), image.get_array()
@@ -74,8 +80,8 @@ def test_segments_are_cut(curve, inside):
 
 
 def test_cells_have_the_same_labels_as_in_the_records():
-    for name in ("UNSETTLED", "ESCAPED", "NOT_FOLLOWED", "AT_COPY"):
-        assert getattr(cells, name) == getattr(records, name)
+    known = ("UNSETTLED", "ESCAPED", "NOT_FOLLOWED", "AT_COPY")
+    assert [getattr(cells, name) for name in known] == [getattr(records, name) for name in known]
 
 
 def test_basins_carry_labels_and_points():
@@ -83,8 +89,7 @@ def test_basins_carry_labels_and_points():
     assert artists.hatching is None
     np.testing.assert_array_equal(artists.image.get_array(), LABELS.T)
     assert artists.image.get_extent() == [-1, 1, -0.5, 0.5]
-    np.testing.assert_array_equal(artists.attractors[0].get_xydata(), [[0.2, 0.1]])
-    np.testing.assert_array_equal(artists.attractors[1].get_xydata(), POINTS[1])
+    lies_at(*zip(artists.attractors, ([[0.2, 0.1]], POINTS[1]), strict=True))
     assert [marker.get_label() for marker in artists.attractors] == ["attractor 0", "attractor 1"]
     called = basin_map(LABELS, BOX, POINTS, names=["clear", "hammering"]).attractors
     assert [marker.get_label() for marker in called] == ["clear", "hammering"]
@@ -125,11 +130,8 @@ def test_the_portrait_carries_saddles_and_clipped_manifolds():
     )
     (stable, more), (unstable,), (cross,) = artists.stable, artists.unstable, artists.saddles
     np.testing.assert_allclose(stable.get_xydata(), [[-1, 0], [0, 0.1], [1, 0.2]], atol=1e-15)
-    np.testing.assert_array_equal(more.get_xydata(), along)
-    np.testing.assert_array_equal(unstable.get_xydata(), along)
-    np.testing.assert_array_equal(cross.get_xydata(), saddle)
-    assert stable.get_color() == more.get_color() == STABLE
-    assert unstable.get_color() == UNSTABLE
+    lies_at((more, along), (unstable, along), (cross, saddle))
+    assert (stable.get_color(), more.get_color(), unstable.get_color()) == (STABLE, STABLE, UNSTABLE)
     axes = stable.axes
     assert (axes.get_xlim(), axes.get_ylim()) == BOX
     assert (axes.get_xlabel(), axes.get_ylabel()) == (X_LABEL, V_LABEL)
@@ -150,7 +152,7 @@ def test_the_legend_names_cells_without_attractor(labels, points, entries):
 
 def test_limit_cycles_are_curves_in_the_colour_of_their_attractor():
     (cycle,) = section_portrait(LABELS, BOX, POINTS, cycles={1: SMALL}).cycles
-    np.testing.assert_array_equal(cycle.get_xydata(), SMALL)
+    lies_at((cycle, SMALL))
     assert cycle.get_color() == colour(1)
 
 
@@ -163,9 +165,7 @@ LARGE = np.stack([0.6 * np.cos(ANGLE), 0.6 * np.sin(ANGLE)], axis=1)
 
 def test_steady_motions_carry_orbits_section_points_and_stops():
     artists = steady_motions([SMALL, LARGE], [SMALL[:1], LARGE[:2]], stops=[(0.5, "right"), (-0.7, "left")])
-    for lines, wanted in ((artists.orbits, (SMALL, LARGE)), (artists.points, (SMALL[:1], LARGE[:2]))):
-        for line, own in zip(lines, wanted, strict=True):
-            np.testing.assert_array_equal(line.get_xydata(), own)
+    lies_at(*zip((*artists.orbits, *artists.points), (SMALL, LARGE, SMALL[:1], LARGE[:2]), strict=True))
     low, high = artists.ax.get_xlim()
     assert low < -0.7 < 0.6 < high
     assert [face.get_xdata()[0] for face in artists.stops] == [0.5, -0.7]
@@ -191,15 +191,12 @@ def test_the_bifurcation_diagram_carries_points_and_marks():
     marks = [("grazing", 1.5, 0.15), ("crisis", 2.5, 0.25), ("grazing", 2.8, np.nan), ("new", 2.9, 0.1)]
     artists = bifurcation_diagram(values, x, branches, marks, label=FREQUENCY)
     (first, other), (grazing, at, crisis, new) = artists.branches, artists.marks
-    np.testing.assert_array_equal(first.get_xydata(), [[1, 0.1], [2, 0.2], [3, 0.3]])
-    np.testing.assert_array_equal(other.get_xydata(), [[1, 0.5]])
+    lies_at((first, [[1, 0.1], [2, 0.2], [3, 0.3]]), (other, [[1, 0.5]]))
+    lies_at((grazing, [[1.5, 0.15]]), (crisis, [[2.5, 0.25]]))
     assert (first.get_color(), other.get_color()) == (colour(0), colour(4))
-    np.testing.assert_array_equal(grazing.get_xydata(), [[1.5, 0.15]])
-    np.testing.assert_array_equal(crisis.get_xydata(), [[2.5, 0.25]])
     assert at.get_xdata()[0] == 2.8
     assert len({mark.get_marker() for mark in (grazing, crisis, new)}) == 3  # kinds that are new have markers, too
-    assert artists.ax.get_xlabel() == FREQUENCY
-    assert artists.ax.get_ylabel() == r"displacement on the section $x$ (m)"
+    assert (artists.ax.get_xlabel(), artists.ax.get_ylabel()) == (FREQUENCY, r"displacement on the section $x$ (m)")
     assert names(artists.ax) == ["branch 0", "branch 4", "grazing", "crisis", "new"]
     nothing = bifurcation_diagram([], [], [], [], label=FREQUENCY)
     assert (nothing.branches, nothing.marks) == ((), ())
@@ -242,8 +239,7 @@ ACTIONS[0][:5] = np.nan
 def test_actions_are_drawn_against_the_angle():
     artists = action_plot(ANGLES, RADII, ACTIONS, labels=[2, 0], names=["a", "b"], energies=[(2, 1e-4), (0, 1e-3)])
     for marks, angle, action in zip(artists.starts, ANGLES, ACTIONS, strict=True):
-        np.testing.assert_allclose(marks.get_xdata(), np.degrees(angle))
-        np.testing.assert_array_equal(marks.get_ydata(), action)
+        lies_at((marks, np.stack([np.degrees(angle), action], axis=1)))
     assert [marks.get_color() for marks in artists.starts] == [colour(2), colour(0)]
     (least,) = artists.least  # the second search is a ring
     finite = least.get_ydata()[np.isfinite(least.get_ydata())]
@@ -338,9 +334,9 @@ def test_axes_that_are_given_are_drawn_into(draw, tmp_path):
 
 def test_no_window_is_ever_opened():
     code = (
-        "import sys, vibrokit.plots.actions, vibrokit.plots.bifurcation, vibrokit.plots.exit_paths\n"
-        "import vibrokit.plots.quasi_potential\n"
-        "import vibrokit.plots.exit_times, vibrokit.plots.portraits, vibrokit.plots.trade\n"
+        "import importlib, pkgutil, sys, vibrokit.plots\n"
+        "for one in pkgutil.iter_modules(vibrokit.plots.__path__):\n"
+        "    importlib.import_module(f'vibrokit.plots.{one.name}')\n"
         "assert not {'matplotlib.pyplot', 'vibrokit.results', 'numba', 'sympy'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

@@ -8,14 +8,15 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-import xarray
 
 import vibrokit as vk
 from tests.builders import (
     PROVENANCE,
+    REGION,
     CountRecord,
     Toy,
     assert_same,
+    attractor,
     empty_structure,
     full_result,
     full_structure,
@@ -26,28 +27,28 @@ from tests.builders import (
 from vibrokit import registry
 from vibrokit.errors import UnknownNameError
 from vibrokit.registry import Group, names
+from vibrokit.results.basins import Basins
 from vibrokit.results.codes import Code, Severity
 from vibrokit.results.files import PlainRecord, ResultFileError, nested, records_in
 from vibrokit.results.finding import Finding
 from vibrokit.results.pictures import save_figure
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
+from vibrokit.results.trajectory import Trajectory
+from vibrokit.scene_file import scene_data
 
 
 @pytest.fixture(scope="module")
 def toy():
     """The result of a plug-in's analyzer."""
     osc = vk.load_scene("hertz-0.570")
-    structure = vk.find_structure(osc, cells=(40, 40), starts=(6, 6), rng=0)
+    labels = (REGION.cell_centres((40, 30))[:, 0] > 0.15).reshape(40, 30).astype(np.int16)
+    structure = dataclasses.replace(
+        empty_structure(), attractors=(attractor(0, "periodic", 1), attractor(1, "periodic", 1)),
+        basins=Basins(REGION, labels), scene=scene_data(osc),
+    )  # fmt: skip
     with plug_in():
         return Toy(points=6, pair=(8, 9)).run(osc, structure)
-
-
-@pytest.fixture(scope="module")
-def toy_file(toy, tmp_path_factory):
-    target = tmp_path_factory.mktemp("toy") / "toy.nc"
-    toy.save(target)
-    return target
 
 
 # Kinds
@@ -58,14 +59,15 @@ def test_every_kind_of_the_toolkit_is_registered():
     assert set(project["entry-points"][Group.RECORDS]) == {one.name for one in names(Group.RECORDS)}
 
 
-def test_a_result_of_a_plug_in_is_saved_opened_and_drawn(toy, toy_file, tmp_path):
+def test_a_result_of_a_plug_in_is_saved_opened_and_drawn(toy, tmp_path):
+    assert [energy.source for energy in toy.energies] == [0, 1]
+    toy.save(tmp_path / "toy.nc")
     with plug_in():
-        again = vk.load_result(toy_file)
+        again = vk.load_result(tmp_path / "toy.nc")
         assert_same(toy, again)
         save_figure(again.plot(), tmp_path / "toy.png")
         assert again.settings == toy.settings
         assert again.analyzer == Toy(points=6, pair=(8, 9))
-    assert (tmp_path / "toy.png").stat().st_size > 1000
     again.plot_paths(), again.plot_history()
 
 
@@ -76,21 +78,21 @@ def test_a_record_of_a_plug_in_is_saved_and_opened(tmp_path):
             assert_same(CountRecord(counts=counts, **PROVENANCE), vk.load_result(tmp_path / "c.nc"))
 
 
-def test_a_file_of_an_unknown_kind_opens_as_plain_data_and_is_saved_as_it_was(toy, toy_file, tmp_path):
-    plain = vk.load_result(toy_file)
+def test_a_file_of_an_unknown_kind_opens_as_plain_data_and_is_saved_as_it_was(toy, tmp_path):
+    toy.save(tmp_path / "toy.nc")
+    plain = vk.load_result(tmp_path / "toy.nc")
     assert type(plain) is PlainRecord
     assert (plain.names, plain.unknown_kind) == (toy.names, "shade")
     assert (plain.scene, plain.settings, plain.stats) == (toy.scene, toy.settings, toy.stats)
     assert plain.oscillator == vk.load_scene("hertz-0.570")
     (finding,) = plain.found(Code.UNKNOWN_KIND)
     assert (finding.severity, finding.values["kind"]) == (Severity.WARNING, "shade")
-    assert "'shade'" in repr(plain)
     np.testing.assert_array_equal(plain.dataset["angle"], toy.data["angle"])
     assert_same(toy.energies, plain.energies)
     with pytest.raises(UnknownNameError, match="no picture of kind 'shade': no installed package registers it"):
         plain.plot()
     plain.save(tmp_path / "again.nc")
-    assert (tmp_path / "again.nc").read_bytes() == toy_file.read_bytes()
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "toy.nc").read_bytes()
 
 
 def test_a_part_of_unknown_kind_comes_back_as_plain_data_and_keeps_its_kind():
@@ -145,9 +147,8 @@ def test_an_abstract_record_needs_no_kind():
 
 
 def test_settings_that_are_not_plain_data_are_refused(tmp_path):
-    record = dataclasses.replace(full_result(), settings={"stepper": vk.RK4(steps=64)})
     with pytest.raises(ResultFileError, match=r"LeastActionResult cannot be saved: .* not plain data .*RK4"):
-        record.save(tmp_path / "r.nc")
+        dataclasses.replace(full_result(), settings={"stepper": vk.RK4(steps=64)}).save(tmp_path / "r.nc")
     assert not list(tmp_path.iterdir())
 
 
@@ -163,13 +164,9 @@ def test_settings_come_back_as_they_were(tmp_path):
 
 
 def test_findings_are_saved_with_names(tmp_path):
-    structure = empty_structure()
     found = Finding.of(Code.CHAOTIC_SOURCE, 7, count=3, periods=[1, 4])
-    dataclasses.replace(structure, findings=(found,)).save(tmp_path / "s.nc")
-    (again,) = vk.load_result(tmp_path / "s.nc").findings
-    assert (again.code, again.source, again.target, dict(again.values)) == (
-        Code.CHAOTIC_SOURCE, 7, None, {"count": 3, "periods": [1, 4]},
-    )  # fmt: skip
+    dataclasses.replace(empty_structure(), findings=(found,)).save(tmp_path / "s.nc")
+    assert vk.load_result(tmp_path / "s.nc").findings == (found,)
 
 
 @pytest.mark.parametrize(
@@ -203,9 +200,7 @@ def test_a_folder_that_does_not_exist_is_named(tmp_path):
 
 
 def test_the_dataset_of_a_trajectory():
-    path = vk.load_scene("hertz-0.570").trajectory((0.1, 0.2), periods=1, samples=16)
+    path = Trajectory(np.arange(3.0), np.random.default_rng(0).normal(size=(3, 3)))
     data = path.to_dataset()
-    np.testing.assert_array_equal(data.v, path.v)
-    np.testing.assert_array_equal(data.t, path.t)
+    np.testing.assert_array_equal([data.t, data.x, data.v, data.state3], [path.t, *path.states.T])
     assert (data.x.units, data.v.units, data.t.units) == ("m", "m s-1", "s")
-    assert isinstance(data, xarray.Dataset)

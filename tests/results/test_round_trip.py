@@ -21,7 +21,6 @@ from tests.builders import (
 )  # fmt: skip
 from vibrokit.errors import ResultFileError
 from vibrokit.results.basins import Basins
-from vibrokit.results.least_action import LeastActionResult
 from vibrokit.results.record import Record
 from vibrokit.results.section import Section
 
@@ -39,18 +38,14 @@ def wide_structure():
     return dataclasses.replace(empty_structure(), attractors=(wide,), basins=Basins(REGION, labels))
 
 
-MADE = (
-    full_structure,
-    empty_structure,
-    wide_structure,
-    full_result,
-    empty_result,
-    full_continuation,
-    empty_continuation,
-)
-
-
-@pytest.mark.parametrize("make", MADE)
+@pytest.mark.parametrize(
+    "make",
+    [
+        full_structure, empty_structure, wide_structure, full_result, empty_result, full_continuation,
+        empty_continuation, lambda: dataclasses.replace(empty_result(), section=Section.of(full_structure())),
+        lambda: dataclasses.replace(empty_result(), seed=2**70),
+    ],
+)  # fmt: skip
 @pytest.mark.filterwarnings("error")
 def test_everything_comes_back_bit_for_bit(make, tmp_path):
     record = make()
@@ -67,18 +62,6 @@ def test_a_path_of_two_energies_is_saved_once(tmp_path):
     again = vk.load_result(tmp_path / "r.nc")
     assert again.energies[0].path is again.branches[0].path
     assert again.to_dataset().sizes["path"] == 3
-
-
-def test_a_seed_longer_than_any_number_comes_back(tmp_path):
-    dataclasses.replace(full_result(), seed=2**70).save(tmp_path / "r.nc")
-    assert vk.load_result(tmp_path / "r.nc").seed == 2**70
-
-
-@pytest.mark.parametrize("make", [full_structure, empty_structure])
-def test_the_section_of_a_structure_comes_back(make):
-    section = Section.of(make())
-    result = dataclasses.replace(empty_result(), section=section)
-    assert_same(section, LeastActionResult.from_dataset(result.to_dataset(), scene={}).section)
 
 
 def test_points_of_different_widths_are_refused(tmp_path):
