@@ -192,13 +192,6 @@ def test_a_path_without_an_error_does_not_attain_the_proven_minimum():
     assert energy.bound is Bound.UPPER
 
 
-def test_the_bounds_of_a_mirror_image_contain_its_own_value():
-    image = dataclasses.replace(path(1.0), lower=1.0 - 1e-12)
-    (energy,), (finding,) = combined(ORBIT, (path(1 - 1e-7),), (), {1: image})
-    assert finding.code is Code.MIRROR_IMAGE
-    assert energy.lower <= energy.value <= energy.upper
-
-
 def test_an_exact_energy_is_not_replaced_by_a_costlier_path():
     (energy,), (finding,) = combined(ORBIT, (path(1.7),), (), least=[least(1.0, Bound.EXACT)])
     assert (finding.code, energy.value, energy.bound) == (Code.BARRIER_ENERGY, 1.0, Bound.EXACT)

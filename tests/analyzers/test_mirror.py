@@ -5,11 +5,14 @@ import functools
 
 import numpy as np
 import pytest
+import scipy.interpolate
 
 import vibrokit as vk
 from tests.layers import long
+from vibrokit.analyzers.mirrored import mirrored
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.analyzers.sources import MirrorImages
 from vibrokit.results.codes import Code
 
 LEAST = vk.LeastAction(graph=vk.GraphSearch(nodes=(120, 120)), shooting=vk.Shooting(points=2000, rounds=8))
@@ -46,6 +49,7 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     (image,) = both(kind).found(Code.MIRROR_IMAGE)
     assert (image.source, image.target) == (second.source, second.target) == (first.target, first.source)
     assert (second.lower, second.bound) == (first.lower, first.bound)
+    assert second.value == pytest.approx(first.value, rel=1e-10)
     alone = vk.LeastAction(source=second.source, graph=LEAST.graph, shooting=LEAST.shooting).run(osc, structure)
     assert not alone.found(Code.MIRROR_IMAGE)
     assert alone.energies[0].value == pytest.approx(second.value, rel=1e-9)
@@ -54,20 +58,34 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["forced", "noise", *map(long, ("one stop", "second harmonic"))])
-def test_other_scenes_have_none(kind):
-    """Whatever path is known, only in the symmetric scene is there a mirror image of it."""
+@pytest.mark.parametrize("kind", ["forced", "unforced"])
+def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
+    """Around the second well it is what the graph finds there."""
     osc, structure = wells(kind)
-    known = both("forced").energies[:1]
-    images = Mirror(ExitProblem(osc, structure, structure.attractors[1], vk.LeaveBasin(), known=known)).candidates(())
-    assert len(images) == (kind == "forced")
+    searched = both(kind).data.isel(source=1)
+    alone = dataclasses.replace(LEAST, source=1, shooting=None).run(osc, structure).data.isel(source=0)
+    found, wanted = (
+        scipy.interpolate.RegularGridInterpolator(
+            (each.quasi_potential_x.values, each.quasi_potential_v.values), each.quasi_potential.values
+        )(structure.attractors[1].points[0, :2] + np.array([[0.0, 0.0], [-0.1, 0.1], [0.2, 0.0], [0.1, -0.2]]))
+        for each in (searched.dropna("node_x", how="all").dropna("node_v", how="all"), alone)
+    )
+    np.testing.assert_allclose(found, wanted, rtol=0.05, atol=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["forced", *OTHERS])
+def test_only_a_symmetric_scene_has_mirror_images(kind):
+    osc, structure = wells(kind)
+    labels = [Mirror(ExitProblem(osc, structure, one, vk.LeaveBasin())).image for one in structure.attractors]
+    assert labels == ([1, 0] if kind == "forced" else [None, None])
 
 
 def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():
     osc, structure = wells("forced")
     left, right = structure.attractors
     known = both("forced").energies[:1]
-    (image,) = Mirror(ExitProblem(osc, structure, right, vk.LeaveBasin(), known=known)).candidates(())
+    mirror = Mirror(ExitProblem(osc, structure, right, vk.LeaveBasin()))
+    (image,) = mirror.candidates(known)
     period = 2 * np.pi / 0.8
     path = known[0].path
     half = np.searchsorted(path.t, period / 2 - 1e-9)
@@ -77,6 +95,7 @@ def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():
     np.testing.assert_array_equal(image.states, -path.q[half:])
     np.testing.assert_array_equal(image.momenta, -path.p[half:])
     assert (image.source, image.target) == (right.label, left.label)
+    assert mirror.candidates(both("forced").energies[1:]) == []  # it leaves the attractor itself
 
 
 @pytest.mark.slow
@@ -91,18 +110,16 @@ def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
     found = vk.LeastAction(source=middle.label, graph=None, shooting=LEAST.shooting).run(osc, structure)
     one = found.branches[0]
     problem = ExitProblem(osc, structure, middle, vk.LeaveBasin())
-    (image,) = Mirror(problem).candidates((one,))
+    (image,) = MirrorImages().propose(problem, (one,))
     assert {image.target, one.target} == {0, 2}
-    assert Mirror(problem).candidates(found.branches) == []
+    assert MirrorImages().propose(problem, found.branches) == []
 
 
-def test_what_is_found_later_of_the_mirror_image_is_polished_too():
+@pytest.mark.parametrize("change", [{"value": 1.001}, {"path": None}, {"bound": vk.Bound.EXACT}], ids=str)
+def test_an_attractor_whose_images_are_not_found_again_is_searched(change):
     osc, structure = wells("forced")
-    first, second = both("forced").energies
-    search = LEAST.road(ExitProblem(osc, structure, structure.attractor(first.source), vk.LeaveBasin()))
-    (found,) = search.revisit((second,)).estimates
-    assert (found.source, found.target, found.bound) == (first.source, first.target, second.bound)
-    assert found.value == pytest.approx(first.value, rel=1e-9)
-    assert search.revisit((second,)) is None
-    costlier = dataclasses.replace(second, value=1.1 * second.value)
-    assert search.revisit((costlier,)) is None
+    energy = both("forced").energies[0]
+    if "value" in change:
+        change = {"value": change["value"] * energy.value, "upper": 2 * energy.value}
+    known = vk.Analysis((dataclasses.replace(energy, **change),), branches=both("forced").branches[:1])
+    assert mirrored(ExitProblem(osc, structure, structure.attractors[1], vk.LeaveBasin()), known, None) is None

@@ -8,7 +8,6 @@ from enum import Enum
 
 import numpy as np
 
-from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -25,7 +24,6 @@ class ExitState(Enum):
     """A path attains the proven minimum."""
     BARRIER = Code.BARRIER_ENERGY
     """The proven minimum is attained, and no polished path shows it."""
-    MIRRORED = Code.MIRROR_IMAGE
     BRACKETED = Code.BRACKET
     """Between the graph and a path from or to an orbit inside a set."""
     AGREED = Code.AGREEMENT
@@ -55,7 +53,6 @@ def compared(
     attractor: Attractor,
     branches: Sequence[ActivationEnergy],
     estimates: Iterable[ActivationEnergy],
-    mirrored: Mapping[int, ActivationEnergy] | None = None,
     least: Iterable[ActivationEnergy] = (),
     shots: Iterable[ActivationEnergy] = (),
 ) -> tuple[ComparedExit, ...]:
@@ -64,22 +61,21 @@ def compared(
     The upper bound is the action of the best path and its numerical error. The lower bound rests on the graph, which
     searches everywhere: it is the smaller of path and graph, each less its error. Where the two differ by more than the
     graph's error, that error was estimated too small, and their difference takes its place. Without a graph nothing
-    excludes a cheaper path, and the lower bound is 0. The energy of a mirror image has the bounds of the other one.
+    excludes a cheaper path, and the lower bound is 0.
     Where a minimum is proven, the lower bound is at least that minimum; where the exit attains it, no path is needed. A
     path attains the proven minimum only if both agree within their numerical errors. An action plot's path that was not
     polished is an upper bound within its own error.
 
-    Given are the polished paths, the cheapest first, the graph's estimates, by target the energies that those of the
-    attractor are mirror images of, the least possible actions, and the action plot's energies.
+    Given are the polished paths, the cheapest first, the graph's estimates, the least possible actions, and the action
+    plot's energies.
     """
     path: dict[int, ActivationEnergy] = {}
     for branch in branches:
         path.setdefault(branch.target, branch)
     graph, lowest, shot = ({each.target: each for each in some} for some in (estimates, least, shots))
-    images = mirrored or {}
     known = [target for target, each in lowest.items() if each.bound is Bound.EXACT]
     return tuple(
-        _of_target(attractor, _Known(*(some.get(target) for some in (path, graph, images, lowest, shot))))
+        _of_target(attractor, _Known(*(some.get(target) for some in (path, graph, lowest, shot))))
         for target in sorted({*path, *graph, *known, *shot}, key=lambda target: (target < 0, target))
     )
 
@@ -90,7 +86,6 @@ class _Known:
 
     path: ActivationEnergy | None  # polished
     graph: ActivationEnergy | None
-    image: ActivationEnergy | None  # the energy of which it is the mirror image
     least: ActivationEnergy | None
     shot: ActivationEnergy | None  # by the action plot
 
@@ -122,14 +117,11 @@ def _without_path(known: _Known) -> tuple[ExitState, ActivationEnergy]:
 
 
 def _with_path(attractor: Attractor, path: ActivationEnergy, known: _Known) -> tuple[ExitState, ActivationEnergy]:
-    graph, image, least = known.graph, known.image, known.least
+    graph, least = known.graph, known.least
     if least is not None and _attains(path, least):
         without = Bound.EXACT if least.bound is Bound.EXACT else path.bound
         bound = without if path.certificate is None else Bound.CERTIFIED
         return ExitState.ATTAINED, dataclasses.replace(path, bound=bound)
-    if image is not None and same_action(path.value, image.value):
-        lower = min(image.lower, path.value)
-        return ExitState.MIRRORED, dataclasses.replace(path, lower=lower, bound=image.bound)
     if graph is None:
         return ExitState.NOT_SEARCHED, path
     if not attractor.repeats or path.bound is Bound.BRACKET:

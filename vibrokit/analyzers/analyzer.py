@@ -7,7 +7,7 @@ import hashlib
 import math
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from typing import Any, ClassVar, Self, dataclass_transform
 
@@ -55,9 +55,6 @@ class Analysis(metaclass=Constructed):
         All exit paths that were found, also those that are not the best; the cheapest first.
     complete : bool
         False if the work was stopped before its end.
-    revisit : callable, optional
-        Called after all attractors have been analyzed, with the energies and branches of the others. Returns a new
-        analysis, or None to keep this one.
     """
 
     estimates: tuple[ActivationEnergy, ...] = ()
@@ -65,7 +62,6 @@ class Analysis(metaclass=Constructed):
     findings: tuple[Finding, ...] = ()
     branches: tuple[ActivationEnergy, ...] = ()
     complete: bool = True
-    revisit: Callable[[tuple[ActivationEnergy, ...]], Analysis | None] | None = None
 
     def __post_init__(self) -> None:
         check_findings(self.findings)
@@ -174,18 +170,16 @@ class Analyzer(ABC, metaclass=Constructed):
         """
         sources = self._checked(osc, structure, executor)
         kept = self._checkpoint(osc, structure, checkpoint)
-        analyses: dict[int, Analysis] = {}
-
-        def problem(attractor: Attractor) -> ExitProblem:
-            known = _known(analyses, attractor.label)
-            return ExitProblem(osc, structure, attractor, self.exit, self.stepper, executor, kept, known)
-
+        problems = [ExitProblem(osc, structure, one, self.exit, self.stepper, executor, kept) for one in sources]
         with working(progress, time_limit) as work:
             try:
-                findings = self._analyze_all(sources, problem, analyses)
+                analyses, stops = self._analyze_all(problems)
             finally:
                 kept.flush()
-            complete = not findings and len(analyses) == len(sources) and all(one.complete for one in analyses.values())
+            some = analyses.values()
+            findings = [finding for one in some for finding in one.findings]
+            findings += _strength(self.least_intensity(osc), some)
+            findings += stops
             if kept.failure:
                 findings.append(Finding.of(Code.CHECKPOINT_NOT_WRITTEN, path=str(kept.path), reason=kept.failure))
             return self.result.assembled(
@@ -193,15 +187,11 @@ class Analyzer(ABC, metaclass=Constructed):
                 estimates={label: one.estimates for label, one in analyses.items()},
                 branches={label: one.branches for label, one in analyses.items()},
                 data={label: one.data for label, one in analyses.items()},
-                findings=(
-                    *(finding for one in analyses.values() for finding in one.findings),
-                    *_strength(self.least_intensity(osc), analyses),
-                    *findings,
-                ),
+                findings=tuple(findings),
                 scene=scene_data(osc),
                 settings=settings_of(self),
                 stats=work.stats,
-                complete=complete,
+                complete=not stops and all(one.complete for one in some),
                 seconds=work.seconds,
             )
 
@@ -261,33 +251,27 @@ class Analyzer(ABC, metaclass=Constructed):
             },
         )
 
-    def _analyze_all(
-        self,
-        sources: Sequence[Attractor],
-        problem_of: Callable[[Attractor], ExitProblem],
-        analyses: dict[int, Analysis],
-    ) -> list[Finding]:
-        """Analyze all attractors, then see what those found later change of the earlier ones; note an interrupt."""
-        problems: dict[int, ExitProblem] = {}
+    def _analyze_all(self, problems: Sequence[ExitProblem]) -> tuple[dict[int, Analysis], tuple[Finding, ...]]:
+        """Analyze attractors in turn until the work is stopped; findings tell of a stop that no analysis tells of."""
+        analyses, analyze = dict[int, Analysis](), self._analyzing()
         with Stoppable(type(self).__name__) as work:
-            for attractor in sources:
-                work.source = attractor.label
-                problem = problems[attractor.label] = problem_of(attractor)
-                with stage(work.doing, subject=attractor.name):
-                    analyses[attractor.label] = self._analyzed(problem)
-                if not analyses[attractor.label].complete:
-                    return []
-            for attractor in sources[:-1]:  # the last one knew the others
-                work.source = attractor.label
-                with stage(work.doing, subject=attractor.name):
-                    analyses[attractor.label] = self._revisited(problems[attractor.label], analyses)
-        return list(work.findings)
+            for problem in problems:
+                work.source = problem.source
+                with stage(work.doing, subject=problem.attractor.name):
+                    analyses[problem.source] = found = self._analyzed(problem, analyze)
+                if not found.complete:
+                    break
+        return analyses, work.findings
 
-    def _analyzed(self, problem: ExitProblem) -> Analysis:
+    def _analyzing(self) -> Callable[[ExitProblem], Analysis]:
+        """Return what analyzes the attractors of one run, in turn; by default each by itself."""
+        return self.analyze
+
+    def _analyzed(self, problem: ExitProblem, analyze: Callable[[ExitProblem], Analysis]) -> Analysis:
         """The analysis of one attractor; a failure is a finding, and the others are analyzed all the same."""
         try:
             problem.check_basin()
-            found = self.analyze(problem)
+            found = analyze(problem)
         except (StructureError, StepperError) as error:
             failed = Finding.of(Code.SOURCE_FAILED, problem.source, reason=str(error))
             return Analysis(findings=(failed,))
@@ -295,19 +279,6 @@ class Analyzer(ABC, metaclass=Constructed):
         with put_off():  # an interrupt must not lose the results
             data, limits = metastability(problem, found.data)
         return dataclasses.replace(found, data=data, findings=(*found.findings, *limits))
-
-    def _revisited(self, problem: ExitProblem, analyses: Mapping[int, Analysis]) -> Analysis:
-        """The analysis of one attractor, anew if what was found of the others changes it; kept if that fails."""
-        before = analyses[problem.source]
-        if before.revisit is None:
-            return before
-        try:
-            found = before.revisit(_known(analyses, problem.source))
-        except (StructureError, StepperError):
-            return before
-        if found is not None:
-            self._check_returned(found, problem)
-        return found or before
 
     def _check_returned(self, found: Any, problem: ExitProblem) -> None:
         """Refuse what no method may return, here where the class that returned it is known."""
@@ -336,15 +307,9 @@ class Analyzer(ABC, metaclass=Constructed):
                 )
 
 
-def _known(analyses: Mapping[int, Analysis], label: int) -> tuple[ActivationEnergy, ...]:
-    """What was found of all other attractors."""
-    others = (one for other, one in analyses.items() if other != label)
-    return tuple(exit_ for one in others for exit_ in (*one.estimates, *one.branches))
-
-
-def _strength(intensity: float, analyses: dict[int, Analysis]) -> list[Finding]:
+def _strength(intensity: float, analyses: Iterable[Analysis]) -> list[Finding]:
     """Findings where the noise is not weak against an energy that is known."""
-    energies = [energy for one in analyses.values() for energy in one.estimates if math.isfinite(energy.upper)]
+    energies = [energy for one in analyses for energy in one.estimates if math.isfinite(energy.upper)]
     return [finding for one in energies for finding in not_weak(one.source, one.target, one.value, intensity)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 from vibrokit.analyzers.agreement import VAGUE, ComparedExit, ExitState, compared
@@ -17,8 +17,6 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.structure.boundaries.meetings import meeting_cells
 
-_EXACT = (ExitState.MIRRORED, ExitState.ATTAINED, ExitState.BARRIER)
-"""Energies with bounds that no graph gave."""
 _GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
 
 
@@ -33,8 +31,6 @@ class Evidence:
     branches: tuple[ActivationEnergy, ...]  # polished, the cheapest first
     graph: GraphSolution | None = None
     rougher: GraphSolution | None = None  # the last graph on half as many nodes along each side
-    images: Mapping[int, ActivationEnergy] = dataclasses.field(default_factory=dict)
-    """By label: the known energies of which those of the attractor are mirror images."""
     least_possible: tuple[ActivationEnergy, ...] = ()
     """What no path can cost less than, where that is known."""
     beyond: frozenset[int] = frozenset()
@@ -52,7 +48,7 @@ class Evidence:
 
     def compared(self, shots: Sequence[ActivationEnergy] = ()) -> tuple[ComparedExit, ...]:
         """Return the energy of each exit; `shots` are the action plot's energies."""
-        return compared(self.attractor, self.branches, self.estimates, self.images, self.least_possible, shots)
+        return compared(self.attractor, self.branches, self.estimates, self.least_possible, shots)
 
     @property
     def exact(self) -> set[int]:
@@ -122,13 +118,12 @@ class Evidence:
         """Exits for which finer grids are of no use.
 
         For an attractor that is reached through other basins a rough estimate suffices. Without a path it is not
-        refined further once its error is below its value. Mirror images have their bounds, and so have paths that cost
-        the least possible.
+        refined further once its error is below its value. Energies that attain the proven minimum have their bounds.
         """
-        agreed, exact = self._in(ExitState.AGREED), self._in(*_EXACT)
+        agreed = self._in(ExitState.AGREED)
         rough = {each.target for each in self.estimates if each.numerical_error < each.value} - self.cheapest.keys()
         beyond = self.beyond & (agreed | rough)
-        return self.unresolvable | exact | beyond
+        return self.unresolvable | self.exact | beyond
 
     @cached_property
     def _states(self) -> dict[int, ExitState]:

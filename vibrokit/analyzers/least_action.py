@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch
+from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.mirrored import mirrored
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.polishing.certified import METHOD
 from vibrokit.analyzers.problem import ExitProblem
@@ -40,9 +43,8 @@ class LeastAction(Analyzer):
     path, where paths compete that differ by about 0.1 %. Paths are certified after each search. If the work is stopped
     in between, they are returned with the bounds that are known.
 
-    In a scene with odd forces, an attractor may be the mirror image of one that was analyzed before. The mirror images
-    of its paths take the place of shooting and of the finer graphs. If the later one has a cheaper path, its image is
-    polished for the earlier one in the end.
+    In a scene with odd forces, an attractor may be the mirror image of one that was analyzed before. Then the mirror
+    images of its paths are polished, with the same bounds, and nothing is searched.
 
     A path that passes saddles and other attractors on its way is polished in legs, from each of these orbits to the
     next.
@@ -100,21 +102,34 @@ class LeastAction(Analyzer):
         SceneError, StructureError, StepperError
             The only search cannot be used for this attractor.
         """
-        problem.check_path_begins()
-        if problem.at_exit:
-            return at_exit(problem, METHOD, Bound.CERTIFIED)
-        return self.road(problem).run()
+        return self._analyzing()(problem)
 
     def road(self, problem: ExitProblem) -> ExitRoad:
         """Return the road that it takes, before anything is done."""
-        mirror = Mirror(problem)
         shoots = self.shooting is not None and problem.attractor.is_fixed
-        images = MirrorImages(mirror)
         graph = None if self.graph is None else Graph(self.graph, shots_follow=shoots)
-        shots = None if self.shooting is None else Shots(self.shooting, mirror)
-        sources = (images, Relaxations(), graph, shots, images, ClosestApproach(graph))
+        shots = None if self.shooting is None else Shots(self.shooting)
+        sources = (Relaxations(), graph, shots, MirrorImages(), ClosestApproach(graph))
         proposing = [source for source in sources if source is not None]
         return ExitRoad(problem, proposing, accuracy=self.accuracy, orbits=self.orbits)
+
+    def _analyzing(self) -> Callable[[ExitProblem], Analysis]:
+        """Return what analyzes attractors in turn; it searches only one of two that are mirror images."""
+        searched: dict[int | None, tuple[Analysis, GraphSolution | None]] = {}
+
+        def analyze(problem: ExitProblem) -> Analysis:
+            problem.check_path_begins()
+            if problem.at_exit:
+                return at_exit(problem, METHOD, Bound.CERTIFIED)
+            original = searched.get(Mirror(problem).image) if searched else None
+            found = None if original is None else mirrored(problem, *original)
+            if found is None:
+                road = self.road(problem)
+                found = road.run()
+                searched[problem.source] = found, road.solution
+            return found
+
+        return analyze
 
 
 def _check_part(name: str, value: Any, kind: type) -> None:

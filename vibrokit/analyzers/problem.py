@@ -22,7 +22,6 @@ from vibrokit.kernels.stopping import LEFT_BASIN, LEFT_REGION
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED
-from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.structure import Structure
 from vibrokit.structure.along_x import apart, wrapped
 from vibrokit.structure.orbits import Orbit, refine_orbit
@@ -48,8 +47,6 @@ class ExitProblem(metaclass=Constructed):
         Where a method may do parts of its work; None for threads of this process.
     checkpoint : Checkpoint
         Where a method may keep what long work has reached.
-    known : tuple of ActivationEnergy
-        What the method has found of other attractors: their energies, and their branches.
     """
 
     osc: Oscillator
@@ -59,7 +56,6 @@ class ExitProblem(metaclass=Constructed):
     stepper: Stepper | None = None
     executor: Executor | None = None
     checkpoint: Checkpoint = dataclasses.field(default_factory=lambda: Checkpoint(None, {}))
-    known: tuple[ActivationEnergy, ...] = ()
 
     @property
     def source(self) -> int:

@@ -16,7 +16,6 @@ from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import detailed_balance
 from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
@@ -55,7 +54,6 @@ class ExitRoad:
         self.problem, self.sources, self._accuracy, self._orbits = problem, sources, accuracy, orbits
         self._graph = next((source for source in sources if isinstance(source, Graph)), None)
         self._shots = next((source for source in sources if isinstance(source, Shots)), None)
-        self._mirror = Mirror(problem)
         self._least = detailed_balance.least_actions(problem)
         self._minima_sought = False  # whether paths that may attain the proven minima were proposed
         self._polishings: list[Polishing] | None = None  # one for each orbit that paths leave; None before the first
@@ -78,25 +76,15 @@ class ExitRoad:
     @property
     def stopped(self) -> bool:
         """Whether the work was stopped anywhere before its end."""
-        parts = (self._solution, self._search, *(self._polishings or ()))
+        parts = (self.solution, self._search, *(self._polishings or ()))
         return self._cut or not all(part.complete for part in parts if part is not None)
-
-    def revisit(self, known: tuple[ActivationEnergy, ...]) -> Analysis | None:
-        """Polish mirror images of paths that were found later, where they cost less than the own ones."""
-        self.problem = dataclasses.replace(self.problem, known=known)
-        self._mirror = Mirror(self.problem)
-        images = self._mirror.candidates(self._polished[0], cheaper=True)
-        if not images:
-            return None
-        self._polish(images, Effort.SHOOT)
-        return self.analysis()
 
     def analysis(self) -> Analysis:
         """Combine what was found."""
         branches, polished = self._polished
         if self._graph is not None and self._graph.solution is not None:
             self._graph.solution = self._graph.solution.bounded(self.problem, self._evidence.cheapest.keys())
-        solution, evidence = self._solution, self._evidence
+        solution, evidence = self.solution, self._evidence
         exits = evidence.compared(self._unpolished(evidence))
         every = (*self._findings, *(() if solution is None else solution.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
@@ -109,7 +97,6 @@ class ExitRoad:
             tuple(finding for number, finding in enumerate(findings) if finding not in findings[:number]),
             branches,
             complete=not self.stopped,
-            revisit=self.revisit,
         )
 
     # --- propose and solve
@@ -135,7 +122,7 @@ class ExitRoad:
             return tuple(propose())
         except (SceneError, StructureError, StepperError) as error:
             alone = source.searches and not any(other.searches for other in self.sources if other is not source)
-            if alone and self._solution is None:
+            if alone and self.solution is None:
                 raise
             self._failed(source.name, error)
             return ()
@@ -188,10 +175,10 @@ class ExitRoad:
 
     def _begin_otherwise(self) -> None:
         """Polish other beginnings of the cheapest path to each attractor, where paths compete that differ little."""
-        if self._graph is None or self._solution is None or not self.problem.attractor.repeats:
+        if self._graph is None or self.solution is None or not self.problem.attractor.repeats:
             return
         evidence = self._evidence
-        for target in sorted(evidence.cheapest.keys() - evidence.unresolvable - evidence.images.keys()):
+        for target in sorted(evidence.cheapest.keys() - evidence.unresolvable):
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
                 self._polish(self._graph.beginnings(self.problem, evidence.cheapest[target]))
 
@@ -202,7 +189,8 @@ class ExitRoad:
         return reached_through_others(self.problem)
 
     @property
-    def _solution(self) -> GraphSolution | None:
+    def solution(self) -> GraphSolution | None:
+        """What the graph has found."""
         return None if self._graph is None else self._graph.solution
 
     @property
@@ -218,11 +206,11 @@ class ExitRoad:
 
     @property
     def _evidence(self) -> Evidence:
-        attractor, images, beyond = self.problem.attractor, self._mirror.energies, frozenset[int]()
+        attractor, beyond = self.problem.attractor, frozenset[int]()
         rougher = None if self._graph is None else self._graph.rougher
-        if self._solution is not None:
+        if self.solution is not None:
             beyond = self._beyond
-        return Evidence(attractor, self._polished[0], self._solution, rougher, images, tuple(self._least), beyond)
+        return Evidence(attractor, self._polished[0], self.solution, rougher, tuple(self._least), beyond)
 
     @property
     def _is_exact(self) -> bool:

@@ -58,16 +58,21 @@ class Source(ABC):
 
 
 class MirrorImages(Source):
-    """The mirror images of known paths, also of other attractors, in a scene whose forces are odd."""
+    """The mirror images of paths, in a scene whose forces are odd: by default those of the attractor's own."""
 
     name = MIRROR
 
-    def __init__(self, mirror: Mirror) -> None:
-        self._mirror = mirror
+    def __init__(self, known: Sequence[ActivationEnergy] | None = None) -> None:
+        self._known = known
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
-        """Return those that are new."""
-        return self._mirror.candidates(polished)
+        """Return those of other actions than the polished paths to the same targets."""
+        found = Mirror(problem).candidates(polished if self._known is None else self._known)
+        return [
+            one
+            for one in found
+            if not any(each.target == one.target and same_action(one.action, each.value) for each in polished)
+        ]
 
 
 class Relaxations(Source):
@@ -146,7 +151,7 @@ class Graph(Source):
 
 
 class Shots(Source):
-    """Shooting; not where mirror images of known paths were polished.
+    """Shooting.
 
     Attributes
     ----------
@@ -158,15 +163,13 @@ class Shots(Source):
     searches = True
     effort = Effort.FROM_ORBIT
 
-    def __init__(self, settings: Shooting, mirror: Mirror) -> None:
-        self._settings, self._mirror = settings, mirror
+    def __init__(self, settings: Shooting) -> None:
+        self._settings = settings
         self.search: Search | None = None
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
         """Shoot from an orbit or an equilibrium; from other motion there is nothing to shoot from."""
-        images = self._mirror.energies
-        mirrored = (each.target in images and same_action(each.value, images[each.target].value) for each in polished)
-        if not problem.attractor.is_fixed or any(mirrored):
+        if not problem.attractor.is_fixed:
             return ()
         self.search = self._settings.search(problem)
         self.findings = self.search.findings

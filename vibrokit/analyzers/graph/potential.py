@@ -51,18 +51,18 @@ class Potential:
         index = np.where(self.grids.inside(phase, states)[:, None], self.grids.index(phase, states), np.nan)
         return interpolate_all(self.values[phase], np.ascontiguousarray(index))
 
-    def on_section(self) -> tuple[Array, Array]:
-        """Return nodes (nx, nv, 2) on the section, and V there: the least in any section interval."""
-        grids = self.grids
-        if len(grids.sections) == 1:
-            return grids.nodes(0), self.values[0]
-        boxes = grids.boxes[list(grids.sections)]
+    def on_section(self, later: int = 0) -> tuple[Array, Array]:
+        """Return nodes (nx, nv, 2) at the section, or some phases later, and V there: the least of all intervals."""
+        grids, phases = self.grids, range(later, self.grids.phases, self.grids.steps)
+        if len(phases) == 1:
+            return grids.nodes(later), self.values[later]
+        boxes = grids.boxes[list(phases)]
         whole = dataclasses.replace(
             grids, boxes=np.stack([boxes[..., 0].min(axis=0), boxes[..., 1].max(axis=0)], -1)[None]
         )
         nodes = whole.nodes(0)
         states = nodes.reshape(-1, 2)
-        values = np.fmin.reduce([self.at(phase, states) for phase in grids.sections])
+        values = np.fmin.reduce([self.at(phase, states) for phase in phases])
         return nodes, np.where(np.isnan(values), self.ceiling, values).reshape(nodes.shape[:2])
 
     def rise(self, phase: int, state: Array) -> float:

@@ -87,15 +87,21 @@ class GraphSolution:
             found.setdefault(energy.target, []).append(energy)
         return tuple(_best(some) for some in found.values())
 
-    def dataset(self) -> xarray.Dataset:
-        """Return the potential on the section, and the cheapest path.
+    def dataset(self, *, mirrored: bool = False) -> xarray.Dataset:
+        """Return the potential on the section, and the cheapest path, or their mirror images half a period later.
 
         The variables are those of `vibrokit.results.least_action.ActionGraphResult`, without ``source``.
         """
-        nodes, values = self.potential.on_section()
-        known = np.where(values < self.potential.ceiling, values, np.nan)
-        paths = [np.column_stack([path.times, path.states]) for path in self.candidates]
-        t, x, v = (paths[0] if paths else np.full((1, 3), np.nan)).T
+        grids = self.potential.grids
+        later = grids.steps // 2 if mirrored and grids.phases > 1 else 0
+        nodes, values = self.potential.on_section(later)
+        path = np.full((1, 3), np.nan)
+        if self.candidates:
+            times, states = self.candidates[0].times, self.candidates[0].states[later:]
+            path = np.column_stack([times[: len(states)], states])
+        if mirrored:
+            nodes, values, path = -nodes[::-1, ::-1], values[::-1, ::-1], path * [1.0, -1.0, -1.0]
+        known, (t, x, v) = np.where(values < self.potential.ceiling, values, np.nan), path.T
         return xarray.Dataset(
             {
                 "quasi_potential": _array(("node_x", "node_v"), known, "m2 s-3", "quasi-potential on the section"),
