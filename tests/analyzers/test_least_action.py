@@ -105,55 +105,49 @@ def estimate(target, value, error):
     return ActivationEnergy(0, target, value, 0.0, value, "graph", Bound.ESTIMATE, numerical_error=error)
 
 
-def graph_of(estimates, finer=0, side=180.0, steps=64, known=math.inf):
-    cheapest = {each.target: SimpleNamespace(side=side, steps=steps, known=known) for each in estimates}
-    return SimpleNamespace(estimates=estimates, finer=finer, cheapest=cheapest, most_steps=64)
+def graph_of(estimates, finer=0, steps=64, known=math.inf, last_for_all=False):
+    cheapest = {each.target: SimpleNamespace(steps=steps, known=known) for each in estimates}
+    return SimpleNamespace(
+        estimates=estimates, finer=finer, cheapest=cheapest, most_steps=64, last_for_all=last_for_all,
+        calibrated=lambda polished: estimates,
+    )  # fmt: skip
 
 
-def test_the_last_doubling_of_the_nodes_is_for_exits_with_a_path_that_the_graph_is_too_coarse_for():
-    """Errors of a hundredth, a third and nine tenths of the paths' actions, and an exit without a path."""
-    paths = tuple(estimate(target, 1.0, 0.0) for target in (1, 2, 3))
-    errors = {1: 0.01, 2: 0.3, 3: 0.9, 4: 0.9}
-    graph = graph_of([estimate(target, 1.0, error) for target, error in errors.items()], finer=1)
-    graph.last_for_all, graph.calibrated = True, lambda polished: graph.estimates
-    attractor = SimpleNamespace(repeats=True, label=0)
-    assert Evidence(attractor, paths, graph).settled(0.01) == {1, 2, 4}
-    graph.last_for_all = False
-    assert Evidence(attractor, paths, graph).settled(0.01) == {1}
-
-
-NEVER_REPEATS = SimpleNamespace(repeats=False)  # its estimates are not calibrated by paths
+ORBIT, SET = SimpleNamespace(repeats=True, label=0), SimpleNamespace(repeats=False, label=0)
 
 
 @pytest.mark.parametrize(
-    ("finer", "before", "useless"),
-    [
-        (0, None, {1, 2}), (1, None, {2}), (2, None, {2}), (3, None, set()),
-        (1, 64.0, {2}), (2, 64.0, {2}), (1, 6.0, {2}), (1, 3.0, {1, 2}), (2, 3.0, {2}), (2, 1.0, {1, 2}),
-    ],
-)  # fmt: skip
-def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, before, useless):
-    """Each doubling of the nodes divides its error, of 2 here, as the last one did, by 8 at best."""
+    ("attractor", "last", "settled"),
+    [(ORBIT, False, {1, 5}), (SET, False, {1, 5}), (ORBIT, True, {1, 2, 4, 5}), (SET, True, {1, 2, 4, 5})],
+)
+def test_exits_that_the_graph_tells_accurately_are_settled(attractor, last, settled):
+    """Errors of a hundredth, a third and nine tenths of the paths' actions, an exit without a path, and one beyond."""
+    paths = tuple(estimate(target, 1.0, 0.0) for target in (1, 2, 3, 5))
+    errors = {1: 0.01, 2: 0.3, 3: 0.9, 4: 0.9, 5: 0.4}
+    graph = graph_of([estimate(target, 1.0, error) for target, error in errors.items()], 1, last_for_all=last)
+    assert Evidence(attractor, paths, graph, beyond=frozenset({5})).settled(0.01) == settled
+
+
+@pytest.mark.parametrize("value", [0.5, 2.0])
+def test_an_exit_of_which_path_and_graph_contradict_each_other_is_not_settled(value):
+    graph = graph_of([estimate(1, value, 0.01)], 1, last_for_all=True)
+    assert Evidence(ORBIT, (estimate(1, 1.0, 0.0),), graph, beyond=frozenset({1})).settled(0.5) == set()
+
+
+@pytest.mark.parametrize(("finer", "useless"), [(0, {1, 2}), (1, {2}), (2, {2}), (3, set())])
+def test_the_graph_is_not_refined_for_what_its_finest_grid_could_not_tell(finer, useless):
+    """Each doubling of the nodes divides its error, of 2 here, by 8 at best."""
     paths = (estimate(2, 0.01, 0.0), estimate(1, 1.0, 0.0))
-    rougher = None if before is None else graph_of([estimate(each, 1.0, before) for each in (1, 2)], side=90.0)
     graph = graph_of([estimate(1, 1.0, 2.0), estimate(2, 0.01, 2.0), estimate(3, 1.0, 9.0)], finer)
-    assert Evidence(NEVER_REPEATS, paths, graph, rougher).unresolvable == useless
+    assert Evidence(ORBIT, paths, graph).unresolvable == useless
 
 
-@pytest.mark.parametrize(("side", "useless"), [(45.0, {1}), (90.0, {1}), (160.0, set()), (180.0, set())])
-def test_the_gain_of_a_finer_graph_is_that_of_twice_the_nodes(side, useless):
-    """An error that fell from 12 to 8 falls by (3/2)^(1/doublings) with the next; half of the action is too coarse."""
-    rougher, graph = graph_of([estimate(1, 1.0, 12.0)], side=side), graph_of([estimate(1, 1.0, 8.0)], finer=2)
-    assert Evidence(NEVER_REPEATS, (estimate(1, 1.0, 0.0),), graph, rougher).unresolvable == useless
-
-
-@pytest.mark.parametrize("rougher", [None, graph_of([estimate(1, 1.0, 2.0)], side=90.0)], ids=["first", "second"])
 @pytest.mark.parametrize(
     ("finer", "known", "useless"), [(0, math.inf, {1}), (1, math.inf, set()), (1, 0.5, set()), (1, 1e-3, {1})]
 )
-def test_grids_far_too_large_for_a_path_found_since_tell_nothing_of_finer_ones(finer, known, useless, rougher):
+def test_grids_far_too_large_for_a_path_found_since_tell_nothing_of_finer_ones(finer, known, useless):
     graph = graph_of([estimate(1, 1.0, 2.0)], finer, known=known)
-    assert Evidence(NEVER_REPEATS, (estimate(1, 1e-3, 0.0),), graph, rougher).unresolvable == useless
+    assert Evidence(ORBIT, (estimate(1, 1e-3, 0.0),), graph).unresolvable == useless
 
 
 @pytest.mark.parametrize(
@@ -161,9 +155,8 @@ def test_grids_far_too_large_for_a_path_found_since_tell_nothing_of_finer_ones(f
     [(0, 32, 0.8, {1}), (1, 32, 0.8, set()), (1, 64, 0.8, {1}), (1, 32, 0.95, {1})],
 )
 def test_v_below_a_path_tells_nothing_of_a_finer_graph_with_shorter_steps(finer, steps, value, useless):
-    rougher = graph_of([estimate(1, 1.0, 1.2)], side=90.0)
-    graph = graph_of([estimate(1, value, 1.2)], finer, steps=steps)
-    assert Evidence(NEVER_REPEATS, (estimate(1, 1.0, 0.0),), graph, rougher).unresolvable == useless
+    graph = graph_of([estimate(1, value, 12.0)], finer, steps=steps)
+    assert Evidence(ORBIT, (estimate(1, 1.0, 0.0),), graph).unresolvable == useless
 
 
 def test_without_a_saddle_the_action_plot_bounds_the_energies():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -30,7 +29,6 @@ class Evidence:
     attractor: Attractor
     branches: tuple[ActivationEnergy, ...]  # polished, the cheapest first
     graph: GraphSolution | None = None
-    rougher: GraphSolution | None = None  # the last graph on half as many nodes along each side
     least_possible: tuple[ActivationEnergy, ...] = ()
     """What no path can cost less than, where that is known."""
     beyond: frozenset[int] = frozenset()
@@ -44,101 +42,72 @@ class Evidence:
     @cached_property
     def estimates(self) -> tuple[ActivationEnergy, ...]:
         """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
-        return self._estimates_of(self.graph)
+        if self.graph is None or not self.attractor.repeats:
+            return () if self.graph is None else self.graph.estimates
+        return self.graph.calibrated([branch for branch in self.branches if branch.bound is not Bound.BRACKET])
 
     def compared(self, shots: Sequence[ActivationEnergy] = ()) -> tuple[ComparedExit, ...]:
         """Return the energy of each exit; `shots` are the action plot's energies."""
         return compared(self.attractor, self.branches, self.estimates, self.least_possible, shots)
 
-    @property
+    @cached_property
     def exact(self) -> set[int]:
         """Exits that cost what no path can cost less than."""
-        return self._in(ExitState.ATTAINED, ExitState.BARRIER)
+        return {target for target, state in self._states.items() if state in (ExitState.ATTAINED, ExitState.BARRIER)}
 
     def settled(self, accuracy: float) -> set[int]:
-        """Return the exits on which an accurate graph and a path agree, or for which finer grids are of no use."""
-        if self.graph is None:
-            return set()
-        if self.graph.last_for_all:
-            found = self._accurate(VAGUE) & self._in(ExitState.AGREED, ExitState.BRACKETED)
-            found |= self._in(ExitState.GRAPH_ONLY)
-        else:
-            found = self._accurate(accuracy) & self._in(ExitState.AGREED)
-        return found | (self._useless if self.attractor.repeats else self.unresolvable | self.beyond)
+        """Return the exits for which more nodes are of no use.
 
-    def _accurate(self, accuracy: float) -> set[int]:
-        return {each.target for each in self.estimates if each.numerical_error <= accuracy * each.value}
+        ======================================  =====================================================
+        exit                                    settled
+        ======================================  =====================================================
+        that attains the proven minimum         always: no graph gave its bounds
+        that even the finest grid will not      always
+        resolve
+        where path and graph contradict each    never
+        other
+        that only paths through other basins    once the graph's error is below its value
+        reach
+        any other                               once that error is at most `accuracy` of the value
+        ======================================  =====================================================
+
+        Twice the nodes that were asked for are only for paths that the graph is too coarse for. Before these, half of
+        the value is enough of an accuracy, and an exit without a path is settled.
+        """
+        found = self.exact | self.unresolvable
+        last = self.graph is not None and self.graph.last_for_all
+        for each in self.estimates:
+            state = self._states[each.target]
+            allowed = 1.0 if each.target in self.beyond else VAGUE if last else accuracy
+            accurate = each.numerical_error <= allowed * each.value or (last and state is ExitState.GRAPH_ONLY)
+            if accurate and state in (ExitState.AGREED, ExitState.BRACKETED, ExitState.GRAPH_ONLY):
+                found.add(each.target)
+        return found
 
     @cached_property
     def unresolvable(self) -> set[int]:
         """Exits with a path that costs less than the error that even the finest graph would have.
 
-        The error is expected to fall again as it fell with the nodes along a side since the last graph.
+        Finer grids may tell more than that if they are for a far cheaper path, found since, or have shorter steps where
+        V is below the action of the path.
         """
-        found, finer = set[int](), 0 if self.graph is None else self.graph.finer
+        found, graph = set[int](), self.graph
         for each in self.estimates:
             path = self.cheapest.get(each.target)
-            if path is None or (finer and self._will_differ(each, path)):
+            if graph is None or path is None:
                 continue
-            if each.numerical_error / self._gain(each) ** finer > path.value:
+            solved = graph.cheapest[each.target]
+            cheaper = LOOSE * path.value < solved.known and path.value < each.value
+            shorter = solved.steps < graph.most_steps and each.value < BELOW * path.value
+            will_differ = graph.finer and (cheaper or shorter)
+            if not will_differ and each.numerical_error / _GAIN**graph.finer > path.value:
                 found.add(each.target)
         return found
-
-    def _will_differ(self, estimate: ActivationEnergy, path: ActivationEnergy) -> bool:
-        """Whether the next grids are for a far cheaper path, found since, or have shorter steps: they tell more."""
-        assert self.graph is not None
-        solved = self.graph.cheapest[estimate.target]
-        cheaper = LOOSE * path.value < solved.known and path.value < estimate.value
-        shorter = solved.steps < self.graph.most_steps
-        return cheaper or (shorter and estimate.value < BELOW * path.value)
-
-    def _gain(self, estimate: ActivationEnergy) -> float:
-        """By which the error of an estimate of the graph is expected to fall when the nodes along a side double."""
-        target, error = estimate.target, estimate.numerical_error
-        if self.graph is None or self.rougher is None or target not in self._errors_before or not error:
-            return _GAIN
-        doublings = math.log2(self.graph.cheapest[target].side / self.rougher.cheapest[target].side)
-        return min(_GAIN, max(1.0, self._errors_before[target] / error) ** (1 / doublings)) if doublings > 0 else _GAIN
-
-    @cached_property
-    def _errors_before(self) -> dict[int, float]:
-        """By label: errors of the rougher graph."""
-        return {each.target: each.numerical_error for each in self._estimates_of(self.rougher)}
-
-    @property
-    def graph_error(self) -> float:
-        """The largest relative error of the graph's estimates of first exits; infinite where paths disagree."""
-        if self._in(ExitState.CHEAPER_EXPECTED, ExitState.TOO_COARSE) - self._useless:
-            return math.inf
-        estimates = [each for each in self.estimates if each.target not in self._useless]
-        return max((each.numerical_error / each.value for each in estimates if each.value), default=0.0)
-
-    @cached_property
-    def _useless(self) -> set[int]:
-        """Exits for which finer grids are of no use.
-
-        For an attractor that is reached through other basins a rough estimate suffices. Without a path it is not
-        refined further once its error is below its value. Energies that attain the proven minimum have their bounds.
-        """
-        agreed = self._in(ExitState.AGREED)
-        rough = {each.target for each in self.estimates if each.numerical_error < each.value} - self.cheapest.keys()
-        beyond = self.beyond & (agreed | rough)
-        return self.unresolvable | self.exact | beyond
 
     @cached_property
     def _states(self) -> dict[int, ExitState]:
         """By label: how graph and path compare."""
         return {one.energy.target: one.state for one in self.compared()}
-
-    def _in(self, *states: ExitState) -> set[int]:
-        return {target for target, state in self._states.items() if state in states}
-
-    def _estimates_of(self, graph: GraphSolution | None) -> tuple[ActivationEnergy, ...]:
-        if graph is None:
-            return ()
-        if not self.attractor.repeats:
-            return graph.estimates
-        return graph.calibrated([branch for branch in self.branches if branch.bound is not Bound.BRACKET])
 
 
 def reached_through_others(problem: ExitProblem) -> frozenset[int]:

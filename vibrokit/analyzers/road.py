@@ -64,13 +64,13 @@ class ExitRoad:
         """Propose, polish and bound, until the end, until all exits are proven, or until the work is stopped."""
         first = [(source.name, self._taking(source)) for source in self.sources if not source.last_resort]
         last = [(source.name, self._taking(source)) for source in self.sources if source.last_resort]
-        for name, step in (*first, ("graph", self._refine), *last, ("graph", self._begin_otherwise)):
-            with Stoppable(name, self.problem.source) as work:
+        with Stoppable("", self.problem.source) as work:
+            for work.doing, step in (*first, ("graph", self._refine), *last, ("graph", self._begin_otherwise)):
                 step()
-            self._findings += work.findings
-            self._cut |= work.stopped
-            if self.stopped or (self._minima_sought and self._is_exact):
-                break
+                if self.stopped or (self._minima_sought and self._is_exact):
+                    break
+        self._findings += work.findings
+        self._cut |= work.stopped
         return self.analysis()
 
     @property
@@ -164,11 +164,11 @@ class ExitRoad:
         """Solve the graph on more nodes until its error is as small as wanted."""
         graph = self._graph
         while graph is not None and not graph.searched and not self.stopped:
-            evidence = self._evidence
-            if graph.solution is not None and evidence.graph_error <= self._accuracy:
+            before, evidence = graph.solution, self._evidence
+            settled = evidence.settled(self._accuracy)
+            if before is not None and settled.issuperset(each.target for each in evidence.estimates):
                 break
-            known = KnownPaths(self._polished[0], evidence.settled(self._accuracy))
-            before = graph.solution
+            known = KnownPaths(self._polished[0], settled)
             found = self._asked(graph, functools.partial(graph.finer, known))
             if graph.solution is not before:
                 self._polish(found)
@@ -206,11 +206,8 @@ class ExitRoad:
 
     @property
     def _evidence(self) -> Evidence:
-        attractor, beyond = self.problem.attractor, frozenset[int]()
-        rougher = None if self._graph is None else self._graph.rougher
-        if self.solution is not None:
-            beyond = self._beyond
-        return Evidence(attractor, self._polished[0], self.solution, rougher, tuple(self._least), beyond)
+        beyond = frozenset[int]() if self.solution is None else self._beyond
+        return Evidence(self.problem.attractor, self._polished[0], self.solution, tuple(self._least), beyond)
 
     @property
     def _is_exact(self) -> bool:

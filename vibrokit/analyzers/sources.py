@@ -102,8 +102,6 @@ class Graph(Source):
     ----------
     solution : GraphSolution or None
         What is known so far.
-    rougher : GraphSolution or None
-        The last solution on half as many nodes along each side.
     searched : bool
         Whether there are no more nodes to take.
     """
@@ -116,7 +114,6 @@ class Graph(Source):
         self.effort = Effort.SHOOT if shots_follow else Effort.FROM_ORBIT
         self._solutions: Generator[GraphSolution, KnownPaths | None, None] | None = None
         self.solution: GraphSolution | None = None
-        self.rougher: GraphSolution | None = None
         self.searched = False
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
@@ -138,8 +135,6 @@ class Graph(Source):
             while not solved:
                 found = next(self._solutions) if known is None else self._solutions.send(known)
                 known = None
-                if before is not None and before.finer > found.finer:
-                    self.rougher = before
                 self.solution, solved = found, found.last
         except StopIteration:  # also after an error, which ends the search
             self.searched = True

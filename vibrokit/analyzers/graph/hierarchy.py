@@ -26,7 +26,6 @@ class TargetEstimate:
     error: float  # both are infinite if the target was not reached
     by_nodes: float  # part of the error that the nodes alone show
     unsettled: float  # the part of the value by which more sweeps may change it
-    side: float  # nodes along a side of the grid, the geometric mean of both
     steps: int  # in a section interval
     known: float  # least action of the paths there that were known before; infinite for none
     paths: tuple[TracedPath, ...]  # distinct ones, the cheapest first
@@ -81,9 +80,8 @@ class GridHierarchy:
             value, error = fine, by_nodes + by_step
         else:
             value = error = self._value(self.whole, target)
-        side = float(np.prod(self.fine.potential.grids.shape)) ** 0.5
         known = min((path.value for path in self.coverage.branches if path.target in target.labels), default=np.inf)
-        return TargetEstimate(value, error, by_nodes, unsettled, side, self.fine.steps, known, tuple(paths))
+        return TargetEstimate(value, error, by_nodes, unsettled, self.fine.steps, known, tuple(paths))
 
     def _value(self, grid: SolvedGrid, target: ExitTarget) -> float:
         """V at a target; infinite where it is not reached."""
