@@ -6,8 +6,8 @@ import dataclasses
 
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.paths.candidate import same_action
 from vibrokit.analyzers.paths.mirror import Mirror
-from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.road import ExitRoad
 from vibrokit.analyzers.sources import MirrorImages

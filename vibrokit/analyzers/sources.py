@@ -10,10 +10,9 @@ from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, reversed_relaxation, slow_relaxation
-from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.paths.mirror import FINDER as MIRROR
 from vibrokit.analyzers.paths.mirror import Mirror
-from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import pieces_of
 from vibrokit.analyzers.polishing.path_solver import Effort

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.paths.cycle_potential import cycle_potential
-from vibrokit.analyzers.paths.local_potential import potential_along
+from vibrokit.analyzers.paths.local_potential import cycle_potential, potential_along
 from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
 

@@ -13,9 +13,8 @@ from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.step_model import StepCosts, StepModel
 from vibrokit.analyzers.graph.targets import Arrival, ExitTarget, TraceStart
 from vibrokit.analyzers.paths.action_descent import descend_action
-from vibrokit.analyzers.paths.candidate import Candidate
+from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
-from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

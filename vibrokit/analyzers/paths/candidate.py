@@ -1,4 +1,4 @@
-"""Candidate: a guess of an exit path, before it is polished."""
+"""Candidate: a guess of an exit path, before it is polished; and when two paths cost the same."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
+
+POLISHED = 1e-6
+"""Relative difference of the actions, and of the places, of one path or orbit that was solved for twice."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -19,3 +22,8 @@ class Candidate:
     action: float  # action according to the method that found it (m² s⁻³)
     finder: str  # that method, in words
     momenta: NDArray[np.float64] | None = None  # (count, n): at the states, where the method knows them
+
+
+def same_action(one: float, other: float, within: float = POLISHED) -> bool:
+    """Return whether two actions differ by no more than a part of the first."""
+    return abs(one - other) <= within * one

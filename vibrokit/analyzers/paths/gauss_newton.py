@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.paths.sparse_blocks import sparse_blocks
 from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap
 
@@ -97,3 +97,17 @@ def _derivatives(current: _Evaluation, unknown: NDArray[np.bool_]) -> scipy.spar
     starts, weights = n * np.arange(count), current.weights
     blocks = [(weights, starts, starts), (-(weights @ current.linear.derivatives)[1:], starts[1:], starts[:-1])]
     return sparse_blocks(blocks, (count * n, count * n))[:, np.flatnonzero(unknown)]
+
+
+def sparse_blocks(
+    blocks: Iterable[tuple[NDArray[np.float64], ArrayLike, ArrayLike]], shape: tuple[int, int]
+) -> scipy.sparse.csc_array:
+    """Return a matrix of blocks (..., rows, columns), each with the row and the column (...) of its first entry."""
+    values, places, others = [], [], []
+    for block, row, column in blocks:
+        rows, columns = np.indices(block.shape[-2:])
+        values.append(block.ravel())
+        places.append(np.broadcast_to(np.asarray(row)[..., None, None] + rows, block.shape).ravel())
+        others.append(np.broadcast_to(np.asarray(column)[..., None, None] + columns, block.shape).ravel())
+    table = (np.concatenate(values), (np.concatenate(places), np.concatenate(others)))
+    return scipy.sparse.csc_array(table, shape=shape)

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from vibrokit.analyzers.path_ends import PathEnd
-from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.same_action import POLISHED, same_action
+from vibrokit.analyzers.paths.candidate import POLISHED, Candidate, same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.certify import certify
 from vibrokit.analyzers.polishing.completion import completed

@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.paths.gauss_newton import sparse_blocks
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.paths.sparse_blocks import sparse_blocks
 from vibrokit.analyzers.polishing.ending import Ending
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.paths.action_descent import descend_action
+from vibrokit.analyzers.paths.candidate import same_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
-from vibrokit.analyzers.paths.same_action import same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.completion import MORE_PERIODS, completed, solved_again, within
 from vibrokit.analyzers.polishing.ending import Cut

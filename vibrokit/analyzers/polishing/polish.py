@@ -6,8 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from vibrokit.analyzers.path_ends import PathEnd
-from vibrokit.analyzers.paths.candidate import Candidate
-from vibrokit.analyzers.paths.same_action import same_action
+from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.polishing import certified
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.ends import Nodes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.analyzers.path_ends import PathEnd
-from vibrokit.analyzers.paths.same_action import same_action
+from vibrokit.analyzers.paths.candidate import same_action
 from vibrokit.analyzers.polishing.leg import Departure, Leg, samples_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
