@@ -11,7 +11,7 @@ import vibrokit as vk
 from tests.layers import long
 from vibrokit.analyzers.graph import tracing
 from vibrokit.analyzers.graph.search import GraphSearch
-from vibrokit.analyzers.graph.whole_paths import whole_action
+from vibrokit.analyzers.graph.traced_path import whole_action
 from vibrokit.analyzers.paths.local_potential import cycle_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.codes import Code

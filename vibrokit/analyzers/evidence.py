@@ -7,16 +7,13 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from vibrokit.analyzers.agreement import VAGUE, ComparedExit, ExitState, compared
-from vibrokit.analyzers.graph.around_paths import LOOSE
-from vibrokit.analyzers.graph.coverage import BELOW
 from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
 from vibrokit.analyzers.path_ends import InBasin
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.structure.boundaries.meetings import meeting_cells
-
-_GAIN = 8.0  # by which the error of the graph falls at most when its nodes along a side are doubled: third order
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,10 +94,10 @@ class Evidence:
             if graph is None or path is None:
                 continue
             solved = graph.cheapest[each.target]
-            cheaper = LOOSE * path.value < solved.known and path.value < each.value
-            shorter = solved.steps < graph.most_steps and each.value < BELOW * path.value
+            cheaper = TOLERANCES.loose * path.value < solved.known and path.value < each.value
+            shorter = solved.steps < graph.most_steps and each.value < TOLERANCES.below * path.value
             will_differ = graph.finer and (cheaper or shorter)
-            if not will_differ and each.numerical_error / _GAIN**graph.finer > path.value:
+            if not will_differ and each.numerical_error / TOLERANCES.gain**graph.finer > path.value:
                 found.add(each.target)
         return found
 

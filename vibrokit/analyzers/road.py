@@ -12,6 +12,7 @@ import xarray
 
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.evidence import Evidence, reached_through_others
+from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.solution import GraphSolution
 from vibrokit.analyzers.paths import detailed_balance
@@ -175,12 +176,12 @@ class ExitRoad:
 
     def _begin_otherwise(self) -> None:
         """Polish other beginnings of the cheapest path to each attractor, where paths compete that differ little."""
-        if self._graph is None or self.solution is None or not self.problem.attractor.repeats:
+        evidence, solution = self._evidence, self.solution
+        if solution is None or not self.problem.attractor.repeats:
             return
-        evidence = self._evidence
         for target in sorted(evidence.cheapest.keys() - evidence.unresolvable):
             with contextlib.suppress(StructureError):  # too close to the attractor for any grid
-                self._polish(self._graph.beginnings(self.problem, evidence.cheapest[target]))
+                self._polish(beginnings(self.problem, solution.potential, evidence.cheapest[target]))
 
     # --- what is known
 

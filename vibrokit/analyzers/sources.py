@@ -139,10 +139,6 @@ class Graph(Source):
             self.searched = True
         return () if self.solution is None or self.solution is before else self.solution.candidates
 
-    def beginnings(self, problem: ExitProblem, path: ActivationEnergy) -> Sequence[Candidate]:
-        """Return other beginnings of a path; raises StructureError where it is too short for any grid."""
-        return () if self.solution is None else self._settings.beginnings(problem, path, self.solution)
-
 
 class Shots(Source):
     """Shooting.

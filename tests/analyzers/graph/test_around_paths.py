@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.graph.around_paths import AroundPaths
-from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
+from vibrokit.analyzers.graph.hierarchy import HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
+from vibrokit.analyzers.graph.regions import AroundPaths
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.problem import ExitProblem

@@ -7,8 +7,6 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.graph.beginnings import beginnings
-from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
-from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.problem import ExitProblem
 
 OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
@@ -28,18 +26,12 @@ def energy(problem):
 
 
 @pytest.fixture(scope="module")
-def search(problem):
-    model = StepModel(problem.scene, vk.RK4(256))
-    return HierarchySearch(problem, model, (8,), (60, 60))
-
-
-@pytest.fixture(scope="module")
 def potential(problem):
     return GRAPH.search(problem).potential
 
 
-def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, potential, energy):
-    found = beginnings(problem, search, potential, energy)
+def test_they_end_where_the_path_ends_and_cost_as_much(problem, potential, energy):
+    found = beginnings(problem, potential, energy)
     assert found
     for candidate in found:
         speed = np.abs(np.diff(energy.path.q[:, :2], axis=0)).max(axis=0) * 128 / 8
@@ -48,10 +40,10 @@ def test_they_end_where_the_path_ends_and_cost_as_much(problem, search, potentia
         assert candidate.action == pytest.approx(energy.value, rel=0.05)
 
 
-def test_none_without_a_path(problem, search, potential, energy):
-    assert beginnings(problem, search, potential, dataclasses.replace(energy, path=None)) == ()
+def test_none_without_a_path(problem, potential, energy):
+    assert beginnings(problem, potential, dataclasses.replace(energy, path=None)) == []
 
 
-def test_none_for_a_path_that_spends_its_action_at_once(problem, search, potential, energy):
+def test_none_for_a_path_that_spends_its_action_at_once(problem, potential, energy):
     path = dataclasses.replace(energy.path, section=energy.path.section[-1:])
-    assert beginnings(problem, search, potential, dataclasses.replace(energy, path=path)) == ()
+    assert beginnings(problem, potential, dataclasses.replace(energy, path=path)) == []

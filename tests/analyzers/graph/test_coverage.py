@@ -9,10 +9,10 @@ import pytest
 import vibrokit as vk
 from tests.layers import long
 from vibrokit.analyzers.graph import value_iteration
-from vibrokit.analyzers.graph.coverage import WholeRegion
 from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.potential import Potential
+from vibrokit.analyzers.graph.regions import WholeRegion
 from vibrokit.analyzers.graph.targets import StateTarget
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

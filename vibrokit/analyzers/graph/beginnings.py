@@ -6,21 +6,20 @@ import dataclasses
 
 import numpy as np
 
-from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
 from vibrokit.analyzers.graph.potential import Potential
+from vibrokit.analyzers.graph.regions import WholeRegion
+from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.targets import StateTarget
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
+from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
+from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy, ExitPath
-
-_SHARE = 0.3  # of the action, that the beginning takes
-_NODES, _FEWEST_NODES = 2 / 3, 32  # along a side, as a part of those of the known potential
-_LEAST = 1e-3  # of the action: a shorter one lies where the linearized equations hold
+from vibrokit.symbolic.flow_kind import Flow
 
 
-def beginnings(
-    problem: ExitProblem, search: HierarchySearch, potential: Potential, energy: ActivationEnergy
-) -> tuple[Candidate, ...]:
+def beginnings(problem: ExitProblem, potential: Potential, energy: ActivationEnergy) -> list[Candidate]:
     """Return paths that differ from a known one up to a state on the section, where it has spent a third of its action.
 
     While it spirals away from the attractor, an impact more or less changes the action of a path by parts of a
@@ -28,21 +27,26 @@ def beginnings(
     cover. On ``hertz-0.570``, leaving the hammering state, 240 nodes along each side find the cheaper of two such
     paths, and 180 do not.
 
-    None are returned for a path without a beginning on the section. Raises StructureError as the search does.
+    None are returned for a path without a beginning on the section, and for one so short that the linearized equations
+    hold there. Raises StructureError if the grid does not reach that state.
     """
     path = energy.path
     if path is None or not len(path.section):
-        return ()
+        return []
     spent = path.action[path.section] / path.action[-1]
-    early = np.flatnonzero(spent <= _SHARE)
-    if not early.size or spent[early[-1]] < _LEAST:
-        return ()
+    early = np.flatnonzero(spent <= 0.3)
+    if not early.size or spent[early[-1]] < 1e-3:
+        return []
     start = int(path.section[early[-1]])
     known = float(path.action[start])
     target = StateTarget((energy.target,), energy.saddle, known, path.q[start, :2][None])
-    nx, nv = (max(_FEWEST_NODES, round(_NODES * nodes)) for nodes in potential.grids.shape)
-    found = search.within(potential, target, (nx, nv))
-    return tuple(_continued(each, path, start, energy.value - known) for each in found)
+    model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+    coverage, before = WholeRegion(problem, model, (target,), ()), SolvedGrid(problem, model, potential)
+    nx, nv = (max(32, round(nodes * 2 / 3)) for nodes in potential.grids.shape)
+    with stage("graph", subject=problem.attractor.name, unit="sweeps"):
+        grids, ceiling = coverage.around(before).with_shape((nx, nv)), TOLERANCES.room * coverage.highest(before)
+        found = coverage.solved(grids, ceiling, before).paths(target)
+    return [_continued(each.candidate, path, start, energy.value - known) for each in found]
 
 
 def _continued(found: Candidate, path: ExitPath, start: int, rest: float) -> Candidate:

@@ -15,28 +15,18 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.graph.grids import Grids, Shape, halved
 from vibrokit.analyzers.graph.step_model import StepModel
 from vibrokit.analyzers.graph.targets import ExitTarget, TraceStart
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
 from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.analyzers.graph.value_iteration import ValueIteration
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy
 
-FAR_LESS = 0.25  # of the costliest exit: below, an exit gets grids that reach no farther than it needs
-ROOM = 1.2  # ceiling of V in units of the costliest exit
 _NEAR_CEILING = 0.95  # of the ceiling: a value above it may be that of the ceiling
-_RAISE, _RAISES = 3.0, 6  # factor and number of trials for a higher ceiling
-_WIDENINGS = 6  # of the first grid, each by 30 % at a side: 5 times its size
-_ZOOMS, WORTHWHILE = 4, 0.8  # closer grids, and the ratio of areas above which another one does not pay
-STEP_TOLERANCE = 0.01  # relative change of a cost by linearization over a step that is accepted
+WORTHWHILE = 0.8  # of the area: a closer grid that is larger does not pay
 # Along a side of a grid that says what to cover: 45 covered too much around the chaotic attractor of hertz-0.525, where
 # linearized steps made V ten times too small.
-_FEWEST_RELIABLE = 64
-# V that shows an error of linearization: in units of a known path's action, and an excess over it in units of what
-# nodes change.
-BELOW, _BEYOND_NODES = 0.9, 2.0
-_SAMPLES = 60  # along each side of the region, whose images show where the other phases need nodes
-_RETURNS = 8  # section intervals in which a state outside the region may come back to it
-_MARGIN = 0.04  # of the width, on each side of them
+FEWEST_RELIABLE = 64
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -112,7 +102,7 @@ class Coverage(ABC):
         """Solve on the first grids, widened if need be, then on closer ones. The ceiling is a first guess."""
         whole = self._wide_enough(self.first(steps, shape, intervals), ceiling)
         coarse = self.closer(whole, np.inf)
-        for _ in range(_ZOOMS - 1):
+        for _ in range(3):
             closer = self.closer(coarse, WORTHWHILE)
             if closer is coarse:
                 break
@@ -125,7 +115,7 @@ class Coverage(ABC):
         Where these are too few to reach an exit, all of them show it.
         """
         shape = grids.shape
-        if min(halved(shape)) < _FEWEST_RELIABLE:
+        if min(halved(shape)) < FEWEST_RELIABLE:
             return self._wide(grids, ceiling)
         try:
             rough = self._wide(grids.with_shape(halved(shape)), ceiling)
@@ -136,7 +126,7 @@ class Coverage(ABC):
     def _wide(self, grids: Grids, ceiling: float) -> SolvedGrid:
         """Solve on grids that are widened until no node that has to be covered lies at their edge."""
         solved = self.solved(grids, ceiling)
-        for _ in range(_WIDENINGS):
+        for _ in range(6):  # each by 30 % at a side: to 5 times its size
             wider = grids.widened(self.needed(solved, self.level(solved)))
             if wider is grids:
                 break
@@ -147,11 +137,13 @@ class Coverage(ABC):
         """Solve on as many nodes around what has to be covered, if that is at most a part of the area."""
         grids = self.around(solved)
         too_large = grids.area > most * solved.potential.grids.area
-        return solved if too_large else self.solved(grids, ROOM * self.highest(solved), solved)
+        return solved if too_large else self.solved(grids, TOLERANCES.room * self.highest(solved), solved)
 
     def around(self, solved: SolvedGrid) -> Grids:
         """Return grids around what has to be covered."""
-        return solved.potential.grids.zoomed(self.needed(solved, ROOM * self.level(solved)), beyond=self.beyond)
+        return solved.potential.grids.zoomed(
+            self.needed(solved, TOLERANCES.room * self.level(solved)), beyond=self.beyond
+        )
 
     def solved(self, grids: Grids, ceiling: float, rougher: SolvedGrid | None = None) -> SolvedGrid:
         """Solve up to a ceiling of V, which is raised until the targets lie well below it.
@@ -159,9 +151,9 @@ class Coverage(ABC):
         Where a rougher grid shows that V is above the ceiling, no steps are computed. Raises StructureError if no
         target is reached.
         """
-        wanted = None if rougher is None else rougher.potential.reached(grids, ROOM * ceiling)
+        wanted = None if rougher is None else rougher.potential.reached(grids, TOLERANCES.room * ceiling)
         iteration = ValueIteration(self.model, self.problem.attractor, grids, wanted)
-        for _ in range(_RAISES):
+        for _ in range(6):
             solved = SolvedGrid(self.problem, self.model, iteration.up_to(ceiling))
             highest = self.highest(solved)
             if not highest:
@@ -171,7 +163,7 @@ class Coverage(ABC):
                 )
             if highest < _NEAR_CEILING * ceiling:
                 return solved
-            ceiling *= _RAISE
+            ceiling *= 3.0
             if wanted is not None:  # a path goes beyond what the rougher grid reaches
                 wanted, iteration = None, ValueIteration(self.model, self.problem.attractor, grids)
         raise StructureError(
@@ -203,7 +195,7 @@ class Coverage(ABC):
         """
         scene, region = self.problem.scene, self.problem.structure.basins.region
         step = scene.section_interval / steps
-        states = region.cell_centres((_SAMPLES, _SAMPLES))
+        states = region.cell_centres((60, 60))
         basins, after = self.problem.structure.basins, self.model.images(states, 0.0, scene.section_interval)
         settled = (basins.at(states) >= 0) & (basins.at(after) >= 0)
         states = np.concatenate([states[settled] if settled.any() else states, *(one.places for one in self.targets)])
@@ -211,7 +203,7 @@ class Coverage(ABC):
         for phase in range(1 if scene.autonomous else steps):
             low = np.minimum(states.min(axis=0), region.bounds[:, 0])
             high = np.maximum(states.max(axis=0), region.bounds[:, 1])
-            margin = _MARGIN * (high - low)
+            margin = 0.04 * (high - low)
             boxes.append(np.stack([low - margin, high + margin], axis=1))
             images = self.model.images(states, phase * step, step)
             states = images[np.isfinite(images).all(axis=1)]
@@ -247,12 +239,12 @@ class Coverage(ABC):
     def _labels(self, states: Array) -> NDArray[np.int16]:
         """Return the labels of the basins that states on the section are in.
 
-        States outside the region are followed until they come back to it, for some section intervals.
+        States outside the region are followed until they come back to it, for 8 section intervals.
         """
         basins, interval = self.problem.structure.basins, self.problem.scene.section_interval
         labels, outside = basins.at(states), np.flatnonzero(~basins.region.contains(states))
         states = states[outside]
-        for _ in range(_RETURNS):
+        for _ in range(8):
             if not outside.size:
                 break
             states = self.model.images(states, 0.0, interval)
@@ -260,65 +252,3 @@ class Coverage(ABC):
             left = np.isfinite(states).all(axis=1) & ~basins.region.contains(states)
             states, outside = states[left], outside[left]
         return labels
-
-
-class WholeRegion(Coverage):
-    """All that lies below the costliest exit, found on grids that cover the region."""
-
-    def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
-        """Grids that cover the region."""
-        return self.region(steps, shape, intervals)
-
-    @property
-    def scale(self) -> float:
-        """That of a straight path."""
-        return max(target.scale for target in self.targets)
-
-    def highest(self, solved: SolvedGrid) -> float:
-        """The cost of the costliest target that is reached; infinite if none is."""
-        return solved.highest(self.targets)
-
-    def level(self, solved: SolvedGrid) -> float:
-        """The same."""
-        return self.highest(solved)
-
-    def rank(self, solved: SolvedGrid) -> float:
-        """By V, which interpolation raises."""
-        return self.highest(solved)
-
-    def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:
-        """The fine one, or a closer one, if the coarse one had enough nodes to say what to cover."""
-        reliable = min(coarse.potential.grids.shape) >= _FEWEST_RELIABLE
-        return self.closer(fine, WORTHWHILE) if fine.potential.grids.shape == shape and reliable else None
-
-    def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
-        """As known paths show, or those on the grid where none are known.
-
-        Interpolation raises V, by no more than what nodes change once these are enough.
-        """
-        targets, branches = self._judged(coarse)
-        room = max(STEP_TOLERANCE, coarse.change(rougher, self.reached(coarse)))
-        fewer = rougher.potential.grids.shape < coarse.potential.grids.shape
-        low, high = max(BELOW, 1 - room), 1 + _BEYOND_NODES * room if fewer else np.inf
-        if not all(low < ratio < high for ratio in self.known_ratios(coarse, branches)):
-            return False
-        return coarse.linearization_error(targets) <= room
-
-    def lies_above(self, solved: SolvedGrid) -> bool:
-        """Than that of a known path, or elsewhere of the path on the grid."""
-        return any(1 + STEP_TOLERANCE < ratio < np.inf for ratio in self.ratios(solved))
-
-    def ratios(self, solved: SolvedGrid) -> list[float]:
-        """By known paths, and elsewhere by those on the grid."""
-        targets, branches = self._judged(solved)
-        return self.known_ratios(solved, branches) + solved.ratios(targets)
-
-    def _judged(self, solved: SolvedGrid) -> tuple[list[ExitTarget], list[ActivationEnergy]]:
-        """Targets that no path is known to, and known paths, but none that cost far less: these get other grids."""
-        known = {branch.target for branch in self.branches}
-        costs = {
-            target: solved.arrival(target).value for target in self.reached(solved) if known.isdisjoint(target.labels)
-        }
-        highest = max((*costs.values(), *(branch.value for branch in self.branches)), default=0.0)
-        targets = [target for target, cost in costs.items() if cost >= FAR_LESS * highest]
-        return targets, [branch for branch in self.branches if branch.value >= FAR_LESS * highest]

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from vibrokit.analyzers.graph.coverage import FAR_LESS
 from vibrokit.analyzers.graph.targets import ExitTarget
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
 from vibrokit.results.energy import ActivationEnergy
 
 
@@ -47,7 +47,7 @@ class KnownPaths:
             costs = [(branch.value, branch.saddle) for branch in self.branches if branch.target == label]
             own = min((value for value, saddle in costs if saddle == target.saddle), default=np.inf)
             least = min((value for value, _ in costs), default=np.inf)
-            if not (np.isfinite(own) and least < FAR_LESS * own):
+            if not (np.isfinite(own) and least < TOLERANCES.far_less * own):
                 return True
         return False
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Sequence
 
 import numpy as np
 
-from vibrokit.analyzers.graph.beginnings import beginnings
-from vibrokit.analyzers.graph.exit_costs import ExitCosts
 from vibrokit.analyzers.graph.grids import Shape
-from vibrokit.analyzers.graph.hierarchy_search import HierarchySearch
+from vibrokit.analyzers.graph.hierarchy import HierarchySearch
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
-from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.solution import ExitCosts, GraphSolution
 from vibrokit.analyzers.graph.step_model import StepModel
-from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.arguments import pair, whole
 from vibrokit.construction import Constructed
@@ -23,7 +20,6 @@ from vibrokit.errors import SceneError, StructureError, counted
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import stage
 from vibrokit.results.codes import Code
-from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.finding import Finding
 from vibrokit.structure.scales import doublings_of
 from vibrokit.structure.validation import gibibytes
@@ -132,8 +128,8 @@ class GraphSearch(metaclass=Constructed):
             )
         with stage("exit targets", subject=attractor.name):
             steps = self._affordable(problem.scene)
-            search = self._hierarchies(problem, steps)
-            targets = exit_targets(problem, search.model)
+            model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
+            search, targets = HierarchySearch(problem, model, steps), exit_targets(problem, model)
         shapes = [nodes for nodes in steps if known is not None or nodes[0] <= self.nodes[0]]
         costs = ExitCosts(search, self._findings(problem, shapes))
         for number, nodes in enumerate(shapes, start=1):
@@ -153,17 +149,6 @@ class GraphSearch(metaclass=Constructed):
                         raise
             if groups and costs.estimates:
                 known = (yield costs.solution(nodes, last=True)) or known
-
-    def beginnings(
-        self, problem: ExitProblem, energy: ActivationEnergy, solved: GraphSolution
-    ) -> tuple[Candidate, ...]:
-        """Return candidates that begin otherwise than a known path, from a closer look at where a solution has it."""
-        search = self._hierarchies(problem, self._affordable(problem.scene))
-        return beginnings(problem, search, solved.potential, energy)
-
-    def _hierarchies(self, problem: ExitProblem, steps: Mapping[Shape, tuple[int, ...]]) -> HierarchySearch:
-        """What solves hierarchies, with some numbers of steps to try for each number of nodes."""
-        return HierarchySearch(problem, StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED)), steps)
 
     def _affordable(self, scene: Oscillator) -> dict[Shape, tuple[int, ...]]:
         """Numbers of nodes, each twice the one before, with the numbers of steps to try that there is memory for.

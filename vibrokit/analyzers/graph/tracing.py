@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.graph.lead_in import lead_in
 from vibrokit.analyzers.graph.potential import Potential
 from vibrokit.analyzers.graph.step_model import StepCosts, StepModel
 from vibrokit.analyzers.graph.targets import Arrival, ExitTarget, TraceStart
+from vibrokit.analyzers.graph.traced_path import TracedPath, distinct, lead_in
 from vibrokit.analyzers.paths.action_descent import descend_action
-from vibrokit.analyzers.paths.candidate import Candidate, same_action
+from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
@@ -25,7 +24,6 @@ METHOD = "graph"
 _FEWEST = 3  # nodes of a path with anything between its ends to relax
 _RELAXATIONS = 30  # steps of the descent: enough for generic paths; polishing goes on from where the others stop
 _RELAXED = 1e-3  # of the action, that another step would gain: below the error of V on the default grid
-_SAME = 1e-4  # relative difference of the actions of paths that count as one
 _LONGEST = 250  # section intervals
 _STEP_WEIGHT = 1 / 1.1  # of a step's cost against V: below 1, so that no path lingers near an unstable orbit
 _LIGHTER, _LEAST_WEIGHT = 0.5, 1e-4  # where V, interpolated, has a hollow that a path would never leave
@@ -33,24 +31,6 @@ _LOSS = 1e-3  # of the lowest V yet, that a path has to lose in a section interv
 _CORNERS = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
 Array = NDArray[np.float64]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class TracedPath:
-    """A path to an exit target, relaxed to a local minimum of the action."""
-
-    candidate: Candidate  # priced by Hamilton's equations, except for the quadratic form that it starts in
-    quadratic: float  # its cost as the graph computes it, with linearized steps
-    states: Array  # (count, 2): from a section on, a step apart
-    steps: int  # in a section interval
-    from_attractor: bool  # whether the first state is on the attractor itself, not next to it
-    target: ExitTarget
-    start: TraceStart  # the end of the path
-
-    @property
-    def linearization_error(self) -> float:
-        """Relative difference that linearization over a step makes."""
-        return abs(self.quadratic - self.candidate.action) / self.candidate.action
 
 
 class SolvedGrid:
@@ -135,15 +115,6 @@ class SolvedGrid:
         candidate = Candidate(problem.source, target.labels[0], times, states, before + action, METHOD)
         on_attractor = not fixed or found[1] == 0.0
         return TracedPath(candidate, before + quadratic, relaxed, self.steps, on_attractor, target, start)
-
-
-def distinct(paths: Iterable[TracedPath]) -> list[TracedPath]:
-    """Return each path once, the cheapest first."""
-    kept: list[TracedPath] = []
-    for path in sorted(paths, key=lambda path: path.candidate.action):
-        if not any(same_action(path.candidate.action, other.candidate.action, _SAME) for other in kept):
-            kept.append(path)
-    return kept
 
 
 def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0) -> tuple[Array, float] | None:

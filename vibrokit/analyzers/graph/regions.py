@@ -1,4 +1,4 @@
-"""AroundPaths: coverage for exits that paths are known to, from the attractor outward."""
+"""WholeRegion and AroundPaths: what grids cover before paths are known, and around paths that are known."""
 
 from __future__ import annotations
 
@@ -8,21 +8,79 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.graph.coverage import ROOM, STEP_TOLERANCE, Coverage
+from vibrokit.analyzers.graph.coverage import FEWEST_RELIABLE, WORTHWHILE, Coverage
 from vibrokit.analyzers.graph.grids import Grids, Shape, halved
 from vibrokit.analyzers.graph.seeds import orbit_visits
+from vibrokit.analyzers.graph.targets import ExitTarget
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
 from vibrokit.analyzers.graph.tracing import SolvedGrid
 from vibrokit.errors import StructureError
-
-LOOSE = 1.5  # V on a grid in units of a known path's action, above which that grid is too large for the path
-_EXTENSIONS = 3  # of grids that turn out too small on more nodes
-# V on a quarter of the nodes along each side, in units of the action: twice as many divided it by 1.7 to 3.5 on scenes
-# where the graph was of use.
-_HOPELESS = 16.0
-_MARGIN = 0.1  # of the width of what is known, added on each side
+from vibrokit.results.energy import ActivationEnergy
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+class WholeRegion(Coverage):
+    """All that lies below the costliest exit, found on grids that cover the region."""
+
+    def first(self, steps: int, shape: Shape, intervals: int) -> Grids:
+        """Grids that cover the region."""
+        return self.region(steps, shape, intervals)
+
+    @property
+    def scale(self) -> float:
+        """That of a straight path."""
+        return max(target.scale for target in self.targets)
+
+    def highest(self, solved: SolvedGrid) -> float:
+        """The cost of the costliest target that is reached; infinite if none is."""
+        return solved.highest(self.targets)
+
+    def level(self, solved: SolvedGrid) -> float:
+        """The same."""
+        return self.highest(solved)
+
+    def rank(self, solved: SolvedGrid) -> float:
+        """By V, which interpolation raises."""
+        return self.highest(solved)
+
+    def refined(self, fine: SolvedGrid, coarse: SolvedGrid, shape: Shape) -> SolvedGrid | None:
+        """The fine one, or a closer one, if the coarse one had enough nodes to say what to cover."""
+        reliable = min(coarse.potential.grids.shape) >= FEWEST_RELIABLE
+        return self.closer(fine, WORTHWHILE) if fine.potential.grids.shape == shape and reliable else None
+
+    def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
+        """As known paths show, or those on the grid where none are known.
+
+        Interpolation raises V, by no more than what nodes change once these are enough.
+        """
+        targets, branches = self._judged(coarse)
+        room = max(TOLERANCES.steps, coarse.change(rougher, self.reached(coarse)))
+        fewer = rougher.potential.grids.shape < coarse.potential.grids.shape
+        low, high = max(TOLERANCES.below, 1 - room), 1 + 2 * room if fewer else np.inf
+        if not all(low < ratio < high for ratio in self.known_ratios(coarse, branches)):
+            return False
+        return coarse.linearization_error(targets) <= room
+
+    def lies_above(self, solved: SolvedGrid) -> bool:
+        """Than that of a known path, or elsewhere of the path on the grid."""
+        return any(1 + TOLERANCES.steps < ratio < np.inf for ratio in self.ratios(solved))
+
+    def ratios(self, solved: SolvedGrid) -> list[float]:
+        """By known paths, and elsewhere by those on the grid."""
+        targets, branches = self._judged(solved)
+        return self.known_ratios(solved, branches) + solved.ratios(targets)
+
+    def _judged(self, solved: SolvedGrid) -> tuple[list[ExitTarget], list[ActivationEnergy]]:
+        """Targets that no path is known to, and known paths, but none that cost far less: these get other grids."""
+        known = {branch.target for branch in self.branches}
+        costs = {
+            target: solved.arrival(target).value for target in self.reached(solved) if known.isdisjoint(target.labels)
+        }
+        highest = max((*costs.values(), *(branch.value for branch in self.branches)), default=0.0)
+        targets = [target for target, cost in costs.items() if cost >= TOLERANCES.far_less * highest]
+        return targets, [branch for branch in self.branches if branch.value >= TOLERANCES.far_less * highest]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,7 +110,7 @@ class AroundPaths(Coverage):
         for phases, states in self._paths(whole):
             np.minimum.at(low, phases, states)
             np.maximum.at(high, phases, states)
-        margin = _MARGIN * (high - low)
+        margin = 0.1 * (high - low)
         low = np.maximum(low - margin, whole.boxes[..., 0])
         high = np.minimum(high + margin, whole.boxes[..., 1])
         return dataclasses.replace(whole, boxes=np.stack([low, high], axis=-1))
@@ -71,7 +129,7 @@ class AroundPaths(Coverage):
         Raises StructureError where V on these is so high that it would be too high on all nodes as well.
         """
         whole, rough = super().coarser(steps, halved(shape), intervals, ceiling)
-        if self.highest(rough) > _HOPELESS * self.scale:
+        if self.highest(rough) > TOLERANCES.hopeless * self.scale:
             raise StructureError(
                 f"on {rough.potential.grids.shape} nodes around the known paths V is {self.highest(rough):.3g}, and "
                 f"they cost {self.scale:.3g}; raise the number of nodes."
@@ -84,7 +142,7 @@ class AroundPaths(Coverage):
 
     def steps_suffice(self, coarse: SolvedGrid, rougher: SolvedGrid) -> bool:
         """If V is not below the actions of known paths, where only linearization or a cheaper path takes it."""
-        return min(self.ratios(coarse)) >= 1 - STEP_TOLERANCE
+        return min(self.ratios(coarse)) >= 1 - TOLERANCES.steps
 
     def rank(self, solved: SolvedGrid) -> float:
         """By how far V is from the action of the costliest known path, above or below."""
@@ -96,11 +154,11 @@ class AroundPaths(Coverage):
 
     def far_above(self, solved: SolvedGrid) -> bool:
         """Return whether V at an exit is so far above the action of its path that the grids are too large for it."""
-        return max(self.ratios(solved)) > LOOSE
+        return max(self.ratios(solved)) > TOLERANCES.loose
 
     def lies_above(self, solved: SolvedGrid) -> bool:
         """Than that of a known path."""
-        return max(self.ratios(solved)) > 1 + STEP_TOLERANCE
+        return max(self.ratios(solved)) > 1 + TOLERANCES.steps
 
     def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
         """Solve again in any case if nodes that have to be covered lie at the edge."""
@@ -123,8 +181,8 @@ class AroundPaths(Coverage):
     def _on(self, shape: Shape, known: SolvedGrid) -> SolvedGrid:
         """Solve on grids of some shape around what others show, and extend those that turn out too small."""
         grids = self.around(known).with_shape(shape)
-        solved = self.solved(grids, ROOM * self.highest(known), known)
-        for _ in range(_EXTENSIONS):
+        solved = self.solved(grids, TOLERANCES.room * self.highest(known), known)
+        for _ in range(3):
             if self._holds_all(solved):
                 break
             solved = super().closer(solved, np.inf)
