@@ -1,7 +1,6 @@
 """The graph's quasi-potential where it is known in closed form, and whether its error estimate holds."""
 
 import functools
-import itertools
 import math
 import os
 
@@ -50,13 +49,20 @@ def solved(damping, nodes=320, steps=None):
     return GraphSearch(nodes=(nodes, nodes), steps_per_period=steps).search(problem(*well(damping)))
 
 
+def solutions(search, problem):
+    """On each number of nodes."""
+    costs = search.begin(problem)
+    while not costs.finished:
+        costs.refine()
+        yield costs.solution()
+
+
 def test_each_solution_has_twice_the_nodes_and_comes_closer():
-    solutions = list(GraphSearch(nodes=(280, 260)).solutions(problem(*well(0.1))))
-    assert [found.potential.grids.shape for found in solutions] == [(70, 65), (140, 130), (280, 260)]
-    assert all(found.last for found in solutions)
-    errors = [abs(best(found, 1).value - 0.4 * BARRIER) for found in solutions]
+    found = list(solutions(GraphSearch(nodes=(280, 260)), problem(*well(0.1))))
+    assert [each.potential.grids.shape for each in found] == [(70, 65), (140, 130), (280, 260)]
+    errors = [abs(best(each, 1).value - 0.4 * BARRIER) for each in found]
     assert errors == sorted(errors, reverse=True)
-    assert all(error <= best(found, 1).numerical_error for error, found in zip(errors, solutions, strict=True))
+    assert all(error <= best(each, 1).numerical_error for error, each in zip(errors, found, strict=True))
 
 
 def misses(found, damping):
@@ -289,40 +295,45 @@ def test_progress_counts_sweeps_of_each_attractor():
 # --- stopped, and refused
 
 
-class Stopping(GraphSearch):
-    """Counts solutions, and is interrupted after some of them."""
+def stopped_after(count, graph, osc, structure):
+    """The result of a graph that is interrupted after it was solved so many times."""
+    solved = []
 
-    after = 1
+    def interrupt(update):
+        if update.stage == "graph" and update.finished:
+            solved.append(update)
+        elif update.stage == "graph" and len(solved) == count:
+            raise KeyboardInterrupt
 
-    def solutions(self, problem):
-        yield from itertools.islice(super().solutions(problem), self.after)
-        raise KeyboardInterrupt
-
-
-class StoppingGraph(Stopping, vk.ActionGraph):
-    """The analyzer that is interrupted after its first solution."""
-
-
-class StoppedGraph(StoppingGraph):
-    """One that is interrupted before any."""
-
-    after = 0
-
-
-def test_an_interrupt_keeps_the_first_solution_and_marks_it():
-    result = StoppingGraph(nodes=(64, 64)).run(*well(0.05))
+    result = graph.run(osc, structure, progress=interrupt)
     assert not result.complete
-    assert [energy.source for energy in result.energies] == [0]
-    assert [(found.code, found.source) for found in result.findings] == [(Code.GRAPH, 0), (Code.STOPPED, 0)]
+    return result
+
+
+@pytest.mark.parametrize(
+    ("nodes", "stopped"), [((120, 120), 0), ((64, 64), 1)], ids=["on more nodes", "at the next attractor"]
+)
+def test_an_interrupt_keeps_the_first_solution_and_marks_it(nodes, stopped):
+    result = stopped_after(1, vk.ActionGraph(nodes=nodes), *well(0.05))
+    (energy,) = result.energies
+    assert energy.source == 0
+    assert energy.lower <= 4 * 0.05 * BARRIER <= energy.upper
+    assert [(found.code, found.source) for found in result.findings] == [(Code.GRAPH, 0), (Code.STOPPED, stopped)]
+
+
+def test_an_interrupt_while_a_cheap_exit_has_grids_of_its_own_keeps_the_other():
+    osc, structure = three_wells()
+    left, middle, right = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
+    result = stopped_after(1, vk.ActionGraph(nodes=(64, 64), source=middle.label), osc, structure)
+    exact = {left.label: 0.2 * barrier_between(0.0, -1.0), right.label: 0.2 * barrier_between(0.0, 0.4)}
+    assert {energy.target for energy in result.energies} == set(exact)
+    assert all(energy.lower <= exact[energy.target] <= energy.upper for energy in result.energies)
 
 
 def test_an_interrupt_before_any_solution_leaves_nothing_and_says_so():
-    result = StoppedGraph(nodes=(64, 64)).run(*well(0.05))
-    assert not result.complete
+    result = stopped_after(0, vk.ActionGraph(nodes=(64, 64)), *well(0.05))
     assert result.energies == ()
     assert [found.code for found in result.findings] == [Code.STOPPED]
-    with pytest.raises(KeyboardInterrupt):
-        Stopping(nodes=(64, 64)).search(problem(*well(0.05)))
 
 
 def test_the_time_limit_ends_a_search():
@@ -405,7 +416,7 @@ def test_a_cheap_exit_is_solved_as_well_as_a_costly_one():
     left, middle, right = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
     exact = {left.label: 0.2 * barrier_between(0.0, -1.0), right.label: 0.2 * barrier_between(0.0, 0.4)}
     assert exact[left.label] > 12 * exact[right.label]
-    first, *_, last = GraphSearch(nodes=(160, 160)).solutions(problem(osc, structure, middle.label))
+    first, *_, last = solutions(GraphSearch(nodes=(160, 160)), problem(osc, structure, middle.label))
     for target, value in exact.items():
         assert best(last, target).value == pytest.approx(value, rel=0.02)
         assert abs(best(last, target).value - value) <= best(last, target).numerical_error

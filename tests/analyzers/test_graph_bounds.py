@@ -147,8 +147,7 @@ def test_without_a_path_there_are_no_bounds(monkeypatch):
 
 def test_a_path_that_ends_in_its_own_basin_is_none():
     found = problem(*wells(0.0))
-    *_, solution = GraphSearch(nodes=(64, 64)).solutions(found)
-    (estimate,) = solution.behind
+    (estimate,) = GraphSearch(nodes=(64, 64)).search(found).behind
     path = estimate.paths[0]
     assert whole_action(found, path) == pytest.approx(0.5, rel=5e-3)
     half = int(np.argmax(path.states[:, 0] > -0.5))

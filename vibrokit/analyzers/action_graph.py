@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from vibrokit.analyzers.analyzer import Analysis, Analyzer, at_exit
 from vibrokit.analyzers.graph.search import GraphSearch
-from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.solution import ExitCosts
 from vibrokit.analyzers.graph.tracing import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.oscillator import Oscillator
@@ -37,12 +37,13 @@ class ActionGraph(GraphSearch, Analyzer):
         problem.check_path_begins()
         if problem.at_exit:
             return at_exit(problem, METHOD, Bound.ESTIMATE)
-        found: GraphSolution | None = None
+        costs: ExitCosts | None = None
         with Stoppable("graph", problem.source) as work:
-            for found in self.solutions(problem):  # noqa: B007 - the last one counts
-                pass
-        if found is None:
+            costs = self.begin(problem)
+            while not costs.finished:
+                costs.refine()
+        if costs is None or not costs.solved:
             return Analysis(findings=work.findings, complete=False)
-        found = found.bounded(problem)
+        found = costs.solution().bounded(problem)
         findings, complete = (*found.findings, *work.findings), found.complete and not work.stopped
         return Analysis(found.estimates, found.dataset(), findings, found.energies, complete)

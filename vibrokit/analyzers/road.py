@@ -77,15 +77,16 @@ class ExitRoad:
     @property
     def stopped(self) -> bool:
         """Whether the work was stopped anywhere before its end."""
-        parts = (self.solution, self._search, *(self._polishings or ()))
+        parts = (self._search, *(self._polishings or ()))
         return self._cut or not all(part.complete for part in parts if part is not None)
 
     def analysis(self) -> Analysis:
         """Combine what was found."""
-        branches, polished = self._polished
-        if self._graph is not None and self._graph.solution is not None:
-            self._graph.solution = self._graph.solution.bounded(self.problem, self._evidence.cheapest.keys())
-        solution, evidence = self.solution, self._evidence
+        (branches, polished), solution = self._polished, self.solution
+        if solution is not None:
+            solution = solution.bounded(self.problem, {branch.target for branch in branches})
+            self._cut |= not solution.complete
+        evidence = self._weighed(solution)
         exits = evidence.compared(self._unpolished(evidence))
         every = (*self._findings, *(() if solution is None else solution.findings), *polished)
         findings = [finding for finding in every if finding.code is not Code.NO_EXIT_FOUND]  # of one search alone
@@ -162,16 +163,16 @@ class ExitRoad:
     # --- bound
 
     def _refine(self) -> None:
-        """Solve the graph on more nodes until its error is as small as wanted."""
+        """Solve the graph on more nodes until they are of no use for any exit."""
         graph = self._graph
-        while graph is not None and not graph.searched and not self.stopped:
-            before, evidence = graph.solution, self._evidence
+        while graph is not None and graph.costs is not None and not graph.costs.finished and not self.stopped:
+            evidence = self._evidence
             settled = evidence.settled(self._accuracy)
-            if before is not None and settled.issuperset(each.target for each in evidence.estimates):
+            if graph.costs.solved and settled.issuperset(each.target for each in evidence.estimates):
                 break
             known = KnownPaths(self._polished[0], settled)
             found = self._asked(graph, functools.partial(graph.finer, known))
-            if graph.solution is not before:
+            if found:
                 self._polish(found)
 
     def _begin_otherwise(self) -> None:
@@ -207,8 +208,11 @@ class ExitRoad:
 
     @property
     def _evidence(self) -> Evidence:
-        beyond = frozenset[int]() if self.solution is None else self._beyond
-        return Evidence(self.problem.attractor, self._polished[0], self.solution, tuple(self._least), beyond)
+        return self._weighed(self.solution)
+
+    def _weighed(self, solution: GraphSolution | None) -> Evidence:
+        beyond = frozenset[int]() if solution is None else self._beyond
+        return Evidence(self.problem.attractor, self._polished[0], solution, tuple(self._least), beyond)
 
     @property
     def _is_exact(self) -> bool:

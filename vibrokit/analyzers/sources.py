@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.search import GraphSearch
-from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.solution import ExitCosts, GraphSolution
 from vibrokit.analyzers.paths import closest_approach, detailed_balance, reversed_relaxation, slow_relaxation
 from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.paths.mirror import FINDER as MIRROR
@@ -99,10 +99,8 @@ class Graph(Source):
 
     Attributes
     ----------
-    solution : GraphSolution or None
-        What is known so far.
-    searched : bool
-        Whether there are no more nodes to take.
+    costs : ExitCosts or None
+        What it has found so far; None before it was asked.
     """
 
     name = "graph"
@@ -111,16 +109,21 @@ class Graph(Source):
     def __init__(self, settings: GraphSearch, *, shots_follow: bool) -> None:
         self._settings = settings
         self.effort = Effort.SHOOT if shots_follow else Effort.FROM_ORBIT
-        self._solutions: Generator[GraphSolution, KnownPaths | None, None] | None = None
-        self.solution: GraphSolution | None = None
-        self.searched = False
+        self.costs: ExitCosts | None = None
+
+    @property
+    def solution(self) -> GraphSolution | None:
+        """What is known so far; None before anything was solved."""
+        return self.costs.solution() if self.costs is not None and self.costs.solved else None
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
-        """Return paths on the fewest nodes."""
-        self._solutions = self._settings.solutions(problem, KnownPaths(polished))
-        return self.finer(None)
+        """Return paths on the fewest nodes on which an exit is reached."""
+        self.costs = self._settings.begin(problem, closer=True)
+        while not (self.costs.solved or self.costs.finished):
+            found = self.finer(KnownPaths(polished))
+        return found
 
-    def finer(self, known: KnownPaths | None) -> Sequence[Candidate]:
+    def finer(self, known: KnownPaths) -> Sequence[Candidate]:
         """Return paths on the next number of nodes; `known` is what was found since the last.
 
         Raises
@@ -128,16 +131,10 @@ class Graph(Source):
         StructureError
             No exit was reached so far on any number of nodes.
         """
-        assert self._solutions is not None
-        before, solved = self.solution, False
-        try:
-            while not solved:
-                found = next(self._solutions) if known is None else self._solutions.send(known)
-                known = None
-                self.solution, solved = found, found.last
-        except StopIteration:  # also after an error, which ends the search
-            self.searched = True
-        return () if self.solution is None or self.solution is before else self.solution.candidates
+        assert self.costs is not None
+        before = self.costs.solved
+        self.costs.refine(known)
+        return self.costs.solution().candidates if self.costs.solved > before else ()
 
 
 class Shots(Source):

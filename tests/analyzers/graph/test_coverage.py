@@ -41,8 +41,10 @@ def test_grids_reach_beyond_the_region_where_a_known_path_does(which):
     states = np.array([[-0.5, 0.0], [1.0, 0.0]])
     path = ExitPath(np.arange(2.0), states, np.zeros((2, 2)), np.array([0.0, EXACT]), np.array([0, 1]))
     known = ActivationEnergy(0, ESCAPED, EXACT, EXACT, EXACT, "", Bound.UPPER, path=path)
-    (*_, found) = vk.GraphSearch(nodes=(120, 120)).solutions(problem(which), KnownPaths([known]))
-    (energy,) = found.estimates
+    costs = vk.GraphSearch(nodes=(120, 120)).begin(problem(which), closer=True)
+    while not costs.finished:
+        costs.refine(KnownPaths([known]))
+    (energy,) = costs.solution().estimates
     assert energy.value == pytest.approx(EXACT, rel=0.01)
     assert energy.numerical_error < 0.05 * EXACT
 

@@ -1,15 +1,14 @@
-"""GraphSearch: settings of the graph, and the search itself, on few nodes first."""
+"""GraphSearch: settings of the graph, and how many nodes and steps it takes in the memory that it may take."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import HierarchySearch
-from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.path_ends import exit_targets
 from vibrokit.analyzers.graph.solution import ExitCosts, GraphSolution
 from vibrokit.analyzers.graph.step_model import StepModel
@@ -104,19 +103,15 @@ class GraphSearch(metaclass=Constructed):
             No exit was reached, the attractor is not hyperbolic or lies outside the structure's region, the exit has a
             path end that the graph does not know, or the grids would take too much memory.
         """
-        *_, best = self.solutions(problem)
-        return best.bounded(problem)
+        costs = self.begin(problem)
+        while not costs.finished:
+            costs.refine()
+        return costs.solution().bounded(problem)
 
-    def solutions(
-        self, problem: ExitProblem, known: KnownPaths | None = None
-    ) -> Generator[GraphSolution, KnownPaths | None, None]:
-        """Yield solutions, each better than the one before; `search` returns the last. Errors as of `search`.
+    def begin(self, problem: ExitProblem, *, closer: bool = False) -> ExitCosts:
+        """Return a search that has solved nothing yet; `closer` allows twice the nodes, around known paths, at its end.
 
-        The number of nodes along each side doubles from a quarter of `nodes` to all. A grid that holds the costliest
-        exit has few nodes for one that costs far less. So those that do are solved again without the others, or before
-        them if paths to them are known; the solution so far is yielded in between. If `known` is given, the last
-        solution has twice the `nodes`, around the paths to exits that are not settled then. In return for the last
-        solution on a number of nodes, the caller may send newer known paths.
+        The number of nodes along each side doubles from a quarter of `nodes` to all. Errors as of `search`.
         """
         attractor = problem.attractor
         self.check_noise(problem.osc)
@@ -129,26 +124,11 @@ class GraphSearch(metaclass=Constructed):
         with stage("exit targets", subject=attractor.name):
             steps = self._affordable(problem.scene)
             model = StepModel(problem.scene, problem.ensemble_stepper(Flow.LINEARISED))
-            search, targets = HierarchySearch(problem, model, steps), exit_targets(problem, model)
-        shapes = [nodes for nodes in steps if known is not None or nodes[0] <= self.nodes[0]]
-        costs = ExitCosts(search, self._findings(problem, shapes))
-        for number, nodes in enumerate(shapes, start=1):
-            costs.finer, paths = len(shapes) - number, known or KnownPaths()
-            costs.last_for_all = nodes == shapes[-1] or shapes[number][0] > self.nodes[0]
-            unsettled = [target for target in (*targets, *search.embedded_targets(paths)) if paths.needs(target)]
-            # Grids for targets that are no farther than the own basin cover that basin alone.
-            both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
-            groups = [pair for together in both for pair in search.groups(together, paths)]
-            for before, (group, paths_of_group) in enumerate(groups):
-                if before and costs.estimates:  # tell what the groups before have shown
-                    yield costs.solution(nodes, last=False)
-                try:
-                    yield from costs.refined(group, nodes, paths_of_group)
-                except StructureError:  # on few nodes, no exit may be reached
-                    if costs.last_for_all and not costs.estimates:
-                        raise
-            if groups and costs.estimates:
-                known = (yield costs.solution(nodes, last=True)) or known
+            targets = exit_targets(problem, model)
+        shapes = tuple(nodes for nodes in steps if closer or nodes[0] <= self.nodes[0])
+        for_all = sum(nodes[0] <= self.nodes[0] for nodes in shapes)
+        search = HierarchySearch(problem, model, steps)
+        return ExitCosts(search, targets, shapes, for_all, self._findings(problem, shapes))
 
     def _affordable(self, scene: Oscillator) -> dict[Shape, tuple[int, ...]]:
         """Numbers of nodes, each twice the one before, with the numbers of steps to try that there is memory for.

@@ -41,7 +41,6 @@ class GraphSolution:
     findings: tuple[Finding, ...]
     cheapest: Mapping[int, TargetEstimate]  # what gave each target's best energy
     most_steps: int  # steps in a section interval that those on more nodes may have
-    last: bool  # no other one on as many nodes follows
     finer: int  # how many times the nodes along a side may still be doubled
     last_for_all: bool  # whether finer ones follow only for exits that it is too coarse for
     complete: bool = True  # False if `bounded` was stopped before its end
@@ -153,32 +152,60 @@ def _array(dims: str | tuple[str, ...], values: object, units: str, long_name: s
 
 @dataclasses.dataclass(eq=False)
 class ExitCosts:
-    """What was found so far."""
+    """What reaching the exits of one attractor costs, as found on more and more nodes.
+
+    All that was found is kept if the work is stopped.
+    """
 
     search: HierarchySearch
+    targets: Sequence[ExitTarget]
+    shapes: Sequence[Shape]  # numbers of nodes, each twice the one before along both sides
+    for_all: int  # of these numbers; others are for exits that the graph is too coarse for
     findings: tuple[Finding, ...]
     estimates: dict[ExitTarget, TargetEstimate] = dataclasses.field(default_factory=dict)
     potential: Potential | None = None  # on the finest grid that reaches the costliest target
-    finer: int = 0  # refinements that follow
-    last_for_all: bool = False  # whether these are only for exits that the graph is too coarse for
+    begun: int = 0  # numbers of nodes that were taken
+    solved: int = 0  # numbers of nodes up to the last on which something was solved
 
-    def refined(self, targets: Sequence[ExitTarget], nodes: Shape, known: KnownPaths) -> Iterator[GraphSolution]:
-        """Solve for all targets together, then for those that cost far less without the others; keep what is known.
+    @property
+    def finished(self) -> bool:
+        """Whether there are no more nodes to take."""
+        return self.begun == len(self.shapes)
 
-        Yields what is known in between. Raises StructureError if no target was reached.
+    def refine(self, known: KnownPaths | None = None) -> None:
+        """Solve on the next number of nodes, for all exits that known paths do not settle.
+
+        Exits that cost far less than others, by known paths, are solved before these on grids of their own. Raises
+        StructureError if no exit was reached on any number of nodes.
+        """
+        paths, nodes = known or KnownPaths(), self.shapes[self.begun]
+        self.begun += 1
+        unsettled = [each for each in (*self.targets, *self.search.embedded_targets(paths)) if paths.needs(each)]
+        # Grids for targets that are no farther than the own basin cover that basin alone.
+        both = ([target for target in unsettled if target.farther is farther] for farther in (True, False))
+        for group, paths_of_group in (pair for together in both for pair in self.search.groups(together, paths)):
+            try:
+                self._solve(group, nodes, paths_of_group)
+            except StructureError:  # on few nodes, no exit may be reached
+                if self.begun >= self.for_all and not self.estimates:
+                    self.begun = len(self.shapes)
+                    raise
+
+    def _solve(self, targets: Sequence[ExitTarget], nodes: Shape, known: KnownPaths) -> None:
+        """Solve for some targets together, then for those that cost far less without the others.
+
+        Raises StructureError if no target was reached.
         """
         estimates = self.estimates
-        solved, potential = self.search.estimates(targets, nodes, known)
-        estimates |= {
-            target: one for target, one in solved.items() if np.isfinite(one.value) or target not in estimates
-        }
+        found, potential = self.search.estimates(targets, nodes, known)
+        estimates |= {target: one for target, one in found.items() if np.isfinite(one.value) or target not in estimates}
+        self.solved = self.begun
         if self.potential is None or _highest(targets, estimates) == _highest(estimates, estimates):
             self.potential = potential
         for _ in range(3):
             targets = _apart(targets, estimates, known)
             if not targets:
                 break
-            yield self.solution(nodes, last=False)
             try:
                 closer, _ = self.search.estimates(targets, nodes, known)
             except StructureError:  # too close to the attractor for any grid
@@ -186,17 +213,17 @@ class ExitCosts:
             targets = [target for target in targets if closer[target].error < estimates[target].error]
             estimates |= {target: closer[target] for target in targets}
 
-    def solution(self, nodes: Shape, *, last: bool) -> GraphSolution:
-        """What is known of the targets, put together."""
+    def solution(self) -> GraphSolution:
+        """Return what is known of the targets, put together; something must have been solved."""
         reached = [
             (target, estimate)
             for target, estimate in sorted(self.estimates.items(), key=lambda entry: entry[1].value)
             if np.isfinite(estimate.value)
         ]
-        potential, (nx, nv) = self.potential, nodes
+        potential, nodes = self.potential, self.shapes[self.solved - 1]
         assert potential is not None
         source, steps, stepper = self.search.problem.source, potential.grids.steps, repr(self.search.model.stepper)
-        used = Finding.of(Code.GRAPH, source, nodes_x=nx, nodes_v=nv, steps=steps, stepper=stepper)
+        used = Finding.of(Code.GRAPH, source, nodes_x=nodes[0], nodes_v=nodes[1], steps=steps, stepper=stepper)
         cheapest = {label: estimate for target, estimate in reversed(reached) for label in target.labels}
         lost = [
             Finding.of(Code.GRAPH_PATH_LOST, source, label)
@@ -204,30 +231,15 @@ class ExitCosts:
             if not estimate.candidates
         ]
         return GraphSolution(
-            tuple(
-                ActivationEnergy(
-                    source=source,
-                    target=label,
-                    value=estimate.value,
-                    lower=max(0.0, estimate.value - estimate.error),
-                    upper=np.inf,
-                    method=METHOD,
-                    bound=Bound.ESTIMATE,
-                    numerical_error=estimate.error,
-                    saddle=target.saddle,
-                )
-                for target, estimate in reached
-                for label in target.labels
-            ),
+            tuple(_energy(source, label, target, estimate) for target, estimate in reached for label in target.labels),
             tuple(estimate for target, estimate in reached for _ in target.labels),
             tuple(_labelled(reached)),
             potential,
             (used, *self.findings, *self._not_converged(), *lost),
             cheapest,
             max((max(steps) for shape, steps in self.search.steps_per_period.items() if shape > nodes), default=0),
-            last,
-            self.finer,
-            self.last_for_all,
+            len(self.shapes) - self.solved,
+            self.solved >= self.for_all,
         )
 
     def _not_converged(self) -> Iterator[Finding]:
@@ -235,6 +247,21 @@ class ExitCosts:
         part = max((estimate.unsettled for estimate in self.estimates.values()), default=0.0)
         if part > TOLERANCES.steps:
             yield Finding.of(Code.GRAPH_NOT_CONVERGED, self.search.problem.source, part=part)
+
+
+def _energy(source: int, label: int, target: ExitTarget, estimate: TargetEstimate) -> ActivationEnergy:
+    """The energy of one exit, without a path that bounds it from above."""
+    return ActivationEnergy(
+        source=source,
+        target=label,
+        value=estimate.value,
+        lower=max(0.0, estimate.value - estimate.error),
+        upper=np.inf,
+        method=METHOD,
+        bound=Bound.ESTIMATE,
+        numerical_error=estimate.error,
+        saddle=target.saddle,
+    )
 
 
 def _apart(
