@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from vibrokit.analyzers.evidence import Evidence, reached_through_others
+from vibrokit.analyzers.agreement import Evidence, reached_through_others
 from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.path_solver import Effort

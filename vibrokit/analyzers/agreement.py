@@ -1,20 +1,26 @@
-"""Agreement: polished paths and the graph's estimates combined into energies with bounds."""
+"""Agreement: polished paths and the graph's estimates, combined into energies with bounds.
+
+`Evidence` also says for which exits a finer graph is of use.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
+from vibrokit.analyzers.graph.solution import GraphSolution
+from vibrokit.analyzers.graph.tolerances import TOLERANCES
+from vibrokit.analyzers.path_ends import InBasin
+from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
-
-VAGUE = 0.5
-"""Of a path's action: with a larger error the graph cannot exclude a path of half the action."""
+from vibrokit.structure.boundaries.meetings import meeting_cells
 
 
 class ExitState(Enum):
@@ -47,6 +53,111 @@ class ComparedExit:
     def finding(self) -> Finding:
         """For reports."""
         return Finding(self.state.value, self.energy.source, self.energy.target, self.values)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known of the exits of an attractor, and for which of them a finer graph is of use.
+
+    Exits are named by the labels of the attractors they lead to.
+    """
+
+    attractor: Attractor
+    branches: tuple[ActivationEnergy, ...]  # polished, the cheapest first
+    graph: GraphSolution | None = None
+    least_possible: tuple[ActivationEnergy, ...] = ()
+    """What no path can cost less than, where that is known."""
+    beyond: frozenset[int] = frozenset()
+    """Labels of the attractors that only paths through other basins reach."""
+
+    @cached_property
+    def cheapest(self) -> dict[int, ActivationEnergy]:
+        """By label: the cheapest polished path."""
+        return {branch.target: branch for branch in reversed(self.branches)}
+
+    @cached_property
+    def estimates(self) -> tuple[ActivationEnergy, ...]:
+        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
+        if self.graph is None or not self.attractor.repeats:
+            return () if self.graph is None else self.graph.estimates
+        return self.graph.calibrated([branch for branch in self.branches if branch.bound is not Bound.BRACKET])
+
+    def compared(self, shots: Sequence[ActivationEnergy] = ()) -> tuple[ComparedExit, ...]:
+        """Return the energy of each exit; `shots` are the action plot's energies."""
+        return compared(self.attractor, self.branches, self.estimates, self.least_possible, shots)
+
+    @cached_property
+    def exact(self) -> set[int]:
+        """Exits that cost what no path can cost less than."""
+        return {target for target, state in self._states.items() if state in (ExitState.ATTAINED, ExitState.BARRIER)}
+
+    def settled(self, accuracy: float) -> set[int]:
+        """Return the exits for which more nodes are of no use.
+
+        ======================================  =====================================================
+        exit                                    settled
+        ======================================  =====================================================
+        that attains the proven minimum         always: no graph gave its bounds
+        that even the finest grid will not      always
+        resolve
+        where path and graph contradict each    never
+        other
+        that only paths through other basins    once the graph's error is below its value
+        reach
+        any other                               once that error is at most `accuracy` of the value
+        ======================================  =====================================================
+
+        Twice the nodes that were asked for are only for paths that the graph is too coarse for. Before these, half of
+        the value is enough of an accuracy, and an exit without a path is settled.
+        """
+        found = self.exact | self.unresolvable
+        last = self.graph is not None and self.graph.last_for_all
+        for each in self.estimates:
+            state = self._states[each.target]
+            allowed = 1.0 if each.target in self.beyond else TOLERANCES.vague if last else accuracy
+            accurate = each.numerical_error <= allowed * each.value or (last and state is ExitState.GRAPH_ONLY)
+            if accurate and state in (ExitState.AGREED, ExitState.BRACKETED, ExitState.GRAPH_ONLY):
+                found.add(each.target)
+        return found
+
+    @cached_property
+    def unresolvable(self) -> set[int]:
+        """Exits with a path that costs less than the error that even the finest graph would have.
+
+        The error falls by 8 at most when the nodes along a side are doubled, since interpolation is of third order.
+        Finer grids may tell more than that if they are for a far cheaper path, found since, or have shorter steps where
+        V is below the action of the path.
+        """
+        found, graph = set[int](), self.graph
+        for each in self.estimates:
+            path = self.cheapest.get(each.target)
+            if graph is None or path is None:
+                continue
+            solved = graph.cheapest[each.target]
+            cheaper = TOLERANCES.loose * path.value < solved.known and path.value < each.value
+            shorter = solved.steps < graph.most_steps and each.value < TOLERANCES.below * path.value
+            will_differ = graph.finer and (cheaper or shorter)
+            if not will_differ and each.numerical_error / 8**graph.finer > path.value:
+                found.add(each.target)
+        return found
+
+    @cached_property
+    def _states(self) -> dict[int, ExitState]:
+        """By label: how graph and path compare."""
+        return {one.energy.target: one.state for one in self.compared()}
+
+
+def reached_through_others(problem: ExitProblem) -> frozenset[int]:
+    """Return the labels of the attractors that no saddle leads to, and whose basins do not touch the own one.
+
+    Paths to these pass other basins: they are no first exits.
+    """
+    unled = {label for end in problem.path_ends if isinstance(end, InBasin) for label in end.targets}
+    if not unled:
+        return frozenset()
+    pairs = meeting_cells(problem.structure.basins)
+    touching = {label for pair in pairs if problem.source in pair for label in pair}
+    return frozenset(unled - touching)
 
 
 def compared(
@@ -161,7 +272,7 @@ def _compared(path: ActivationEnergy, graph: ActivationEnergy) -> tuple[ExitStat
         state = ExitState.CHEAPER_EXPECTED if graph.value < path.value else ExitState.TOO_COARSE
         lower = min(path.value, graph.value) - difference
     else:
-        state = ExitState.TOO_COARSE if graph.numerical_error > VAGUE * path.value else ExitState.AGREED
+        state = ExitState.TOO_COARSE if graph.numerical_error > TOLERANCES.vague * path.value else ExitState.AGREED
         lower = min(path.value - path.numerical_error, graph.value - graph.numerical_error)
     bound = Bound.CERTIFIED if state is ExitState.AGREED and path.certificate is not None else Bound.UPPER
     return state, dataclasses.replace(path, lower=max(0.0, lower), bound=bound)
@@ -173,7 +284,7 @@ def _bracket(path: ActivationEnergy, graph: ActivationEnergy, bound: Bound) -> A
     The value is the smaller one of both, and that of the path where the graph's error is as large. A graph above the
     path by more than its error has at least the difference as error.
     """
-    vague = graph.numerical_error > VAGUE * path.value
+    vague = graph.numerical_error > TOLERANCES.vague * path.value
     best = path if vague or path.value <= graph.value else graph
     above = graph.value - path.value
     least = graph.lower if above <= graph.numerical_error else path.value - above

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import xarray
 
+from vibrokit.analyzers.agreement import Evidence, reached_through_others
 from vibrokit.analyzers.analyzer import Analysis
-from vibrokit.analyzers.evidence import Evidence, reached_through_others
 from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.solution import GraphSolution

@@ -74,12 +74,12 @@ class Coverage(ABC):
         """Return whether shorter steps would change costs by less than the error of the nodes."""
 
     @abstractmethod
-    def lies_above(self, solved: SolvedGrid) -> bool:
-        """Return whether V at an exit is larger than the action of the path to it, as by interpolation."""
-
-    @abstractmethod
     def ratios(self, solved: SolvedGrid) -> list[float]:
         """V at the exits that the grids are for, in units of the actions of paths; infinite where there is no path."""
+
+    def lies_above(self, solved: SolvedGrid) -> bool:
+        """Return whether V at an exit is larger than the action of the path to it, as by interpolation."""
+        return any(1 + TOLERANCES.steps < ratio < np.inf for ratio in self.ratios(solved))
 
     def excess(self, solved: SolvedGrid) -> float:
         """Return the largest difference of the logarithms of V at an exit and of the action of the path to it."""

@@ -63,10 +63,6 @@ class WholeRegion(Coverage):
             return False
         return coarse.linearization_error(targets) <= room
 
-    def lies_above(self, solved: SolvedGrid) -> bool:
-        """Than that of a known path, or elsewhere of the path on the grid."""
-        return any(1 + TOLERANCES.steps < ratio < np.inf for ratio in self.ratios(solved))
-
     def ratios(self, solved: SolvedGrid) -> list[float]:
         """By known paths, and elsewhere by those on the grid."""
         targets, branches = self._judged(solved)
@@ -155,10 +151,6 @@ class AroundPaths(Coverage):
     def far_above(self, solved: SolvedGrid) -> bool:
         """Return whether V at an exit is so far above the action of its path that the grids are too large for it."""
         return max(self.ratios(solved)) > TOLERANCES.loose
-
-    def lies_above(self, solved: SolvedGrid) -> bool:
-        """Than that of a known path."""
-        return max(self.ratios(solved)) > 1 + TOLERANCES.steps
 
     def closer(self, solved: SolvedGrid, most: float) -> SolvedGrid:
         """Solve again in any case if nodes that have to be covered lie at the edge."""

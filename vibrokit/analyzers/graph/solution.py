@@ -9,7 +9,6 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 import xarray
 
-from vibrokit.analyzers.agreement import VAGUE
 from vibrokit.analyzers.graph.grids import Shape
 from vibrokit.analyzers.graph.hierarchy import HierarchySearch, TargetEstimate
 from vibrokit.analyzers.graph.known_paths import KnownPaths
@@ -131,7 +130,7 @@ def _best(energies: Sequence[ActivationEnergy]) -> ActivationEnergy:
 def _bounded(energy: ActivationEnergy, estimate: TargetEstimate, action: float) -> ActivationEnergy:
     """An energy with bounds by the action of a whole path to the exit."""
     error = max(estimate.error, estimate.by_nodes + TOLERANCES.by_path * abs(action - energy.value))
-    low, vague = min(energy.value, action), error > VAGUE * action
+    low, vague = min(energy.value, action), error > TOLERANCES.vague * action
     return dataclasses.replace(
         energy,
         value=action if vague and math.isfinite(action) else low,

@@ -24,8 +24,8 @@ class GraphTolerances:
     hopeless : float
         Times the action of known paths, on a quarter of the nodes along each side: with more, grids around these paths
         are given up. Twice the nodes divided V by 1.7 to 3.5 on scenes where the graph was of use.
-    gain : float
-        By which the error falls at most when the nodes along a side are doubled: the interpolation is of third order.
+    vague : float
+        Of a path's action: with a larger error the graph cannot exclude a path of half the action.
     by_path : float
         Factor on the difference from the action of a path, as the part of the error that linearization makes: the
         fixed ends of the path make its action an upper bound.
@@ -37,7 +37,7 @@ class GraphTolerances:
     below: float = 0.9
     loose: float = 1.5
     hopeless: float = 16.0
-    gain: float = 8.0
+    vague: float = 0.5
     by_path: float = 2.0
 
 
