@@ -14,13 +14,12 @@ from tests.scenes import Coloured
 from vibrokit.analyzers.exits import LeaveRegion
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.completion import solved_again
+from vibrokit.analyzers.polishing.certified import certify
 from vibrokit.analyzers.polishing.ending import resampled
 from vibrokit.analyzers.polishing.ends import ending_at
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.newton import NotConverged
-from vibrokit.analyzers.polishing.path_solver import PathSolver
+from vibrokit.analyzers.polishing.path_solver import PathSolver, solved_again
 from vibrokit.analyzers.polishing.polish import Polishing, Shared, polish
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

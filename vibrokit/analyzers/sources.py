@@ -90,7 +90,7 @@ class Relaxations(Source):
         if found:
             least = detailed_balance.least_actions(problem)
             exact = bool(least) and all(each.bound is Bound.EXACT for each in least)
-            self.effort = Effort.JOIN if exact else Effort.FROM_ORBIT
+            self.effort = Effort.SHOOT if exact else Effort.FROM_ORBIT
         return [*found, *slow]
 
 

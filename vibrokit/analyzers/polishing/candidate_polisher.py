@@ -11,10 +11,9 @@ import numpy as np
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.ends import Nodes
-from vibrokit.analyzers.polishing.leg import Departure, LegSolver
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver, SolvedPath
 from vibrokit.analyzers.polishing.passing import PassingSearch
 from vibrokit.analyzers.polishing.path_solver import Effort
-from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError

@@ -9,14 +9,13 @@ import numpy as np
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import POLISHED, Candidate, same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.certify import certify
-from vibrokit.analyzers.polishing.completion import completed
+from vibrokit.analyzers.polishing.certified import certify
 from vibrokit.analyzers.polishing.ends import Nodes
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.leg import Departure, LegSolver
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.analyzers.polishing.newton import extremal_path
-from vibrokit.analyzers.polishing.path_solver import Effort
+from vibrokit.analyzers.polishing.path_solver import Effort, completed
 from vibrokit.analyzers.polishing.sensitivity import Sensitivity, sensitivities
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem

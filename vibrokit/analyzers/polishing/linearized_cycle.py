@@ -18,8 +18,7 @@ from vibrokit.analyzers.polishing.linear_spaces import (
     normalized,
     scale_of,
 )
-from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
-from vibrokit.analyzers.polishing.orbit_displacement import OrbitDisplacement, adjoint_weights
+from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit, OrbitDisplacement, adjoint_weights
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.structure.autonomous import Cycle, refine_cycle
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map, gaussian_pieces

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.path_ends import AtSaddle, PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.ends import Nodes, obstacle
-from vibrokit.analyzers.polishing.leg import Departure, LegSolver
+from vibrokit.analyzers.polishing.leg import Departure, LegSolver, SolvedPath
 from vibrokit.analyzers.polishing.path_solver import Effort
-from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 

@@ -1,4 +1,7 @@
-"""PathSolver: from a cut candidate to the extremal path between two orbits, or from an orbit to a face."""
+"""PathSolver: from a cut candidate to the extremal path between two orbits, or from an orbit to a face.
+
+A path is complete when it starts and ends so near to its orbits that its action no longer changes.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.candidate import same_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.completion import MORE_PERIODS, completed, solved_again, within
 from vibrokit.analyzers.polishing.ending import Cut
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
@@ -22,12 +24,10 @@ from vibrokit.analyzers.polishing.newton import NotConverged, extremal_path
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 
-_NEAR = 1e-3  # of a path's extent: a candidate is cut where it last is this near to its source
-_ON_ORBIT = (8, 16, 32, 64, 128)  # section intervals spent near the orbit by a path that starts on it
-_FAILURES = 3  # of these in turn, after which no longer one is tried
+MORE_PERIODS = 2
+"""Periods of its orbits by which a certified path must allow to be extended."""
 _FROM_NEAR = TOLERANCES.evaluations // 3  # for a candidate with momenta, or a longer path
 _FITTED = 5e-3  # of the action: accuracy of the Gauss–Newton method, by which a path is of a known family
-_MOST_ADDED = 1000  # section intervals before a candidate that starts far from its source
 
 Array = NDArray[np.float64]
 
@@ -35,10 +35,9 @@ Array = NDArray[np.float64]
 class Effort(enum.IntEnum):
     """Rungs of a ladder: a candidate that leads to no path with one effort is tried with the next one later."""
 
-    JOIN = 0  # multiple shooting for a candidate that is a path but for its ends, which needs 3 to 6 evaluations
-    SHOOT = 1  # multiple shooting from the candidate's momenta
-    DESCEND = 2  # Gauss–Newton method, descent of the action, and multiple shooting
-    FROM_ORBIT = 3  # the same, in finer pieces too, and then for a path that starts on the orbit itself
+    SHOOT = 0  # multiple shooting from the candidate's momenta
+    DESCEND = 1  # Gauss–Newton method, descent of the action, and multiple shooting
+    FROM_ORBIT = 2  # the same, in finer pieces too, and then for a path that starts on the orbit itself
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -67,9 +66,8 @@ class PathSolver:
         joined to its source by the linearized equations starts on the orbit itself, if it costs less than `least`,
         the least action known.
         """
-        if effort <= Effort.SHOOT:
-            evaluations = TOLERANCES.evaluations // 16 if effort is Effort.JOIN else _FROM_NEAR
-            return self._once(self._shot(self._as_given(cuts[0]), evaluations))
+        if effort is Effort.SHOOT:
+            return self._once(self._shot(self._as_given(cuts[0]), _FROM_NEAR))
         fitted = (self._fitted(*_begun(self.propagator, self.source, cut), cut) for cut in cuts)
         guess = min(fitted, key=lambda each: each.action)
         action = guess.action
@@ -125,15 +123,16 @@ class PathSolver:
         return result
 
     def _from_orbit(self, guess: _Guess, failure: StructureError) -> ExtremalPath:
-        """A path that starts on the orbit itself: the longest that converges, or hardly costs more than a longer one.
+        """The longest path from the orbit itself that converges, or that hardly costs more than a longer one.
 
-        Raises the failure if none converges. What its length changes is in its certificate.
+        It spends more and more section intervals near the orbit; after three failures in turn no longer one is tried,
+        and the failure given is raised.
         """
         best, failures, propagator, cut = None, 0, self.propagator, guess.cut
         source = self.source.with_start_on_orbit()
         if source is None:
             raise failure
-        for intervals in _ON_ORBIT:
+        for intervals in (8, 16, 32, 64, 128):
             added = intervals * propagator.pieces
             first = guess.first - added
             states = np.concatenate([source.along(first, added), guess.points[:, : propagator.size]])
@@ -144,7 +143,7 @@ class PathSolver:
                 solved_again(propagator, found, MORE_PERIODS * source.period_nodes, 0)
             except StructureError:
                 failures += 1
-                if best is not None or failures == _FAILURES:
+                if best is not None or failures == 3:
                     break
                 continue
             if best is not None and abs(found.action - best.action) <= TOLERANCES.lasting * best.action:
@@ -165,19 +164,85 @@ def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
 def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[LinearizedOrbit, int, Array]:
     """The source, the phase there, and the states of a candidate from where it last is near the source.
 
-    The start stays on the orbit until multiple shooting: the linearized equations do not hold for a start far from the
-    orbit, and would give it much too small an action.
+    Near is within 1e-3 of its extent; up to 1000 section intervals on the orbit come before one that is never so near.
+    The start stays on the orbit until multiple shooting, since far from it the linearized equations would give much
+    too small an action.
     """
     states = cut.states
     nodes = np.arange(0, len(states) - 1, propagator.grain)
     closest, places = source.nearest(states[nodes], nodes)
-    wanted = _NEAR * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
+    wanted = 1e-3 * float(np.linalg.norm(np.ptp(states, axis=0) / propagator.units))
     near = np.flatnonzero(closest <= wanted)
     entered = int(near[-1]) if near.size else 0
     (source, first), states = source.starting(places[entered]), states[nodes[entered] :]
     if not near.size:
         periods = math.ceil(math.log(closest[0] / wanted) / (source.slowest_rate * propagator.pieces))
-        added = min(periods, _MOST_ADDED) * propagator.pieces
+        added = min(periods, 1000) * propagator.pieces
         first -= added
         states = np.concatenate([source.along(first, added), states])
     return source, first, np.concatenate([source.along(first, 1), states[1:]])
+
+
+def completed(propagator: SegmentPropagator, found: ExtremalPath) -> ExtremalPath:
+    """Return the same path, started and ended so near to its orbits that the action no longer changes.
+
+    Raises StructureError if it cannot be joined to them by the linearized equations.
+    """
+    radius = TOLERANCES.radius * found.extent
+    try:
+        found = within(propagator, found, radius)
+    except StructureError:
+        if not found.flat:  # of one of a family, only the error of the linearized equations may be too large
+            raise
+        radius /= 10
+        found = within(propagator, found, radius)
+    for _ in range(4):
+        radius /= 10
+        closer = within(propagator, found, radius)
+        if abs(closer.action - found.action) <= TOLERANCES.unchanged * abs(found.action):
+            break
+        found = closer
+    return found
+
+
+def within(propagator: SegmentPropagator, found: ExtremalPath, radius: float) -> ExtremalPath:
+    """Return the same path, started and ended within a radius of its orbits, or raise StructureError.
+
+    It is made longer in steps where all at once does not converge, which generic paths never need.
+    """
+    grain, source, share, failures = propagator.grain, found.source, 1, 0
+    while True:
+        before = 0 if source.start_on_orbit else source.missing(found.points, found.first, -1, radius, grain) // grain
+        after = found.ending.missing(found.points, radius) // grain
+        try:
+            longer = solved_again(propagator, found, int(before / share) * grain, int(after / share) * grain)
+        except StructureError:
+            failures += 1
+            if failures > 6 or max(abs(before), abs(after)) < 2 * share:
+                raise
+            share *= 2
+            continue
+        if share == 1:
+            return longer
+        found, share = longer, share // 2
+
+
+def solved_again(
+    propagator: SegmentPropagator, found: ExtremalPath, before: int, after: int, accepted: float = TOLERANCES.accepted
+) -> ExtremalPath:
+    """Solve for the same path with so many nodes more (or fewer, if negative) before and after.
+
+    Raises StructureError if it does not converge, or if hardly anything of the path would be left.
+    """
+    points, first = found.points, found.first
+    if len(points) + min(before, 0) + min(after, 0) < 2:
+        raise StructureError(
+            f"a path of {len(points)} nodes cannot be made {-min(before, 0) - min(after, 0)} nodes shorter."
+        )
+    more = found.source.continued(points[0], first, -max(before, 0))
+    points = np.concatenate([more, points[max(-before, 0) :]])
+    points, ending = found.ending.extended(points, after)
+    return extremal_path(
+        propagator, found.source, first - before, ending, points, found.last,
+        evaluations=TOLERANCES.evaluations // 8, accepted=accepted,
+    )  # fmt: skip

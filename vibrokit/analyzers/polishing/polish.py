@@ -10,8 +10,8 @@ from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.polishing import certified
 from vibrokit.analyzers.polishing.candidate_polisher import CandidatePolisher
 from vibrokit.analyzers.polishing.ends import Nodes
+from vibrokit.analyzers.polishing.leg import SolvedPath
 from vibrokit.analyzers.polishing.path_solver import Effort
-from vibrokit.analyzers.polishing.solved_path import SolvedPath
 from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.progress import advance, stage
@@ -111,19 +111,19 @@ class Polishing:
         ranked = sorted(new, key=lambda each: each.action)
         self._seen |= set(ranked)
         with Stoppable("polishing", self._problem.source) as work:
-            self._polish(ranked, min(effort, Effort.SHOOT))
+            self._polish(ranked)
             for rung in range(Effort.DESCEND, effort + 1):
                 self._polish_the_rest(Effort(rung))
         self._findings += work.findings
         self.complete &= not work.stopped
         self._certify()
 
-    def _polish(self, ranked: Sequence[Candidate], effort: Effort) -> None:
+    def _polish(self, ranked: Sequence[Candidate]) -> None:
         with stage("polishing", unit="candidates", total=len(ranked)):
             for candidate in ranked:
                 if candidate not in self._shared.fruitless:
                     before = len(self._polisher.solved)
-                    self._polisher.polish(candidate, effort)
+                    self._polisher.polish(candidate, Effort.SHOOT)
                     self._shared.note(candidate, self._polisher.solved[before:], self._number)
                 advance()
 
