@@ -9,7 +9,7 @@ from tests.conformance import broken
 from vibrokit import Constant, CubicSpring, Hertz, WhiteNoise
 from vibrokit.errors import UnknownNameError
 from vibrokit.kernels import kernel, store
-from vibrokit.symbolic import model
+from vibrokit.symbolic import equations
 from vibrokit.testing import (
     ConformanceError,
     check,
@@ -59,8 +59,8 @@ def test_caught(checks, name, part):
 @pytest.mark.parametrize(("name", "law", "wrong"), broken.MISLED, ids=[name for name, *_ in broken.MISLED])
 def test_a_wrong_derivation_is_caught(name, law, wrong, tmp_path, monkeypatch):
     """With a cache of its own: the code is that of no scene."""
-    derived = model.derive_contact
-    monkeypatch.setattr(model, "derive_contact", lambda *of: dataclasses.replace(derived(*of), **wrong))
+    derived = equations.derive_contact
+    monkeypatch.setattr(equations, "derive_contact", lambda *of: dataclasses.replace(derived(*of), **wrong))
     monkeypatch.setattr(store, "cache_directory", lambda: tmp_path)
     kernel._KERNELS.clear()
     with pytest.raises(ConformanceError, match="deriv"):
