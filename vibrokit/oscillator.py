@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from vibrokit.kernels.stepper import Stepper
     from vibrokit.symbolic.model import Model
 
-_SAMPLES = 256
 _MOST_SAMPLES = 10**8
 _MOST_PERIODS = 10**15
 # Times of a force in an interval from which on it may be what needs 200 000 attempts at steps. Order8 gave up after
@@ -68,7 +67,7 @@ class Oscillator(Scene):
         periods: float | None = None,
         *,
         duration: float | None = None,
-        samples: int = _SAMPLES,
+        samples: int = 256,
         start_time: float = 0.0,
         stepper: Stepper | None = None,
         rng: Rng = None,

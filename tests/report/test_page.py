@@ -3,7 +3,6 @@
 import dataclasses
 import html
 import json
-import math
 import shutil
 import subprocess
 import xml.etree.ElementTree
@@ -12,7 +11,7 @@ import pytest
 
 import vibrokit as vk
 from tests.assessment.test_assessment import SCENE, STRUCTURE, assessment, rated  # noqa: F401 - a fixture
-from tests.builders import drop, full_structure, rewritten
+from tests.builders import full_structure
 from tests.layers import slow
 from tests.report.page import Page
 from vibrokit.assessment.durations import duration_text
@@ -134,14 +133,6 @@ def test_a_scene_file_with_markup_in_its_names(tmp_path, monkeypatch, capsys):
     assert not page.open
     assert name in page.words
     assert {"spring.b_1", "spring.script"} <= set(page.cells)
-
-
-def test_a_file_without_accuracies_opens(assessment, tmp_path):  # noqa: F811
-    assessment.save(tmp_path / "a.nc")
-    (tmp_path / "a.nc").write_bytes(rewritten((tmp_path / "a.nc").read_bytes(), drop("reached")))
-    again = vk.load_result(tmp_path / "a.nc")
-    assert again.mean_time(0) == assessment.mean_time(0)
-    assert {math.inf} == {accuracy for name in again.results for _, accuracy in again.parts(name).values()}
 
 
 def test_files(report, tmp_path):

@@ -113,8 +113,9 @@ class Assessment(Record):
         start, end = self._labels(source, target)
         found = self.evidence.energy(start, end)
         if found is None:
-            leaving = exit_name(self.names, start, end)
-            raise StructureError(f"no activation energy is known for {leaving}; give more time.")
+            raise StructureError(
+                f"no activation energy is known for {exit_name(self.names, start, end)}; give more time."
+            )
         return found
 
     @called
@@ -144,12 +145,7 @@ class Assessment(Record):
 
     @called
     def probability_of_leaving(
-        self,
-        source: int | str,
-        within: float | str,
-        target: int | str | None = None,
-        *,
-        intensity: float | None = None,
+        self, source: int | str, within: float | str, target: int | str | None = None, *, intensity: float | None = None
     ) -> Answer:
         """Return the probability that a state is left within a time, 1 − exp(−t/τ), times the share of the target.
 
@@ -174,9 +170,8 @@ class Assessment(Record):
         time = seconds_in(within, period=self.period)
         (start, end), at = self._labels(source, target), self._checked(intensity)
         goal = self.evidence.log_time(start, end, at)
-        leaving = (
-            goal if end is None or self.evidence.targets(start) == {end} else self.evidence.log_time(start, None, at)
-        )
+        alone = end is None or self.evidence.targets(start) == {end}
+        leaving = goal if alone else self.evidence.log_time(start, None, at)
         value, lower, upper = probability_within(time, leaving, goal, self.evidence.relaxation(start))
         return Answer(
             question=f"probability that {self.evidence.leaving(start, end)} within {time:g} s",
@@ -238,11 +233,7 @@ class Assessment(Record):
 
     @called
     def sensitivities(
-        self,
-        source: int | str,
-        target: int | str | None = None,
-        *,
-        tied: Mapping[str, Sequence[str]] | None = None,
+        self, source: int | str, target: int | str | None = None, *, tied: Mapping[str, Sequence[str]] | None = None
     ) -> tuple[Sensitivity, ...]:
         """Return by how many per cent 1 % of each parameter changes ΔU and the mean time at the scene's noise.
 
@@ -285,11 +276,9 @@ class Assessment(Record):
         if not isinstance(structure, Structure):
             raise ResultFileError("it holds no structure")
         results = {name: one for name, one in records.items() if isinstance(one, Result)}
-        arrays, shape = Arrays(dataset), (len(results), len(structure.names))
-        if "reached" in arrays:  # without it no analysis counts as finished, and an assessment that goes on repeats it
-            table = arrays.numbers("reached", shape, 0.0, finite=False)
-            provenance["reached"] = dict(zip(results, table, strict=True))
-        return cls(structure=structure, results=results, **provenance)
+        shape = len(results), len(structure.names)
+        reached = dict(zip(results, Arrays(dataset).numbers("reached", shape, 0.0, finite=False), strict=True))
+        return cls(structure=structure, results=results, reached=reached, **provenance)
 
     def parts(self, name: str) -> dict[int, tuple[Result, float]]:
         """What one result says of each attractor that was analyzed, by its label, and for what accuracy that is."""
@@ -307,8 +296,6 @@ class Assessment(Record):
         return label_of(source, self.names), None if target is None else goal_of(target, self.names)
 
     def _checked(self, intensity: float | None) -> float:
-        if intensity is None:
-            return self.intensity
-        if not 0 < real(intensity) < math.inf:
+        if intensity is not None and not 0 < real(intensity) < math.inf:
             raise StructureError(f"intensity must be a positive finite number (m² s⁻³), got {shown(intensity)}.")
-        return real(intensity)
+        return self.intensity if intensity is None else real(intensity)

@@ -9,7 +9,6 @@ from functools import singledispatch
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.tables import overview_text, quantity_rows, verdict_rows
 from vibrokit.comparison.transitions import Transitions
-from vibrokit.progress import Stats
 from vibrokit.report.blocks import Block, Listing, Sentences, Table
 from vibrokit.report.tables import (
     along_table,
@@ -29,8 +28,6 @@ from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.results.sweep import Sweep
-
-_LEAST_SHARE = 0.01  # of the time: shorter stages are not listed
 
 
 def record_text(title: str, record: Record, *, brief: bool = False) -> str:
@@ -112,18 +109,13 @@ def findings_text(findings: Sequence[Finding], names: Sequence[str] = ()) -> str
 
 
 def stats_text(record: Record) -> str:
-    """Return how much work a record took, in one line."""
-    counts = ", ".join(f"{number:,} {name}" for name, number in stats_counts(record.stats).items() if number)
-    stages = sorted(record.stats.seconds.items(), key=lambda item: -item[1])
-    times = ", ".join(f"{name} {spent:.1f} s" for name, spent in stages if spent >= _LEAST_SHARE * record.seconds)
-    return f"{record.seconds:.1f} s" + (f" ({times})" if times else "") + (f"; {counts}" if counts else "") + "."
-
-
-def stats_counts(stats: Stats) -> dict[str, int]:
-    """Return the counts of `Stats` by what they count."""
-    return {
-        "trajectories": stats.trajectories,
-        "section intervals": stats.intervals,
-        "steps": stats.steps,
+    """Return how much work a record took, in one line; stages of less than a hundredth of the time are left out."""
+    stats = record.stats
+    done = {
+        "trajectories": stats.trajectories, "section intervals": stats.intervals, "steps": stats.steps,
         "Newton iterations": stats.newton_iterations,
-    }
+    }  # fmt: skip
+    counts = ", ".join(f"{number:,} {name}" for name, number in done.items() if number)
+    stages = sorted(stats.seconds.items(), key=lambda item: -item[1])
+    times = ", ".join(f"{name} {spent:.1f} s" for name, spent in stages if spent >= 0.01 * record.seconds)
+    return f"{record.seconds:.1f} s" + (f" ({times})" if times else "") + (f"; {counts}" if counts else "") + "."

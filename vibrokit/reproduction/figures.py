@@ -25,7 +25,6 @@ from vibrokit.results.sgcm import SGCMResult
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import load_scene
 
-_WALKERS, _SEED, _RELAXATIONS = 20_000, 6, 5.0  # of the simulation beside Figure 6; what is left of its start is e⁻⁵
 _LAST, _SPENT = 4, 0.99  # periods that Figure 10 shows, and the share of the action that is spent at their end
 
 
@@ -78,12 +77,14 @@ def _of_scene(scene: str, known: dict[str, Record]) -> Iterator[Figure]:
 def _displacements(
     osc: Oscillator, density: SGCMResult, structure: Structure, stationary: Callable[[], StationaryDensity]
 ) -> Artists:
-    one, rng = stationary(), np.random.default_rng(_SEED)
+    """Draw the density of x, and a simulation of 20 000 walkers; what is left of its start is e⁻⁵."""
+    seed = 6
+    one, rng = stationary(), np.random.default_rng(seed)
     shares = np.nan_to_num(one.occupancies[0].values)  # what counts with another state has none of its own
-    starts = [a.points[rng.integers(len(a.points), size=round(_WALKERS * share)), :2] for a, share in
+    starts = [a.points[rng.integers(len(a.points), size=round(20_000 * share)), :2] for a, share in
               zip(structure.attractors, shares / shares.sum(), strict=True)]  # fmt: skip
-    periods = math.ceil(_RELAXATIONS * float(np.max(density.relaxations)) / osc.section_interval)
-    sample = osc.section_map(np.concatenate(starts), periods, rng=_SEED)[:, 0]
+    periods = math.ceil(5.0 * float(np.max(density.relaxations)) / osc.section_interval)
+    sample = osc.section_map(np.concatenate(starts), periods, rng=seed)[:, 0]
     marginal = one.density[0].integrate("v")
     return sampled_density(one.x, marginal.values, sample)
 

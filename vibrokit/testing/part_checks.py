@@ -32,7 +32,6 @@ P = TypeVar("P", bound=Part)
 Rng = int | np.random.Generator | None
 
 ORDERS = ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # of the derivatives that kernels use, in two arguments
-_NEGLIGIBLE = 1e-18  # relative to the scale of a derivative: the error of a finite difference
 
 
 class PartChecks(ABC, Generic[P]):
@@ -277,7 +276,7 @@ class PartChecks(ABC, Generic[P]):
                 for order, size in zip(orders, point, strict=True):
                     scale /= mpmath.mpf(abs(size)) ** order
                 by_formula, by_difference = reference.exact(*point), difference(value, point, orders)
-                if max(abs(by_formula), abs(by_difference)) <= _NEGLIGIBLE * scale:
+                if max(abs(by_formula), abs(by_difference)) <= 1e-18 * scale:  # the error of a finite difference
                     continue
                 distance = relative_distance(by_formula, by_difference)
                 worst = max(worst, distance)

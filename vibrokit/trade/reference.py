@@ -19,8 +19,6 @@ from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.flow_kind import Flow
 
 TIGHTEST = 2.3e-14  # relative tolerance, the least that SciPy's DOP853 takes
-_PROBES = 16  # places in each step that are searched for a change of contact
-_FEWEST_STEPS = 32  # in an interval, so that the probes lie close
 _MOST_CHANGES = 1_000_000  # of contact in one interval; chatter would never end
 
 Array = NDArray[np.float64]
@@ -54,7 +52,7 @@ class _Motion:
         """Integrate from time 0 to `interval`."""
         time, pushing = 0.0, self.pushing_at(state)
         for _ in range(_MOST_CHANGES):
-            solver = self._solver(time, state, interval, pushing, interval / _FEWEST_STEPS)
+            solver = self._solver(time, state, interval, pushing, interval / 32)
             change = None
             while solver.status == "running" and change is None:
                 time, state = solver.t, solver.y
@@ -102,9 +100,9 @@ class _Motion:
         if not self.stops:
             return None
         dense = solver.dense_output()
-        probes = np.linspace(solver.t_old, solver.t, _PROBES + 1)
+        probes = np.linspace(solver.t_old, solver.t, 17)
         states = dense(probes).T
-        for k in range(1, _PROBES + 1):
+        for k in range(1, len(probes)):
             high = probes[k]
             changed = self.pushing_at(states[k]) != pushing
             if not changed and states[k - 1, 1] * states[k, 1] < 0.0:

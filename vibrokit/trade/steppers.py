@@ -70,9 +70,7 @@ class Trade:
     first_calls: tuple[FirstCall, ...]
     references: Mapping[str, str]  # what the errors of each stepper are distances to
     orders: Mapping[str, float]  # exponent of the error, in the step or in the tolerance, or NaN
-    unused: Mapping[
-        str, str
-    ]  # steppers that cannot integrate this scene, and settings that are too coarse; with reasons
+    unused: Mapping[str, str]  # why a stepper cannot integrate this scene, or a setting is too coarse for it
     checked: float  # median distance of the finest stepper to DOP853, which shares only the right-hand side with it
     starts: int
     periods: int
@@ -118,7 +116,6 @@ def measure_steppers(
     starts: int = 64,
     periods: int = 2,
     seconds: float = 0.6,
-    rng: int | np.random.Generator = 0,
     progress: Progress = None,
 ) -> Trade:
     """Measure error and time of every stepper that can integrate a scene, coarse to fine.
@@ -132,7 +129,7 @@ def measure_steppers(
     at random between the stops. NoSectionError is raised if the excitations have no common period, IntegrationError if
     a reference ran out of range.
     """
-    states = starts_between_stops(osc, starts, np.random.default_rng(rng))
+    states = starts_between_stops(osc, starts, np.random.default_rng(0))
     defaults = {repr(ensemble_stepper(osc, Flow.STATE)), repr(single_stepper(osc, Flow.STATE))}
     rows: list[TradeRow] = []
     with working(progress), stage("steppers", unit="settings"), warnings.catch_warnings():
