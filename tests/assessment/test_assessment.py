@@ -49,7 +49,7 @@ def rated(kind=MFETResult, error=0.02, sources=(0, 1)):
     return rated_result(kind, times, D, error, section=SECTION, scene=SCENE, relaxation=1.0)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def assessment():
     paths = tuple(energy(*way, value, lower=value, upper=value) for way, value in BARRIERS.items())
     least = LeastActionResult(

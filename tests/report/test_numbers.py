@@ -8,7 +8,6 @@ import re
 
 import pytest
 
-from tests.assessment.test_assessment import assessment  # noqa: F401 - a fixture
 from tests.report.page import Page
 from vibrokit.assessment.plausibility import plausibility
 from vibrokit.report.assessment import assessment_data
@@ -42,9 +41,8 @@ def finite(*values):
 
 
 @pytest.fixture(scope="module")
-def tables(assessment):  # noqa: F811
+def tables(report):
     """Tables of the page by chapter and name, after a look that page and files have the same cells."""
-    report = assessment.report()
     shown = Page(report.html).tables
     for cells, table in zip(shown, report.tables, strict=True):
         assert cells == list(csv.reader(table.csv.splitlines()))
@@ -54,7 +52,7 @@ def tables(assessment):  # noqa: F811
 
 
 @pytest.fixture(scope="module")
-def data(assessment):  # noqa: F811
+def data(assessment):
     return json.loads(json.dumps(assessment_data(assessment), allow_nan=False))
 
 
@@ -94,7 +92,7 @@ def test_each_method(tables, data):
                 check(row[1:5], [one["intensity"], math.exp(-one["log_value"]), one["value"], one["log_error"]])
 
 
-def test_comparison(tables, assessment):  # noqa: F811
+def test_comparison(tables, assessment):
     found = json.loads(json.dumps(reconciliation_data(assessment.reconciliation), allow_nan=False))
     chapter = "Agreement of the methods"
     wanted = sorted((one["about"], one["code"], one["text"]) for one in found["verdicts"])
@@ -110,7 +108,7 @@ def test_comparison(tables, assessment):  # noqa: F811
         )
 
 
-def test_scene(tables, assessment):  # noqa: F811
+def test_scene(tables, assessment):
     osc = assessment.oscillator
     rows = {row[0]: row for row in tables["Scene", "inputs"]}
     for path, value in osc.parameters.items():

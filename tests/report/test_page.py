@@ -10,7 +10,7 @@ import xml.etree.ElementTree
 import pytest
 
 import vibrokit as vk
-from tests.assessment.test_assessment import SCENE, STRUCTURE, assessment, rated  # noqa: F401 - a fixture
+from tests.assessment.test_assessment import SCENE, STRUCTURE, rated
 from tests.builders import full_structure
 from tests.layers import slow
 from tests.report.page import Page
@@ -25,11 +25,6 @@ from vibrokit.scene_file import scene_data
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
-@pytest.fixture(scope="module")
-def report(assessment):  # noqa: F811
-    return assessment.report(title="A <b>scene</b> & its noise")
-
-
 def test_the_page_is_well_formed_and_needs_nothing_else(report):
     page = Page(report.html)
     assert not page.open
@@ -40,7 +35,7 @@ def test_the_page_is_well_formed_and_needs_nothing_else(report):
         assert chapter.title in page.words
 
 
-def test_units_of_the_inputs_and_numbers_of_the_answer(assessment, report):  # noqa: F811
+def test_units_of_the_inputs_and_numbers_of_the_answer(assessment, report):
     (inputs,) = [table for table in report.tables if table.name == "inputs"]
     units = {row[0]: row[2:4] for row in inputs.rows}
     assert units["noise.intensity"] == ("1.5e-05", "m² s⁻³")
@@ -58,7 +53,7 @@ def test_equations_are_mathml(report):
     assert sum(1 for _ in roots[1].iter("mtable")) == len(SCENE["barriers"])
 
 
-def test_the_same_records_give_the_same_page(assessment, report):  # noqa: F811
+def test_the_same_records_give_the_same_page(assessment, report):
     assert assessment.report(title=report.title).html == report.html
 
 
@@ -68,19 +63,9 @@ def test_a_structure_and_results_are_one_assessment():
     (one,) = gathered([*results, structure])
     assert one.structure is structure
     assert list(one.results) == ["mfet", "mfet 2"]
-    assert "Answer" in [chapter.title for chapter in vk.Report.of(*results, structure).chapters]
 
 
-def test_what_is_incomplete_is_said(assessment):  # noqa: F811
-    stopped = dataclasses.replace(
-        assessment, complete=False, findings=(Finding.of(vk.Code.REMARK, text="a <script> & more"),)
-    )
-    page = Page(stopped.report().html)
-    assert any("ncomplete" in word for word in page.words)
-    assert any("A <script> & more" in word for word in page.words)
-
-
-def test_what_cannot_be_reported(assessment):  # noqa: F811
+def test_what_cannot_be_reported(assessment):
     other = dataclasses.replace(STRUCTURE, scene={**SCENE, "damping_ratio": 0.7})
     with pytest.raises(StructureError, match="damping_ratio"):
         vk.Report.of(assessment, other)
@@ -101,16 +86,22 @@ def test_what_cannot_be_reported(assessment):  # noqa: F811
         r"$\frac{1$ --> ]]>",
     ],
 )
-def test_names_with_markup_are_escaped(assessment, name):  # noqa: F811
-    """In tables, pictures and settings."""
+def test_names_with_markup_are_escaped_and_what_is_incomplete_is_said(assessment, name):
+    """In tables, pictures, settings and remarks."""
     renamed = dataclasses.replace(STRUCTURE.attractors[0], name=name)
     structure = dataclasses.replace(STRUCTURE, attractors=(renamed, STRUCTURE.attractors[1]), scene=SCENE)
-    page = Page(dataclasses.replace(assessment, structure=structure, settings={name: name}).report(title=name).html)
+    remarks = (Finding.of(vk.Code.REMARK, text=name),)
+    stopped = dataclasses.replace(
+        assessment, structure=structure, settings={name: name}, complete=False, findings=remarks
+    )
+    page = Page(stopped.report(title=name).html)
     assert not page.open
     assert not page.tags & {"img", "script", "b"}
     assert all(link.startswith(("#", "data:")) for link in page.links)
     assert name in page.words  # the title
     assert name in page.cells
+    assert any("ncomplete" in word for word in page.words)
+    assert any(f"info: {name}" in word for word in page.words)
 
 
 def test_a_scene_file_with_markup_in_its_names(tmp_path, monkeypatch, capsys):
@@ -149,7 +140,7 @@ def test_files(report, tmp_path):
         report.save_tables(tmp_path / "page.html")
 
 
-def test_command_line(assessment, tmp_path, monkeypatch, capsys):  # noqa: F811
+def test_command_line(assessment, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assessment.save("answer.nc")
     assert main(["report", "answer.nc"]) == 0
