@@ -13,7 +13,7 @@ from vibrokit.structure.autonomous import find_cycle
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.structure.parameter_values import parameter_line
 from vibrokit.structure.tracing.branches import Tracing
-from vibrokit.structure.tracing.following import follow
+from vibrokit.structure.tracing.following import Follower
 from vibrokit.symbolic.flow_kind import Flow
 
 pytestmark = pytest.mark.slow
@@ -24,13 +24,13 @@ CLEAR, HAMMERING = (0.4666, 0.0026), (0.0236, -0.0491)  # of hertz-0.570
 
 def passed(osc, path, state, target, *, size=(2.0, 2.0), cycle=False):
     """What a motion meets from where the scene stands to the target, and whether it arrives there stable."""
-    stepper, start = single_stepper(osc, Flow.STATE_VARIATIONAL), parameter_line("test", osc, path).own
+    stepper, line = single_stepper(osc, Flow.STATE_VARIATIONAL), parameter_line("test", osc, path)
     if cycle:
         orbit = find_cycle(osc, np.array(state), stepper, longest=50.0)
     else:
         orbit = refine_orbit(osc, np.array(state), 1, stepper)
     attractor = describe_orbit(osc, orbit, stepper)
-    return follow(osc, parameter_line("test", osc, path), attractor, start, target, np.array(size), stepper)
+    return Follower(osc, line, np.array(size), stepper).follow(attractor, line.own, target)
 
 
 def only(followed, kind):
@@ -202,7 +202,8 @@ def test_the_cascade_between_periods_1_and_4_has_both_its_doublings():
     for frequency, point, period in ((0.525, (0.0966, -0.0271), 4), (0.57, (0.0236, -0.0491), 1)):
         there = osc.replace({FREQUENCY: frequency})
         found.append([describe_orbit(there, refine_orbit(there, np.array(point), period, stepper), stepper)])
-    tracing = Tracing(osc, parameter_line("test", osc, FREQUENCY), [0.525, 0.57], found, np.array([1.5, 1.5]), stepper)
+    follower = Follower(osc, parameter_line("test", osc, FREQUENCY), np.array([1.5, 1.5]), stepper)
+    tracing = Tracing(follower, [0.525, 0.57], found)
     tracing.run()
     assert tracing.numbered == [[0], [0]]
     doublings = {one.period: one for _, one in tracing.located if one.kind == "period doubling"}

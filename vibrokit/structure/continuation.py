@@ -33,6 +33,7 @@ from vibrokit.structure.find import structure_of
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.regions import frame_of
 from vibrokit.structure.tracing.branches import Tracing, thinned, without_fraction
+from vibrokit.structure.tracing.following import Follower
 from vibrokit.structure.validation import Request, check_means, plain, seed_of, stepper_of
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -198,7 +199,8 @@ class ContinuationRun:
         size = np.ones(2) if frame is None else np.diff(frame.bounds)[:, 0]
         stepper = self.request.stepper or single_stepper(self.osc, Flow.STATE_VARIATIONAL)
         attractors = [[without_fraction(attractor) for attractor in at.attractors] for at in held]
-        return Tracing(self.osc, self.line, [at.value for at in held], attractors, size, stepper)
+        follower = Follower(self.osc, self.line, size, stepper)
+        return Tracing(follower, [at.value for at in held], attractors)
 
     def _find_fractions(self) -> None:
         """Find the basin fractions of all attractors at each value."""

@@ -39,8 +39,6 @@ from vibrokit.symbolic.flow_kind import Flow
 BRANCHES = "branches"
 """Unit of stages that grow manifolds: each branch advances them."""
 _START, _NEAREST = 1e-6, 1e-13  # of the region: extent of the domain from the saddle, and what rounding leaves of it
-_CLOSE = 1e-9  # of the region: largest error of the saddle
-_WEAKEST = 1e-8  # smallest multiplier, relative to the other one, that rounding leaves different from zero
 
 Array = NDArray[np.float64]
 
@@ -154,7 +152,7 @@ def _branch(
     """Grow one branch; a unit of work that an executor may carry."""
     here = _linearised(osc, saddle, place)
     multiplier, direction = _direction(here, backwards, limits)
-    if abs(multiplier) < _WEAKEST or abs(multiplier) > 1.0 / _WEAKEST:
+    if not 1e-8 <= abs(multiplier) <= 1e8:  # rounding leaves the smaller multiplier no digits
         return Manifold(saddle_index, place, backwards, side, here.point[None], ManifoldEnd.TOO_EXTREME)
     point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
     flow = Flow.STATE_REVERSED if backwards else Flow.STATE
@@ -235,15 +233,15 @@ def _with_fixed_point(images: FlowMap, here: _Linearised, limits: Limits, refine
 
     (point,), _, (offset,) = newton(evaluate, here.point[None])
     error = float(np.linalg.norm(np.linalg.solve(jacobian, offset) / limits.width))
-    if not error < _CLOSE and refinements:
+    if error < 1e-9:
+        return images, point
+    if refinements:
         finer = dataclasses.replace(images, stepper=images.stepper.refined())
         return _with_fixed_point(finer, here, limits, refinements - 1)
-    if not error < _CLOSE:
-        raise StructureError(
-            f"with {images.stepper} there is no saddle near {tuple(np.round(point, 6).tolist())}: Newton's steps do "
-            f"not fall below {error:.1g} of the region. Use a finer stepper, or one that locates contacts."
-        )
-    return images, point
+    raise StructureError(
+        f"with {images.stepper} there is no saddle near {tuple(np.round(point, 6).tolist())}: Newton's steps do not "
+        f"fall below {error:.1g} of the region. Use a finer stepper, or one that locates contacts."
+    )
 
 
 def _domain(images: FlowMap, point: Array, direction: Array, growth: float, limits: Limits) -> Domain:

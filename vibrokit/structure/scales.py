@@ -19,7 +19,6 @@ from vibrokit.structure.along_x import states_at, turn_of
 from vibrokit.structure.known_motions import Balance, balances_of
 from vibrokit.structure.one_variable import bracketed_roots
 
-_RESONANCE = 5.0  # amplification of a periodic force that two stops do not limit: room for subharmonic motions
 _DECADES = 12  # above and below 1 m: deflections at which a spring is compared with a linear one, damping with 0
 
 Array = NDArray[np.float64]
@@ -42,7 +41,7 @@ def length_of(osc: Oscillator) -> float:
     for index, part in enumerate(osc.excitations):
         resonant = len(osc.barriers) < 2 and part.period is not None
         largest = _largest_force(field, index, part.period, 2 * math.pi / osc.natural_frequency)
-        push += largest * (_RESONANCE if resonant else 1.0) / osc.natural_frequency**2
+        push += largest * (5.0 if resonant else 1.0) / osc.natural_frequency**2  # room for subharmonic motions
     stops = (2 * abs(barrier.position) for barrier in osc.barriers)
     if osc.model.domain:
         return max([push, _length_between_borders(osc), *stops]) or 1.0

@@ -40,9 +40,6 @@ from vibrokit.structure.scales import units_of
 from vibrokit.structure.validation import check_means
 from vibrokit.symbolic.flow_kind import Flow
 
-_CONVERGED = 1e-9
-_APART = 1e-5  # of the region's widths: largest distance between an orbit of the coarser map and the refined one
-
 Array = NDArray[np.float64]
 
 
@@ -164,7 +161,7 @@ def _roots(osc: Oscillator, equations: Callable[[Array], Evaluation], starts: Ar
         return steps * np.minimum(1.0, longest)
 
     def converged(places: Array, sizes: Array) -> NDArray[np.bool_]:
-        return np.asarray(sizes < _CONVERGED * (1.0 + np.linalg.norm(places / units, axis=1)))
+        return np.asarray(sizes < 1e-9 * (1.0 + np.linalg.norm(places / units, axis=1)))
 
     units = units_of(osc)
 
@@ -186,7 +183,7 @@ def _distinct(
     known: list[tuple[Orbit, Array]] = []
     seen = np.empty((0, roots.shape[1]))
     for root in roots[np.lexsort(roots.T[::-1])]:
-        if len(seen) and region.apart(seen, root).min() < _APART:
+        if len(seen) and region.apart(seen, root).min() < 1e-5:  # as far as the coarser map moves an orbit
             continue
         seen = np.vstack([seen, root])
         try:

@@ -26,7 +26,6 @@ MARGIN = 2
 """Cells on every side that must lead to the same attractor for a cell to classify trajectories, by default."""
 FINEST = 2048
 """Cells along one side of a grid, at most."""
-_BELOW = 1e-3  # of the depth of a well: motion so far below its barriers stays, whatever errors its integration makes
 _SQUARE = np.ones((3, 3), dtype=bool)
 
 Whole = NDArray[np.int64]
@@ -146,6 +145,7 @@ def wells(
     """
     if not osc.model.relaxes:
         return None
+    room = 1e-3  # of the depth of a well, for errors of the integration
     low, high = region.x
     edges, speeds = np.linspace(low, high, cells[0] + 1), np.linspace(*region.v, num=cells[1] + 1, dtype=np.float64)
     steady = SteadyForce(osc)
@@ -166,9 +166,9 @@ def wells(
         with np.errstate(invalid="ignore"):  # beyond a pole nothing is known
             depth = min(before, after) - bottom
             error = float(np.abs(halved - work)[first:last].sum())  # large where a force is singular
-        if label is None or not falls or not error <= 0.1 * _BELOW * depth:
+        if label is None or not falls or not error <= 0.1 * room * depth:
             continue
-        limit = bottom + (1 - _BELOW) * depth
+        limit = bottom + (1 - room) * depth
         between = (edges[:-1] >= left) & (edges[1:] <= right)
         labels[between[:, None] & (highest[:, None] + kinetic < limit)] = label
     return Basins(region, labels)

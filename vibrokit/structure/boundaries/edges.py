@@ -23,8 +23,7 @@ from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.boundaries.meetings import Pair, grouped, meeting_cells, settled, spread
 from vibrokit.symbolic.flow_kind import Flow
 
-_WIDTH = 1e-10  # of the region's widths: target distance of two ends
-_SEPARATED, _TOGETHER = 60.0, 2.0  # times that: distances at which ends are brought together, and count as together
+_TOGETHER = 2e-10  # of the region's widths: distance of two ends that count as together
 
 Array = NDArray[np.float64]
 
@@ -142,9 +141,9 @@ class Straddles:
         after = self._widths()
         with np.errstate(divide="ignore", invalid="ignore"):
             self._stretches.append(np.log(after / before))
-        separated = ~(after <= _SEPARATED * _WIDTH)
+        separated = ~(after <= 30 * _TOGETHER)
         if separated.any():  # the others are included: a call takes as long as its longest trajectory
-            separated |= after > _TOGETHER * _WIDTH
+            separated |= after > _TOGETHER
         self._bring_together(np.flatnonzero(separated))
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
@@ -172,7 +171,7 @@ class Straddles:
                 break
             shrunk = self._cut(wide)
             straddling[wide[~shrunk]] = False
-            wide = wide[shrunk & (self._widths()[wide] > _TOGETHER * _WIDTH)]
+            wide = wide[shrunk & (self._widths()[wide] > _TOGETHER)]
         straddling[wide] = False
         self.keep(straddling)
         self._points.append(self.ends.mean(axis=1))

@@ -13,7 +13,6 @@ from vibrokit.structure.boundaries.edges import EdgeTrack
 
 NEAR = 1e-3
 """Distance, in widths of the region, within which a motion on a boundary is near a saddle, or near where it was."""
-_RECURRENCE = 1e-6  # of the region's widths: a motion has returned
 
 Array = NDArray[np.float64]
 
@@ -32,7 +31,7 @@ def recurrence(points: Array, longest: int) -> int:
     for period in range(1, min(longest, len(points) - 1) + 1):
         apart = np.linalg.norm(points[period:] - points[:-period], axis=1)
         staying = len(apart) >= 48 and apart[-48:].max() < NEAR
-        if apart[-period:].max() < _RECURRENCE or staying:
+        if apart[-period:].max() < 1e-6 or staying:
             return period
     return 0
 

@@ -31,7 +31,7 @@ from vibrokit.symbolic.flow_kind import Flow
 
 RESIDUAL = 1e-10
 """Largest residual of an unstable orbit that is accepted without a finding."""
-_DEPARTURE, _FARTHEST = 1e-5, 1e-2  # of the region's widths: distance from a saddle at which its branches are followed
+_FARTHEST = 1e-2  # of the region's widths: distance from a saddle at which its branches are followed, at most
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def branch_limits(classifier: BasinClassifier, orbit: Orbit) -> tuple[int, ...]:
     other attractors that are reached follow. A repeller has the labels of all directions.
     """
     # Nearer than a hundred errors of the stepper, coarse steps across contacts may have orbits of their own.
-    away = min(_FARTHEST, max(_DEPARTURE, 100 * _mismatch(classifier, orbit)))
+    away = min(_FARTHEST, max(1e-5, 100 * _mismatch(classifier, orbit)))
     with contextlib.suppress(StepperError, StructureError):  # the classifier's map may not have the orbit
         orbit = orbit.refined(classifier.osc, classifier.stepper)
     widths = classifier.region.widths

@@ -13,8 +13,6 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from vibrokit.errors import StructureError, VibrokitError
-from vibrokit.kernels.stepper import Stepper
-from vibrokit.oscillator import Oscillator
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
@@ -25,13 +23,11 @@ from vibrokit.structure.attractors.names import names_of
 from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.orbits import SAMPLES, Orbit, refine_orbit, visited
-from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.tracing.bifurcations import GRAZING, Located
 from vibrokit.structure.tracing.families import DOUBLING, Member
-from vibrokit.structure.tracing.following import follow
+from vibrokit.structure.tracing.following import Follower
 
-_SAME = 1e-5  # fraction of the region's size within which two points are one
-_NEAR = 0.1  # the same, within which two sets of points may belong to one branch
+_NEAR = 0.1  # fraction of the region's size within which two sets of points may belong to one branch
 
 Array = NDArray[np.float64]
 Place = tuple[int, int]
@@ -42,22 +38,16 @@ Place = tuple[int, int]
 class Tracing:
     """Steady states at each value, the links between neighbouring values, and the bifurcations between."""
 
-    osc: Oscillator
-    line: ParameterLine
+    follower: Follower
     values: list[float]  # those with steady states, ascending
     found: list[list[Attractor]]  # at each; those that the search missed are added, with basin fraction NaN
-    size: Array  # (2,), width of the region in x and in v
-    stepper: Stepper
 
     def __post_init__(self) -> None:
+        self.at, self.size, self.stepper = self.follower.at, self.follower.size, self.follower.stepper
         self.links: list[dict[int, int]] = [{} for _ in self.values[1:]]
         self.located: list[tuple[Place, Located]] = []
         self.added = 0
         self._led_to: dict[tuple[int, int, int], Array] = {}
-
-    def at(self, value: float) -> Oscillator:
-        """Return the scene at a value of the parameter."""
-        return self.line.at(self.osc, value)
 
     def run(self) -> None:
         """Follow every orbit to the next value, those that were not reached back, and pair the others by distance."""
@@ -99,10 +89,10 @@ class Tracing:
 
     def _follow(self, at: int, index: int, to: int) -> None:
         attractor, start, target = self.found[at][index], self.values[at], self.values[to]
-        if not attractor.repeats or (attractor.turns and self.osc.autonomous):
+        if not attractor.repeats or (attractor.turns and self.follower.osc.autonomous):
             return
         try:
-            followed = follow(self.osc, self.line, attractor, start, target, self.size, self.stepper)
+            followed = self.follower.follow(attractor, start, target)
         except VibrokitError:  # it stays unlinked, and a finding says that its branch ends
             return
         self.located += [((at, index), bifurcation) for bifurcation in followed.bifurcations]
@@ -126,7 +116,7 @@ class Tracing:
         for index, attractor in enumerate(self.found[at]):
             if (attractor.kind, attractor.period) == (origin.kind, origin.period):
                 away = np.abs(attractor.points[:, :2] - member.point[:2]) / self.size
-                if away.max(axis=1).min() < _SAME:
+                if away.max(axis=1).min() < 1e-5:
                     return index
         return None
 
@@ -180,7 +170,7 @@ class Tracing:
                 guess = large.points[::period].mean(axis=0)
                 orbit = refine_orbit(self.at(start), guess, period, self.stepper)
                 parent = dataclasses.replace(large, points=orbit.point[None], period=period)
-                passed = follow(self.osc, self.line, parent, start, target, self.size, self.stepper).bifurcations
+                passed = self.follower.follow(parent, start, target).bifurcations
             except VibrokitError:
                 return
             self.located += [(many, found) for found in passed if found.kind == DOUBLING]
@@ -193,7 +183,7 @@ class Tracing:
         for attractors, branches in zip(self.found, self.numbered, strict=True):
             for attractor, branch in zip(attractors, branches, strict=True):
                 first.setdefault(branch, attractor)
-        return names_of([first[branch] for branch in sorted(first)], has_stops=bool(self.osc.barriers))
+        return names_of([first[branch] for branch in sorted(first)], has_stops=bool(self.follower.osc.barriers))
 
     @cached_property
     def bifurcations(self) -> tuple[Bifurcation, ...]:
@@ -227,7 +217,7 @@ class Tracing:
     def findings(self, values: int) -> tuple[Finding, ...]:
         """Return findings about the branches at some number of values."""
         count = len({branch for branches in self.numbered for branch in branches})
-        found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=self.line.path)]
+        found = [Finding.of(Code.BRANCHES, branches=count, values=values, parameter=self.follower.line.path)]
         found += [
             Finding.of(Code.BIFURCATION, one.branch, kind=one.kind, side=one.side, value=one.value, error=one.error)
             for one in self.bifurcations

@@ -23,7 +23,6 @@ from vibrokit.structure.parameter_values import ParameterLine
 from vibrokit.structure.scales import units_of
 
 FOLD, DOUBLING, TORUS, HOPF = "fold", "period doubling", "Neimark–Sacker", "Hopf"
-_CLOSED = 1e-9  # residual of a member, relative to the sizes of the coordinates
 
 Array = NDArray[np.float64]
 
@@ -111,10 +110,6 @@ class Family(ABC):
         """Return the scene at a value of the parameter."""
         return self.line.at(self.osc, value)
 
-    def place_of(self, unknowns: Array, value: float) -> Array:
-        """Return unknowns and value, each in its unit."""
-        return np.append(unknowns / self.sizes, value / self.span)
-
     @abstractmethod
     def equations(self, osc: Oscillator) -> Callable[[Array], Evaluation]:
         """Return the equations of the defect at one value of the parameter, and the derivative that belongs to it."""
@@ -143,7 +138,7 @@ class Family(ABC):
             return Evaluation(residual[None], jacobian[None], np.array([member]))
 
         _, (residual,), members = newton(evaluate, guess[None], iterations=12)
-        if not residual <= _CLOSED * float(np.linalg.norm(self.sizes)):
+        if not residual <= 1e-9 * float(np.linalg.norm(self.sizes)):
             value = float(guess[-1] * self.span)
             raise StructureError(f"Newton's method found no {self.kind} motion near {self.line.path} = {value:g}.")
         found: Member = members[0]

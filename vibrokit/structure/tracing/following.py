@@ -17,7 +17,6 @@ from vibrokit.structure.tracing.bifurcations import Located, Stage, bifurcations
 from vibrokit.structure.tracing.families import FAMILIES, Family, Member
 
 _LONGEST = 0.01  # fraction of the region's size that a motion may move in one step
-_SHORTEST = 1e-6  # the same, below which a family counts as lost
 
 Array = NDArray[np.float64]
 
@@ -31,43 +30,50 @@ class Followed:
     bifurcations: tuple[Located, ...]
 
 
-def follow(
-    osc: Oscillator,
-    line: ParameterLine,
-    attractor: Attractor,
-    start: float,
-    target: float,
-    size: Array,
-    stepper: Stepper,
-) -> Followed:
-    """Follow the family of an attractor that repeats, until the parameter reaches the target or turns back.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Follower:
+    """Follows families of steady motions along a parameter, by pseudo-arclength continuation.
 
-    The method is pseudo-arclength continuation (H. B. Keller, "Numerical solution of bifurcation and nonlinear
-    eigenvalue problems", 1977). `size` is the width (2,) of the region in x and in v.
+    The method is that of H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems", 1977.
     """
-    unknowns = attractor.points[0].copy()
-    sizes = np.append(size, np.full(len(unknowns) - 2, size[1]))
-    if attractor.kind == "limit cycle":
-        unknowns[1] = sizes[1] = attractor.duration
-    span, middle = abs(target - start), 0.5 * (start + target)
-    family = FAMILIES[attractor.kind](osc, line, attractor.period, sizes, span, middle, stepper)
-    ahead = np.append(np.zeros(len(unknowns)), math.copysign(1.0, target - start))
-    across = np.abs(ahead)
-    try:
-        first = family.corrected(family.place_of(unknowns, start), np.zeros(len(unknowns)), across)
-        here = Stage.of(first, ahead)
-    except VibrokitError:
-        return Followed(None, False, ())
-    found: list[Located] = []
-    length = 1.0
+
+    osc: Oscillator
+    line: ParameterLine
+    size: Array  # (2,), width of the region in x and in v
+    stepper: Stepper
+
+    def at(self, value: float) -> Oscillator:
+        """Return the scene at a value of the parameter."""
+        return self.line.at(self.osc, value)
+
+    def follow(self, attractor: Attractor, start: float, target: float) -> Followed:
+        """Follow the family of an attractor that repeats, until the parameter reaches the target or turns back."""
+        unknowns = attractor.points[0].copy()
+        sizes = np.append(self.size, np.full(len(unknowns) - 2, self.size[1]))
+        if attractor.kind == "limit cycle":
+            unknowns[1] = sizes[1] = attractor.duration
+        span, middle = abs(target - start), 0.5 * (start + target)
+        family = FAMILIES[attractor.kind](self.osc, self.line, attractor.period, sizes, span, middle, self.stepper)
+        ahead = np.append(np.zeros(len(unknowns)), math.copysign(1.0, target - start))
+        try:
+            place = np.append(unknowns / sizes, start / span)
+            here = Stage.of(family.corrected(place, np.zeros(len(unknowns)), np.abs(ahead)), ahead)
+        except VibrokitError:
+            return Followed(None, False, ())
+        return _followed(here, target, ahead)
+
+
+def _followed(here: Stage, target: float, ahead: Array) -> Followed:
+    """Go on from a stage in steps that are halved where they fail and doubled where they do not."""
+    family, found, length = here.member.family, list[Located](), 1.0
     for _ in range(800):
-        guess, normal, arriving = _predicted(here, length, target / family.span, across)
+        guess, normal, arriving = _predicted(here, length, target / family.span, np.abs(ahead))
         length = float(np.linalg.norm(guess - here.member.place))
         there = _step(family, here, guess, normal)
         passed = bifurcations_between(here, there) if there else []
         if there is None or (length > 1e-3 and any(one.bracketed for one in passed)):
             length /= 2
-            if length < _SHORTEST:
+            if length < 1e-6:  # the family is lost
                 found += grazing_ahead(here)
                 break
             continue
