@@ -1,7 +1,6 @@
 import concurrent.futures
 import dataclasses
 import itertools
-import math
 import multiprocessing
 
 import numpy as np
@@ -10,7 +9,7 @@ from scipy import stats
 
 import vibrokit as vk
 from tests.scenes import scene
-from vibrokit.errors import ParameterError, StructureError
+from vibrokit.errors import StructureError
 from vibrokit.results.codes import Code
 from vibrokit.structure import continuation as module
 from vibrokit.structure.continuation import continuation
@@ -227,35 +226,3 @@ def test_an_interrupt_at_any_moment_leaves_the_values_found(small, tmp_path):
         assert len(part.branches) == 2 or len(part.values) <= 1
         part.save(tmp_path / "part.nc")
         assert same(vk.load_result(tmp_path / "part.nc"), part)
-
-
-@pytest.mark.parametrize(
-    ("parameter", "values", "words"),
-    [
-        ("excitations.0.frequenc", [1.0], "nearest is 'excitations.0.frequency'"),
-        (3, [1.0], "no parameter 3"),
-        (FREQUENCY, [], "one or more"),
-        (FREQUENCY, 1.0, "sequence of numbers"),
-        (FREQUENCY, "12", "sequence of numbers"),
-        (FREQUENCY, [1.0, math.nan], "finite numbers"),
-        (FREQUENCY, [1.0, True], "finite numbers"),
-        (FREQUENCY, [1.0, 2.0, 1.0], "1 more than once"),
-        ({}, [0.5], "factors"),
-        ({"barriers.0.position": 1.0, FREQUENCY: 1.0}, [0.5], "cannot be tied"),
-        ({"barriers.0.position": 0.0}, [0.5], "factor"),
-        ({"barriers.0.position": "1"}, [0.5], "factor"),
-        ({"barriers.0.position": 1.0, "barriers.7.position": 1.0}, [0.5], "barriers.7"),
-    ],
-)
-def test_bad_parameters_and_values(parameter, values, words):
-    with pytest.raises(ParameterError, match=words):
-        continuation(vk.load_scene("hertz-0.570"), parameter, values)
-
-
-def test_bad_arguments():
-    osc = scene(damping_ratio=0.05, spring=vk.CustomSpring("x + e*x**5", e=0.2))
-    with pytest.raises(ParameterError, match="shapes the equations"):
-        continuation(osc, "spring.formula", ["x", "x**3"])
-    for bad in ({"cells": (0, 3)}, {"starts": 5}, {"region": ((1, 0), (0, 1))}):
-        with pytest.raises(StructureError, match=next(iter(bad))):
-            continuation(vk.load_scene("duffing"), FREQUENCY, [1.3, 1.4], **bad)

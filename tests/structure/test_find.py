@@ -1,5 +1,3 @@
-import math
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -7,7 +5,7 @@ from scipy.optimize import fsolve
 
 import vibrokit as vk
 from tests.scenes import double_well, scene
-from vibrokit.errors import NoSectionError, ParameterError, StructureError
+from vibrokit.errors import StructureError
 from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
@@ -67,44 +65,6 @@ def test_labels_are_where_the_flow_leads(paper):
     points = np.array([attractor.points[0] for attractor in structure.attractors])
     nearest = np.argmin(np.linalg.norm(ends[:, None] - points, axis=2), axis=1)
     assert np.mean(nearest == basins.labels.ravel()[picked]) > 0.9  # cells on a boundary may differ by the step
-
-
-UNDAMPED = vk.load_scene("hertz-0.570").replace({"damping_ratio": 0.0})
-TWO_TONES = scene(damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 1.0), vk.Harmonic(0.1, 2**0.5)))
-CHAOTIC = scene(damping_ratio=0.15, spring=vk.CubicSpring(-1.0, 1.0), excitations=(vk.Harmonic(0.5, 1.2),))
-
-
-@pytest.mark.parametrize(
-    ("osc", "given", "error", "words"),
-    [
-        (UNDAMPED, {}, StructureError, "damping"),
-        (TWO_TONES, {}, NoSectionError, "no common period"),
-        (CHAOTIC, {"budget": 1, "starts": (4, 4), "cells": (4, 4)}, StructureError, "raise budget"),
-    ],
-)
-def test_scenes_without_attractors_are_refused(osc, given, error, words):
-    with pytest.raises(error, match=words):
-        vk.find_structure(osc, **given)
-
-
-BAD = {
-    "region": (StructureError, [((1, -1), (0, 1)), ((0, 0), (0, 1)), ((0, math.nan), (0, 1)), 3, ((0, 1),)]),
-    "cells": (StructureError, [200, (0, 2), (2.5, 3), (10**6, 10**6)]),
-    "starts": (StructureError, [None, (0, 0)]),
-    "settling": (StructureError, [0, -1.0, "a"]),
-    "budget": (StructureError, [0, -1, 1.5, True, 10**30]),
-    "edge_budget": (StructureError, [0, 1.5, "a", True]),
-    "time_limit": (StructureError, [0, -1.0, math.nan, "1", True]),
-    "rng": (ParameterError, [-1, "x", 1.5]),
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "error", "value"), [(name, error, value) for name, (error, values) in BAD.items() for value in values]
-)
-def test_bad_arguments(name, error, value):
-    with pytest.raises(error, match=name):
-        vk.find_structure(vk.load_scene("hertz-0.570"), **{name: value})
 
 
 def van_der_pol():
@@ -342,12 +302,19 @@ def test_the_shortest_contacts_are_counted(stiffness):
     assert speed == pytest.approx(speed_at_a_rigid_stop(), rel=3 * contact / np.pi)
 
 
+FEW = {"cells": (40, 40), "starts": (12, 12), "manifolds": False}
+
+
+@pytest.fixture(scope="module")
+def in_metres():
+    return vk.find_structure(vk.load_scene("hertz-0.570"), **FEW)
+
+
 @pytest.mark.parametrize(("length", "rate"), [(1e-6, 1e3), (1e-3, 1.0), (1e3, 1e-2)])
-def test_units_change_nothing(paper, length, rate):
+def test_units_change_nothing(in_metres, length, rate):
     """The same scene in other units: lengths × L, rates × W, Hertz's stiffness × W²/√L."""
-    osc, _ = paper
     unit = {"": 1.0, "m": length, "s^-1": rate, "m s^-2": length * rate**2, "m^(-1/2) s^-2": rate**2 / length**0.5}
-    scaled = osc.replace(
+    scaled = in_metres.oscillator.replace(
         {
             "natural_frequency": rate,
             **{f"barriers.{n}.position": sign * 0.5 * unit["m"] for n, sign in ((0, 1), (1, -1))},
@@ -357,14 +324,13 @@ def test_units_change_nothing(paper, length, rate):
             "excitations.1.force": 0.2 * unit["m s^-2"],
         }
     )
-    structure = vk.find_structure(scaled, cells=(40, 40), starts=(12, 12), manifolds=False)
-    same = vk.find_structure(osc, cells=(40, 40), starts=(12, 12), manifolds=False)
+    structure = vk.find_structure(scaled, **FEW)
     scale = np.array([length, length * rate])
-    for ours, theirs in zip(structure.attractors, same.attractors, strict=True):
+    for ours, theirs in zip(structure.attractors, in_metres.attractors, strict=True):
         np.testing.assert_allclose(ours.points / scale, theirs.points, atol=1e-9)
         assert ours.hits == theirs.hits
         assert ours.basin_fraction == pytest.approx(theirs.basin_fraction, abs=0.01)
-    np.testing.assert_allclose(structure.saddles[0].points / scale, same.saddles[0].points, atol=1e-9)
+    np.testing.assert_allclose(structure.saddles[0].points / scale, in_metres.saddles[0].points, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -10,10 +10,10 @@ import pytest
 
 import vibrokit as vk
 from tests.scenes import scene
-from vibrokit.errors import StructureError
+from tests.structure.stable import saddle
 from vibrokit.kernels.ensemble import Stop, run_ensemble
-from vibrokit.results.saddle import ManifoldEnd, Saddle
-from vibrokit.structure.curves import Domain, Limits, grow
+from vibrokit.results.saddle import ManifoldEnd
+from vibrokit.structure.curves import Domain, Growth, Limits
 from vibrokit.structure.manifolds import grow_manifolds
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -21,11 +21,6 @@ from vibrokit.symbolic.flow_kind import Flow
 DOUBLE_WELL = vk.load_scene("double-well")
 SQUARE = ((-1.0, 1.0), (-1.0, 1.0))
 WIDE = ((-3.0, 3.0), (-3.0, 3.0))
-
-
-def saddle(*points, kind="saddle", period=1, duration=0.0):
-    nothing, places = np.empty(0, dtype=complex), np.array(points, dtype=float)
-    return Saddle(kind, period, duration, places, places[:1], nothing, nothing, (0, 1), 0.0, 0.0)
 
 
 def distances(points, curve):
@@ -107,7 +102,7 @@ def test_a_map_with_a_curve_in_closed_form(growth, turn):
 
     domain = Domain(np.zeros(2), np.array([1e-6, 0.0]), growth, np.zeros(2))
     limits = Limits(np.array([-1.0, -1.0]), np.array([2.0, 2.0]), 0.01, 0.2, 2.5)
-    curve, end = grow(domain, images, limits)
+    curve, end = Growth(domain, images, limits).run()
     factor = 1.0 / (growth**3 - turn)
     assert abs(curve[:-1, 1] - factor * curve[:-1, 0] ** 3).max() < 1e-12
     assert np.linalg.norm(np.diff(curve, axis=0), axis=1).sum() == pytest.approx(2.5, rel=1e-12)
@@ -263,20 +258,3 @@ def test_a_direction_that_all_but_vanishes_in_a_period_is_not_followed():
     branches = list(grow_manifolds(osc, 0, saddle([0.0, 0.0]), region=((-1.6, 1.6), (-1.0, 1.0))))
     assert all(len(branch.curve) == 1 and branch.end is ManifoldEnd.TOO_EXTREME for branch in branches[:2])
     assert all(branch.arc_length > 0.5 and branch.end is ManifoldEnd.AT_REST for branch in branches[2:])
-
-
-@pytest.mark.parametrize(
-    ("given", "settings", "message"),
-    [
-        (saddle([1.0, 0.0]), {}, r"multipliers of the orbit are .*, but only a saddle has manifolds"),
-        (saddle([0.0, 0.0, 0.0]), {}, r"this scene has 3 states\.$"),
-        (saddle([0.0, 0.0], kind="chaotic", period=0), {}, r"chaotic set without an orbit\.$"),
-        (saddle([0.0, 0.0], duration=3.0), {}, r"this is a limit cycle\.$"),
-        (saddle([0.0, 0.0]), {"spacing": 0.0}, r"spacing must be a number above 0, at most 1\.0, got 0\.0\.$"),
-        (saddle([0.0, 0.0]), {"bend": 2.0}, r"bend must be a number above 0, at most 1\.5, got 2\.0\.$"),
-        (saddle([0.0, 0.0]), {"arc_length": math.nan}, r"arc_length must be any number above 0, got nan\.$"),
-    ],
-)
-def test_what_is_refused(given, settings, message):
-    with pytest.raises(StructureError, match=message):
-        list(grow_manifolds(DOUBLE_WELL, 0, given, region=SQUARE, **settings))

@@ -8,7 +8,6 @@ import pytest
 
 import vibrokit as vk
 from tests.scenes import scene
-from vibrokit.errors import StructureError
 from vibrokit.structure.orbits import (
     Orbit,
     least_period,
@@ -76,8 +75,3 @@ def test_several_nodes_are_the_orbit_of_one(pieces):
     assert least_period(DUFFING, twice, ORDER8).period == 1
     later = nodes_from(1, twice.nodes, visited(DUFFING, twice, ORDER8))
     np.testing.assert_allclose(later, several.nodes[np.arange(2 * pieces) % pieces], atol=1e-9)
-
-
-def test_nodes_far_from_any_orbit_are_refused():
-    with pytest.raises(StructureError, match="no orbit of period 1"):
-        refine_orbit(DUFFING, np.array([[30.0, 0.0], [-30.0, 50.0]]), 1, ORDER8)

@@ -164,7 +164,7 @@ def test_the_duffing_oscillator_has_one_boundary_saddle():
 def test_a_weakly_damped_boundary_takes_long_to_reach_its_saddle():
     # An island of period 3 beside the small oscillation: its boundary closes in by exp(−0.02 · 2π/3.3) in a period.
     osc = scene(spring=vk.CubicSpring(linear=1.0, cubic=0.2), excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),))
-    structure = vk.find_structure(osc, manifolds=False)
+    structure = vk.find_structure(osc, cells=(100, 100), starts=(12, 12), manifolds=False)
     assert [attractor.period for attractor in structure.attractors] == [1, 1, 3]
     assert [(saddle.kind, saddle.period, set(saddle.leads_to)) for saddle in structure.saddles] == [
         ("saddle", 1, {0, 1, 2}), ("saddle", 3, {0, 2}),

@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
-from vibrokit.errors import StructureError
 
 
 def separatrix(damping=0.05):
@@ -60,10 +59,3 @@ def test_a_fatal_kick_is_fatal_and_a_smaller_one_is_not(paper):
         fates = [int(np.argmin(np.linalg.norm(points - end, axis=1))) for end in ends]
         assert fates == [stability.label, stability.label, shock.target]
         assert stability.velocity_kick.size >= shock.size - shock.error
-
-
-@pytest.mark.parametrize("bad", [{"phases": 0}, {"phases": 1.5}, {"directions": 2}, {"directions": True}], ids=str)
-def test_bad_counts(paper, bad):
-    osc, structure = paper
-    with pytest.raises(StructureError, match=next(iter(bad))):
-        vk.shape_stability(osc, structure, **bad)

@@ -6,7 +6,6 @@ import pytest
 import vibrokit as vk
 from tests.scenes import scene
 from tests.structure.stable import stable_orbits
-from vibrokit.errors import StructureError
 from vibrokit.kernels.choice import ensemble_stepper
 from vibrokit.results.region import Region
 from vibrokit.structure.basins.classifier import BasinClassifier
@@ -99,21 +98,3 @@ def test_a_repeller():
     assert orbit.kind == "repeller"
     np.testing.assert_allclose(orbit.points, [[0, 0]], atol=1e-12)
     np.testing.assert_allclose(sorted(orbit.exponents, key=np.imag), [0.5 - 0.75**0.5 * 1j, 0.5 + 0.75**0.5 * 1j])
-
-
-BAD = {
-    "period must be": [{"period": period} for period in (0, -1, 1.0, True, "1", None, 10**9)],
-    "starts must be": [{"starts": starts} for starts in (3, (0, 1), (1.0, 2), (10**5, 10**5), None, (1, 2, 3))],
-    "region": [{"region": ((1, -1), (0, 1))}],
-}
-
-
-@pytest.mark.parametrize(("words", "given"), [(words, given) for words, many in BAD.items() for given in many])
-def test_bad_arguments(words, given):
-    with pytest.raises(StructureError, match=words):
-        unstable_orbits(vk.load_scene("duffing"), **({"period": 1} | given))
-
-
-def test_only_equilibria_without_forcing():
-    with pytest.raises(StructureError, match="equilibria"):
-        unstable_orbits(vk.load_scene("double-well"), 2)

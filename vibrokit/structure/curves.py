@@ -131,66 +131,65 @@ class Domain:
         return float(8.0 * np.finfo(float).eps * np.abs(self.point).max() / step) + 1e-12
 
 
-@np.errstate(invalid="ignore", over="ignore")  # motion that has left the region may be anywhere
-def grow(domain: Domain, images: Images, limits: Limits) -> tuple[Array, ManifoldEnd]:
-    """Join the images of a domain to a curve (count, 2) until it is long enough, leaves the region, or converges."""
-    fractions = np.linspace(0.0, 1.0, 5)
-    states = domain(fractions)
-    curve = [domain.point[None], states]
-    if not limits.inside(np.concatenate(curve)).all():
-        return domain.point[None], ManifoldEnd.SADDLE_OUTSIDE
-    vertices, remaining = len(states), limits.arc_length - _length(np.concatenate(curve))
-    if remaining <= 0.0:
-        return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_VERTICES)
-    extent, left = 0.0, limits.applications
-    for count in range(1, 5001):
-        before, known = curve[-1][-2], (fractions, images(states, 1))
-        fractions, states, left = _image(domain, images, count, known, before, remaining, limits, left - len(states))
-        if left < 0:
-            return np.concatenate(curve), ManifoldEnd.MOST_SECTIONS
+class Growth:
+    """A curve that grows by the images of a domain."""
+
+    def __init__(self, domain: Domain, images: Images, limits: Limits) -> None:
+        self.domain, self.images, self.limits = domain, images, limits
+        self.fractions = np.linspace(0.0, 1.0, 5)  # in the domain, of the vertices of the last image
+        self.states = domain(self.fractions)  # these vertices
+        self.curve = [domain.point[None], self.states]  # the pieces so far
+        self.left = limits.applications  # so often the map may still be applied to a state
+
+    @np.errstate(invalid="ignore", over="ignore")  # motion that has left the region may be anywhere
+    def run(self) -> tuple[Array, ManifoldEnd]:
+        """Join images until the curve (count, 2) is long enough, leaves the region, or converges."""
+        limits, curve = self.limits, self.curve
+        if not limits.inside(np.concatenate(curve)).all():
+            return self.domain.point[None], ManifoldEnd.SADDLE_OUTSIDE
+        vertices, remaining = len(self.states), limits.arc_length - _length(np.concatenate(curve))
+        if remaining <= 0.0:
+            return limits.cut(np.concatenate(curve), limits.arc_length, _MOST_VERTICES)
+        extent = 0.0
+        for count in range(1, 5001):
+            self._map(count, remaining)
+            if self.left < 0:
+                return np.concatenate(curve), ManifoldEnd.MOST_SECTIONS
+            states, last = self.states, curve[-1][-1]
+            joined = np.concatenate([last[None], states[limits.same(states[0], last) :]])
+            room, whole = max(2, _MOST_VERTICES - vertices), self.fractions[-1] == 1.0 and limits.inside(states).all()
+            if not whole or _length(joined) >= remaining or len(joined) > room:
+                piece, end = limits.cut(joined, remaining, room)
+                return np.concatenate([*curve, piece[1:]]), end
+            curve.append(joined[1:])
+            vertices, remaining = vertices + len(joined) - 1, remaining - _length(joined)
+            before, extent = extent, float(limits.shape(joined)[0].sum())
+            if extent < min(before, 1e-5):  # widths of the region: it converges to a point
+                return np.concatenate(curve), ManifoldEnd.AT_REST
+        return np.concatenate(curve), ManifoldEnd.TOO_SLOW
+
+    def _map(self, count: int, remaining: float) -> None:
+        """Go on to the image of a count, with as many vertices as make it fine enough, as far as it is needed.
+
+        Every new vertex is an image of a point of the domain.
+        """
+        limits, before, fractions = self.limits, self.curve[-1][-2:-1], self.fractions
+        states = self.images(self.states, 1)
+        self.left -= len(states)
+        while True:
+            needed = limits.needed(states, 1.1 * remaining)
+            fractions, states = fractions[:needed], states[:needed]
+            coarse = limits.coarse(np.concatenate([before, states]))[1:]
+            coarse &= np.diff(fractions) > self.domain.resolution
+            self.left -= count * int(coarse.sum())
+            if not coarse.any() or len(states) > _MOST_VERTICES or self.left < 0:
+                break
+            middle = 0.5 * (fractions[:-1] + fractions[1:])[coarse]
+            places = 1 + np.flatnonzero(coarse)
+            fractions = np.insert(fractions, places, middle)
+            states = np.insert(states, places, self.images(self.domain(middle), count), axis=0)
         kept = limits.thinned(states)
-        fractions, states = fractions[kept], states[kept]
-        joined = np.concatenate([curve[-1][-1:], states[limits.same(states[0], curve[-1][-1]) :]])
-        room = max(2, _MOST_VERTICES - vertices)
-        if fractions[-1] < 1.0 or not limits.inside(states).all() or _length(joined) >= remaining or len(joined) > room:
-            piece, end = limits.cut(joined, remaining, room)
-            return np.concatenate([*curve, piece[1:]]), end
-        curve.append(joined[1:])
-        vertices, remaining = vertices + len(joined) - 1, remaining - _length(joined)
-        last, extent = extent, float(limits.shape(joined)[0].sum())
-        if extent < min(last, 1e-5):  # widths of the region: it converges to a point
-            return np.concatenate(curve), ManifoldEnd.AT_REST
-    return np.concatenate(curve), ManifoldEnd.TOO_SLOW
-
-
-def _image(
-    domain: Domain,
-    images: Images,
-    count: int,
-    known: tuple[Array, Array],
-    before: Array,
-    remaining: float,
-    limits: Limits,
-    left: float,
-) -> tuple[Array, Array, float]:
-    """Insert vertices into an image of the domain until it is fine enough, as far as it is needed.
-
-    Every new vertex is an image of a point of the domain; `before` is the point of the curve before the image begins.
-    `left` is the number of times that the map may still be applied to a state; what remains of it is returned too,
-    below 0 if it was too small.
-    """
-    fractions, states = known
-    while True:
-        needed = limits.needed(states, 1.1 * remaining)
-        fractions, states = fractions[:needed], states[:needed]
-        coarse = limits.coarse(np.concatenate([before[None], states]))[1:] & (np.diff(fractions) > domain.resolution)
-        left -= count * int(coarse.sum())
-        if not coarse.any() or len(states) > _MOST_VERTICES or left < 0:
-            return fractions, states, left
-        middle = 0.5 * (fractions[:-1] + fractions[1:])[coarse]
-        places = 1 + np.flatnonzero(coarse)
-        fractions = np.insert(fractions, places, middle)
-        states = np.insert(states, places, images(domain(middle), count), axis=0)
+        self.fractions, self.states = fractions[kept], states[kept]
 
 
 def _length(states: Array) -> float:

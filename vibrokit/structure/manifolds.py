@@ -12,6 +12,8 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import dataclasses
+import functools
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -31,7 +33,7 @@ from vibrokit.progress import advance
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Manifold, ManifoldEnd, Saddle
 from vibrokit.structure.autonomous import refine_equilibrium
-from vibrokit.structure.curves import Domain, Limits, grow
+from vibrokit.structure.curves import Domain, Growth, Limits
 from vibrokit.structure.newton import Evaluation, newton
 from vibrokit.structure.orbits import refine_orbit
 from vibrokit.symbolic.flow_kind import Flow
@@ -107,16 +109,11 @@ def grow_manifolds(
         low=frame.bounds[:, 0], width=np.diff(frame.bounds)[:, 0], spacing=spacing, bend=bend,
         arc_length=arc_length or default_arc_length(frame),
     )  # fmt: skip
-    tasks = [
-        (osc, saddle_index, saddle, point, backwards, side, limits, most_sections, stepper)
-        for point in range(len(saddle.points))
-        for backwards in stable
-        for side in (-1, 1)
-    ]
+    branches = _Branches(osc, saddle_index, saddle, limits, most_sections, stepper)
+    tasks = list(itertools.product(range(len(saddle.points)), stable, (-1, 1)))
     for backwards in stable:  # not in several threads at once
-        flow = Flow.STATE_REVERSED if backwards else Flow.STATE
-        compiled_kernel(osc, flow, stepper or _default_stepper(osc, flow))
-    with contextlib.closing(carry(_branch, tasks, executor)) as grown:
+        compiled_kernel(osc, *branches.flow_and_stepper(backwards))
+    with contextlib.closing(carry(branches.grow, tasks, executor)) as grown:
         for branch in grown:
             yield branch
             advance(1, BRANCHES)
@@ -138,40 +135,43 @@ def _check(osc: Oscillator, saddle: Saddle, spacing: float, bend: float, arc_len
             raise StructureError(f"{name} must be {allowed}, got {shown(value)}.")
 
 
-def _branch(
-    osc: Oscillator,
-    saddle_index: int,
-    saddle: Saddle,
-    place: int,
-    backwards: bool,
-    side: int,
-    limits: Limits,
-    most_sections: float,
-    stepper: Stepper | None,
-) -> Manifold:
-    """Grow one branch; a unit of work that an executor may carry."""
-    here = _linearised(osc, saddle, place)
-    multiplier, direction = _direction(here, backwards, limits)
-    if not 1e-8 <= abs(multiplier) <= 1e8:  # rounding leaves the smaller multiplier no digits
-        return Manifold(saddle_index, place, backwards, side, here.point[None], ManifoldEnd.TOO_EXTREME)
-    point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
-    flow = Flow.STATE_REVERSED if backwards else Flow.STATE
-    once = FlowMap(osc, stepper or _default_stepper(osc, flow), flow, saddle.period, osc.section_interval)
-    if osc.autonomous:
-        once = dataclasses.replace(once, periods=1, interval=min(once.interval, math.log(8) / rate))
-    else:
-        once, point = _with_fixed_point(once, here, limits, 2 if stepper is None else 0)
-    interval, periods = once.interval, once.periods
-    repeats = math.ceil(math.log(2) / (rate * interval * periods))
-    repeats += repeats % 2 if multiplier < 0 else 0
-    images = dataclasses.replace(once, periods=periods * repeats)
-    limits = dataclasses.replace(limits, applications=most_sections / images.periods)
-    domain = _domain(images, point, side * direction, math.exp(rate * interval * periods * repeats), limits)
-    return Manifold(saddle_index, place, backwards, side, *grow(domain, images, limits))
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Branches:
+    """The branches of a saddle; each is a unit of work that an executor may carry."""
 
+    osc: Oscillator
+    saddle_index: int
+    saddle: Saddle
+    limits: Limits
+    most_sections: float
+    stepper: Stepper | None
 
-def _default_stepper(osc: Oscillator, flow: Flow) -> Stepper:
-    return LOCATED if osc.barriers else ensemble_stepper(osc, flow).refined().refined()
+    def flow_and_stepper(self, backwards: bool) -> tuple[Flow, Stepper]:
+        flow = Flow.STATE_REVERSED if backwards else Flow.STATE
+        default = LOCATED if self.osc.barriers else ensemble_stepper(self.osc, flow).refined().refined()
+        return flow, self.stepper or default
+
+    def grow(self, place: int, backwards: bool, side: int) -> Manifold:
+        """Grow one branch from a point of the saddle."""
+        osc, here, limits = self.osc, _linearised(self.osc, self.saddle, place), self.limits
+        multiplier, direction = _direction(here, backwards, limits)
+        named = functools.partial(Manifold, self.saddle_index, place, backwards, side)
+        if not 1e-8 <= abs(multiplier) <= 1e8:  # rounding leaves the smaller multiplier no digits
+            return named(here.point[None], ManifoldEnd.TOO_EXTREME)
+        point, rate = here.point, abs(math.log(abs(multiplier))) / here.duration
+        flow, stepper = self.flow_and_stepper(backwards)
+        once = FlowMap(osc, stepper, flow, self.saddle.period, osc.section_interval)
+        if osc.autonomous:
+            once = dataclasses.replace(once, periods=1, interval=min(once.interval, math.log(8) / rate))
+        else:
+            once, point = _with_fixed_point(once, here, limits, 2 if self.stepper is None else 0)
+        duration = once.interval * once.periods
+        repeats = math.ceil(math.log(2) / (rate * duration))
+        repeats += repeats % 2 if multiplier < 0 else 0
+        images = dataclasses.replace(once, periods=once.periods * repeats)
+        limits = dataclasses.replace(limits, applications=self.most_sections / images.periods)
+        domain = _domain(images, point, side * direction, math.exp(rate * duration * repeats), limits)
+        return named(*Growth(domain, images, limits).run())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
