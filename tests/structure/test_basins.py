@@ -11,8 +11,8 @@ from scipy.stats import beta
 
 import vibrokit as vk
 from tests.scenes import scene
+from tests.structure.stable import attractor
 from vibrokit.progress import working
-from vibrokit.results.attractor import Attractor
 from vibrokit.results.basins import ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
 from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
@@ -22,17 +22,6 @@ from vibrokit.structure.basins.stop_cells import agreeing
 from vibrokit.structure.orbits import refine_orbit
 
 PAPER_STATES = ((0.466551, 0.002566), (0.023582, -0.049071))
-
-
-def attractor(points, kind="periodic", orbit=None):
-    """A record with what a classifier reads."""
-    points = np.atleast_2d(points)
-    none = np.empty(0, dtype=complex)
-    return Attractor(
-        label=0, kind=kind, period=len(points), duration=math.nan, points=points,
-        orbit=np.empty((0, 2)) if orbit is None else orbit, multipliers=none, exponents=none, exponent_error=0.0,
-        hits={}, peak_depth={}, peak_force={}, basin_fraction=0.0, basin_fraction_error=0.0, residual=0.0, error=0.0,
-    )  # fmt: skip
 
 
 def classifier(osc, points, bounds, **changes):

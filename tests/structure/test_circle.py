@@ -8,9 +8,12 @@ from scipy.integrate import solve_ivp
 
 import vibrokit as vk
 from tests.scenes import scene
+from tests.structure.stable import attractor
 from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
+from vibrokit.results.region import Region
 from vibrokit.structure.along_x import turn_of
+from vibrokit.structure.basins.landings import Landings, without_copies
 
 
 def pendulum(*excitations, damping=0.1, force="sin(x)", **constants):
@@ -39,6 +42,15 @@ def test_the_turn_of_a_force_is_recognised(force, constants, turn):
 def test_between_stops_motion_does_not_turn_over():
     osc = pendulum()
     assert turn_of(osc.replace(barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"),))) == 0.0
+
+
+def test_states_half_a_turn_to_either_side_are_copies():
+    """Moved to the turn around x = 0, they lie at its two ends, up to rounding."""
+    osc, region = pendulum(force="-sin(x)"), Region((-4.0, 4.0), (-1.0, 1.0))
+    rests = [attractor((place, 0.0), "equilibrium") for place in (math.pi - 1e-9, 1e-9 - math.pi)]
+    assert len(without_copies(osc, rests)) == 1
+    landings = Landings(osc, rests, region, circle=True)
+    assert landings.labels(np.array([0, 1]), np.array([0, 0])).tolist() == [0, 0]
 
 
 @pytest.fixture(scope="module")
