@@ -1,6 +1,6 @@
 """Microseconds per trajectory-period of the paper scene's Hamiltonian flow, contestants side by side.
 
-    python tests/benchmarks/hamiltonian_ensemble.py [--rounds 12] [--trajectories 8192] [--periods 20] [--threads 2]
+    python -m tests.benchmarks.hamiltonian_ensemble.py [--rounds 12] [--trajectories 8192] [--periods 20] [--threads 2]
 
 The scene is omega = 0.570 with two Hertz stops; five equations (x, v, two momenta, action), classical Runge-Kutta
 with 256 steps a period. Every round runs all contestants one after another, so that ratios compare neighbours in
@@ -11,37 +11,37 @@ grown by then, for many of these trajectories are chaotic. To enter another cont
 import argparse
 import concurrent.futures as futures
 import math
-import sys
-import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numba
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-import vibrokit
+import vibrokit as vk
+from tests.benchmarks.by_hand import (
+    AMPLITUDE,
+    CONSTANT,
+    DAMPING,
+    FLAGS,
+    FORCING,
+    FREQUENCY,
+    GAP,
+    HALF,
+    NATURAL,
+    SCENE,
+    SIXTH,
+    SQUARE,
+    STEPS,
+    STIFFNESS,
+    H,
+)
+from tests.benchmarks.races import fastest, race, report, timed
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.symbolic.flow_kind import Flow
 
-STEPS = 256
 LANES = 32
-SCENE = vibrokit.load_scene("hertz-0.570")
-NUMBERS = SCENE.parameters
-NATURAL = NUMBERS["natural_frequency"]
-DAMPING = 2 * NUMBERS["damping_ratio"] * NATURAL
-SQUARE = NATURAL**2
-GAP, STIFFNESS = NUMBERS["barriers.0.position"], NUMBERS["barriers.0.law.stiffness"]
 SLOPE = 1.5 * STIFFNESS
-AMPLITUDE, FREQUENCY = NUMBERS["excitations.0.amplitude"], NUMBERS["excitations.0.frequency"]
-CONSTANT = NUMBERS["excitations.1.force"]
-H = 2 * math.pi / FREQUENCY / STEPS
-HALF, SIXTH = 0.5 * H, H / 6
-FORCING = AMPLITUDE * np.cos(FREQUENCY * HALF * np.arange(2 * STEPS + 1)) + CONSTANT
-FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
 
 Array = NDArray[np.float64]
 Contestant = Callable[[Array, int], Array]
@@ -216,7 +216,7 @@ def naive_run(starts, periods):
 
 def generated(pool: futures.Executor) -> Contestant:
     def run(starts: Array, periods: int) -> Array:
-        return run_ensemble(SCENE, Flow.HAMILTONIAN, RK4(STEPS), starts, periods, executor=pool).states
+        return run_ensemble(SCENE, Flow.HAMILTONIAN, vk.RK4(STEPS), starts, periods, executor=pool).states
 
     return run
 
@@ -255,31 +255,6 @@ def check(contestants: dict[str, Contestant], starts: Array, periods: int) -> No
             assert difference <= max(allowed, 100 * nudged), f"{name} differs by {difference:.1e}."
 
 
-def race(contestants: dict[str, Contestant], rounds: int, starts: Array, periods: int) -> dict[str, Array]:
-    """Microseconds per trajectory-period, round by round."""
-    cost: dict[str, list[float]] = {name: [] for name in contestants}
-    for number in range(rounds):
-        names = list(contestants)
-        for name in names if number % 2 else reversed(names):
-            start = time.perf_counter_ns()
-            contestants[name](starts, periods)
-            cost[name].append((time.perf_counter_ns() - start) / 1e3 / (len(starts) * periods))
-    return {name: np.array(times) for name, times in cost.items()}
-
-
-def report(cost: dict[str, Array]) -> None:
-    print(f"{'':32}{'µs per trajectory-period':>27}{'over ' + REFERENCE:>29}")
-    print(f"{'':32}{'median':>11}{'quartiles':>16}{'median':>13}{'quartiles':>16}")
-    for name, times in cost.items():
-        row = f"{name:32}"
-        for values, width in ((times, 11), (times / cost[REFERENCE], 13)):
-            low, middle, high = np.percentile(values, [25, 50, 75])
-            row += f"{middle:{width}.2f}{f'{low:.2f}-{high:.2f}':>16}"
-        print(row)
-    best = min((name for name in cost if name.startswith(SCALAR)), key=lambda name: np.median(cost[name]))
-    print(f"best scalar: {best}, {np.median(cost[best] / cost[REFERENCE]):.2f} times {REFERENCE}")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description="Cost of the lane-packed Hamiltonian ensemble.")
     parser.add_argument("--rounds", type=int, default=12)
@@ -292,7 +267,16 @@ def main() -> None:
     with futures.ThreadPoolExecutor(options.threads) as pool:
         contestants = {REFERENCE: generated(pool)} | CONTESTANTS
         check(contestants, starts, options.periods)
-        report(race(contestants, options.rounds, starts, options.periods))
+        costs = {
+            name: [1e6 * seconds / (len(starts) * options.periods) for _, seconds in runs]
+            for name, runs in race(
+                {name: lambda _, run=run: timed(run, starts, options.periods) for name, run in contestants.items()},
+                options.rounds,
+            ).items()
+        }
+    report(costs, REFERENCE, "µs per trajectory-period")
+    best = fastest(costs, SCALAR)
+    print(f"best scalar: {best}, {np.median(np.divide(costs[best], costs[REFERENCE])):.2f} times {REFERENCE}")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Seconds for the published ring on hertz-0.570: vibrokit's kernel beside the best scalar loop.
 
-    python tests/benchmarks/ring_speed.py [--rounds 20] [--points 100000] [--threads 2] [--source 0 1]
+    python -m tests.benchmarks.ring_speed.py [--rounds 20] [--points 100000] [--threads 2] [--source 0 1]
 
 Starts lie on a circle of radius 1e-6 round an attractor, with the momentum of the linearised quasi-potential, and are
 carried by Hamilton's equations, classical Runge-Kutta with 256 steps a period, until they are in a cell of another
@@ -11,28 +11,22 @@ formula is written down.
 First all must agree, on a share of the ring: in how and when each path ended, and in its action, as far as rounding
 lets them. Then the scalar loops race each other on that share, and the fastest goes on. Then the whole ring is carried,
 in rounds: each takes another share of the points, by all contestants one after another, so that ratios compare
-neighbours in time whatever else the machine does. The processor's time, of all threads, is told besides the clock's.
+neighbours in time whatever else the machine does. What counts is the processor's time, of all threads.
 """
 
 import argparse
 import concurrent.futures as futures
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numba
 import numpy as np
 from numba import njit, prange
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-sys.path.insert(0, str(Path(__file__).parent))
-from hamiltonian_ensemble import (
-    FORCING,
-    SCENE,
-    STEPS,
+import vibrokit as vk
+from tests.benchmarks.by_hand import FORCING, SCENE, STEPS, H
+from tests.benchmarks.hamiltonian_ensemble import (
     Array,
-    H,
     both_stops,
     branching,
     folded,
@@ -40,8 +34,7 @@ from hamiltonian_ensemble import (
     naive_slopes,
     runge_kutta,
 )
-
-import vibrokit as vk
+from tests.benchmarks.races import fastest, race, report
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.shooting.shooting import default_effort
 from vibrokit.analyzers.shooting.starts import Ring
@@ -161,38 +154,16 @@ def check(contestants: dict[str, Contestant], starts: Array) -> None:
         assert np.median(apart) < 1e-6, f"{name} pays otherwise"
 
 
-def race(contestants: dict[str, Contestant], starts: Array, rounds: int) -> dict[str, Array]:
-    """Seconds of every round, by the clock and of the processor; a round takes every so many-th start."""
-    seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in contestants}
-    for number in range(rounds):
-        names, share = list(contestants), np.ascontiguousarray(starts[number::rounds])
-        for name in names if number % 2 else reversed(names):
-            begun, used = time.perf_counter(), time.process_time()
-            contestants[name](share)
-            seconds[name].append((time.perf_counter() - begun, time.process_time() - used))
-    return {name: np.array(times) for name, times in seconds.items()}
+def processor_seconds(contestants: dict[str, Contestant], starts: Array, rounds: int) -> dict[str, list[float]]:
+    """Of all threads, in each round, which takes every so many-th start."""
 
+    def run(contestant: Contestant, number: int) -> float:
+        share = np.ascontiguousarray(starts[number::rounds])
+        used = time.process_time()
+        contestant(share)
+        return time.process_time() - used
 
-def report(seconds: dict[str, Array], against: str) -> None:
-    print(
-        f"  {'':22}{'seconds':>9}{'over ' + against:>24}{'quartiles':>14}{'processor':>11}{'over':>7}{'quartiles':>14}"
-    )
-    for name, times in seconds.items():
-        row = f"  {name:22}"
-        for clock, width in ((0, 24), (1, 7)):
-            least, ratio, most = np.percentile(times[:, clock] / seconds[against][:, clock], [25, 50, 75])
-            row += (
-                f"{times[:, clock].sum():{9 if clock == 0 else 11}.2f}{ratio:{width}.2f}{f'{least:.2f}-{most:.2f}':>14}"
-            )
-        print(row, flush=True)
-
-
-def best_of(contestants: dict[str, Contestant], starts: Array, rounds: int) -> str:
-    """The fastest, by the median over the rounds."""
-    seconds = race(contestants, starts, rounds)
-    best = min(seconds, key=lambda name: float(np.median(seconds[name][:, 0])))
-    report(seconds, best)
-    return best
+    return race({name: lambda number, each=each: run(each, number) for name, each in contestants.items()}, rounds)
 
 
 def main() -> None:
@@ -221,9 +192,12 @@ def main() -> None:
             print(f"leaving attractor {source}, at most {budget} periods, RK4({STEPS}), {options.threads} threads")
             share = np.ascontiguousarray(starts[::SHARE])
             check(ours | scalars | plain, share)
-            best = best_of(scalars, share, HEATS)
+            heats = processor_seconds(scalars, share, HEATS)
+            best = fastest(heats, SCALAR)
+            report(heats, best, "processor seconds")
             print(f"  {len(starts)} points, in {options.rounds} rounds", flush=True)
-            report(race(ours | {best: scalars[best]} | plain, starts, options.rounds), OURS)
+            costs = processor_seconds(ours | {best: scalars[best]} | plain, starts, options.rounds)
+            report(costs, OURS, "processor seconds", {name: f"{sum(each):9.2f} in all" for name, each in costs.items()})
 
 
 if __name__ == "__main__":

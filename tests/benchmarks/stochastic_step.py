@@ -1,6 +1,6 @@
 """Nanoseconds per trajectory-step of the noisy paper scene, one thread, contestants side by side.
 
-    python tests/benchmarks/stochastic_step.py [--rounds 12] [--trajectories 2048] [--periods 8]
+    python -m tests.benchmarks.stochastic_step [--rounds 12] [--trajectories 2048] [--periods 8]
 
 The scene is omega = 0.570 with two Hertz stops. One step draws two normals, kicks the velocity, takes one RK4
 step of the drift and kicks again. Every round runs all contestants one after another, so that ratios compare
@@ -12,7 +12,6 @@ import argparse
 import concurrent.futures as futures
 import math
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -22,24 +21,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-import vibrokit
+import vibrokit as vk
+from tests.benchmarks.by_hand import FLAGS, FORCING, SCENE, STEPS, H, branching, folded, runge_kutta
+from tests.benchmarks.races import race, report
 from vibrokit.kernels.ensemble import run_ensemble
-from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.intrinsics import use_widest_registers
 from vibrokit.kernels.streams import normal_pair, seed_lane, streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
-SCENE = vibrokit.load_scene("hertz-0.570")
-STEPS = 256
 LANES = 32
-DAMPING, STIFFNESS, GAP = 0.02, 50.0, 0.5
-FREQUENCY, INTENSITY = 0.57, 2e-5
-H = 2 * math.pi / FREQUENCY / STEPS
-FORCING = 0.18 * np.cos(FREQUENCY * H / 2 * np.arange(2 * STEPS + 1)) + 0.2
-HALF_KICK = 0.5 * math.sqrt(INTENSITY * H)
+HALF_KICK = 0.5 * math.sqrt(SCENE.parameters["noise.intensity"] * H)
 ROOT_THIRD = 1 / math.sqrt(3)
-FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
+smooth_step, branching_step = runge_kutta(folded), runge_kutta(branching)
 
 
 class Outcome(NamedTuple):
@@ -49,12 +42,6 @@ class Outcome(NamedTuple):
 
 
 # --- lane-packed
-
-
-@njit(**FLAGS)
-def smooth_drift(x, v, forcing):
-    depth = max(abs(x) - GAP, 0.0)
-    return forcing - DAMPING * v - x - math.copysign(STIFFNESS * depth * math.sqrt(depth), x)
 
 
 @njit(**FLAGS)
@@ -68,17 +55,9 @@ def packed_normals(streams, u, w):
 def packed_step(x, v, u, w, f0, f1, f2):
     use_widest_registers()
     for i in range(LANES):
-        q = x[i]
-        p = v[i] + HALF_KICK * (u[i] + ROOT_THIRD * w[i])
-        a1 = smooth_drift(q, p, f0)
-        p2 = p + 0.5 * H * a1
-        a2 = smooth_drift(q + 0.5 * H * p, p2, f1)
-        p3 = p + 0.5 * H * a2
-        a3 = smooth_drift(q + 0.5 * H * p2, p3, f1)
-        p4 = p + H * a3
-        a4 = smooth_drift(q + H * p3, p4, f2)
-        x[i] = q + H / 6 * (p + 2 * (p2 + p3) + p4)
-        v[i] = p + H / 6 * (a1 + 2 * (a2 + a3) + a4) + HALF_KICK * (u[i] - ROOT_THIRD * w[i])
+        kicked = v[i] + HALF_KICK * (u[i] + ROOT_THIRD * w[i])
+        x[i], after = smooth_step(x[i], kicked, f0, f1, f2)
+        v[i] = after + HALF_KICK * (u[i] - ROOT_THIRD * w[i])
 
 
 @njit(**FLAGS)
@@ -101,27 +80,9 @@ def packed_ensemble(final, periods, seed, forcing):
 
 
 @njit(**FLAGS)
-def branching_drift(x, v, forcing):
-    depth = abs(x) - GAP
-    free_flight = forcing - DAMPING * v - x
-    if depth <= 0.0:  # a predicted branch costs less than waiting for a square root
-        return free_flight
-    return free_flight - math.copysign(STIFFNESS * depth * math.sqrt(depth), x)
-
-
-@njit(**FLAGS)
 def scalar_step(q, v, u, w, f0, f1, f2, half_kick):
-    p = v + half_kick * (u + ROOT_THIRD * w)
-    a1 = branching_drift(q, p, f0)
-    p2 = p + 0.5 * H * a1
-    a2 = branching_drift(q + 0.5 * H * p, p2, f1)
-    p3 = p + 0.5 * H * a2
-    a3 = branching_drift(q + 0.5 * H * p2, p3, f1)
-    p4 = p + H * a3
-    a4 = branching_drift(q + H * p3, p4, f2)
-    position = q + H / 6 * (p + 2 * (p2 + p3) + p4)
-    velocity = p + H / 6 * (a1 + 2 * (a2 + a3) + a4) + half_kick * (u - ROOT_THIRD * w)
-    return position, velocity
+    position, velocity = branching_step(q, v + half_kick * (u + ROOT_THIRD * w), f0, f1, f2)
+    return position, velocity + half_kick * (u - ROOT_THIRD * w)
 
 
 @njit(**FLAGS)
@@ -199,7 +160,7 @@ def generated(trajectories: int, periods: int, seed: int) -> Outcome:
     starts = np.zeros((trajectories, 2))
     start = time.perf_counter_ns()
     streams = streams_of(seed, np.arange(trajectories))
-    ended = run_ensemble(SCENE, Flow.NOISY, RK4(STEPS), starts, periods, streams=streams, executor=Here())
+    ended = run_ensemble(SCENE, Flow.NOISY, vk.RK4(STEPS), starts, periods, streams=streams, executor=Here())
     elapsed = time.perf_counter_ns() - start
     final = ended.states[:, 0]
     return Outcome(elapsed / (trajectories * periods * STEPS), float(final.mean()), float(final.std()))
@@ -214,31 +175,6 @@ CONTESTANTS: dict[str, Callable[[int, int, int], Outcome]] = {
 }
 
 
-def race(contestants, rounds: int, trajectories: int, periods: int) -> dict[str, list[Outcome]]:
-    outcomes = {name: [] for name in contestants}
-    for contestant in contestants.values():
-        contestant(LANES, 1, 0)  # compiles
-    for number in range(rounds):
-        names = list(contestants)
-        for name in names if number % 2 else reversed(names):
-            outcomes[name].append(contestants[name](trajectories, periods, number + 1))
-    return outcomes
-
-
-def report(outcomes: dict[str, list[Outcome]]) -> None:
-    print(f"{'':26}{'ns per step':>21}{'over ' + REFERENCE:>27}{'final x':>19}")
-    print(f"{'':26}{'median':>9}{'quartiles':>12}{'median':>15}{'quartiles':>12}{'mean':>11}{'spread':>8}")
-    reference = np.array([outcome.nanoseconds for outcome in outcomes[REFERENCE]])
-    for name, runs in outcomes.items():
-        cost = np.array([outcome.nanoseconds for outcome in runs])
-        row = f"{name:26}"
-        for values, width in ((cost, 9), (cost / reference, 15)):
-            low, middle, high = np.percentile(values, [25, 50, 75])
-            row += f"{middle:{width}.2f}{f'{low:.2f}-{high:.2f}':>12}"
-        mean, spread = np.mean([(outcome.mean, outcome.spread) for outcome in runs], axis=0)
-        print(row + f"{mean:11.5f}{spread:8.5f}")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description="Cost of one noisy step, one thread.")
     parser.add_argument("--rounds", type=int, default=12)
@@ -249,7 +185,20 @@ def main() -> None:
     trajectories = -(-options.trajectories // LANES) * LANES
     with tempfile.TemporaryDirectory() as folder:
         contestants = CONTESTANTS | {"C, xoshiro and ziggurat": c_program(folder, options.cc)}
-        report(race(contestants, options.rounds, trajectories, options.periods))
+        for contestant in contestants.values():
+            contestant(LANES, 1, 0)  # compiles
+        runs = race(
+            {
+                name: lambda number, each=each: each(trajectories, options.periods, number + 1)
+                for name, each in contestants.items()
+            },
+            options.rounds,
+        )
+    final = {name: np.mean([(one.mean, one.spread) for one in each], axis=0) for name, each in runs.items()}
+    report(
+        {name: [one.nanoseconds for one in each] for name, each in runs.items()}, REFERENCE, "ns per step",
+        {name: f"   final x {mean:.5f}, spread {spread:.5f}" for name, (mean, spread) in final.items()},
+    )  # fmt: skip
 
 
 if __name__ == "__main__":
