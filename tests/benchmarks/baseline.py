@@ -14,12 +14,11 @@ import argparse
 import csv
 import json
 import statistics
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import vibrokit as vk
+from tests.benchmarks.apart import apart
 from tests.benchmarks.gallery import SCENES
 from tests.extremes.scenes_of_action import ActionScene, scenes
 from vibrokit.errors import VibrokitError
@@ -102,14 +101,8 @@ def rows_of(analyzer, osc, structure, limit, name="", exact=None):
 
 def alone(name, limit):
     """The rows of one scene, from a process of its own."""
-    command = [sys.executable, "-W", "ignore", "-m", "tests.benchmarks.baseline", "one", name, "--limit", str(limit)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMITS * limit + ROOM, check=False)
-    except subprocess.TimeoutExpired:
-        return [{"remarks": "did not end"}]
-    if done.returncode:
-        return [{"remarks": f"failed: {(done.stderr.strip().splitlines() or ['without a word'])[-1]}"}]
-    return json.loads(done.stdout.splitlines()[-1])
+    rows, why = apart("baseline", "one", name, "--limit", limit, seconds=LIMITS * limit + ROOM)
+    return [{"remarks": why}] if rows is None else rows
 
 
 def run(table, words, limit):

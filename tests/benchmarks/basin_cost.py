@@ -1,29 +1,23 @@
 """How the cost of basins grows: seconds, error and what failed, over grid size, stiffness, damping and clearance.
 
-    python tests/benchmarks/basin_cost.py [--cells 100] [--only grid stiffness …] [--limit 300] [--quick]
+    python -m tests.benchmarks.basin_cost [--cells 100] [--only grid stiffness …] [--limit 300] [--quick]
 
 Every row is `find_structure` on hertz-0.570 with one thing changed, without saddles and manifolds. The error is the
 share of cells whose label changes in a second run with everything tightened: the next finer stepper, a tenth of the
 settling distance, twice the budget, no sharing of answers; the shift is the largest change of a basin's fraction, which
 is small even where basins are so finely mixed that single labels mean little. Attractors are matched by their points.
-A run that takes longer than the limit is stopped as by Ctrl-C, and what it had found by then is told.
+A run that takes longer than the limit is stopped, and what it had found by then is told.
 """
 
 import argparse
-import contextlib
-import signal
-import sys
 import time
 import warnings
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
-from vibrokit.errors import VibrokitError
+from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.kernels.choice import CoarseStepsWarning
 from vibrokit.kernels.named import named_stepper
 from vibrokit.results.basins import ESCAPED, UNSETTLED
@@ -49,33 +43,11 @@ def changed(osc, name: str, value: float):
     return osc
 
 
-class TooLongError(Exception):
-    """A run was stopped at the limit, with nothing or only a part to show."""
-
-
-@contextlib.contextmanager
-def limited(seconds: int) -> Iterator[None]:
-    """Raise what Ctrl-C raises, once the time is up."""
-
-    def stop(*_) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGALRM, stop)
-    signal.alarm(seconds)
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise TooLongError(f"stopped after {seconds} s, before any attractor was known") from None
-    finally:
-        signal.alarm(0)
-
-
 def run(osc, limit: int, **options) -> vk.Structure:
     """Attractors and basins, in the time given."""
-    with limited(limit):
-        structure = vk.find_structure(osc, saddles=False, manifolds=False, **options)
+    structure = vk.find_structure(osc, saddles=False, manifolds=False, time_limit=limit, **options)
     if not structure.complete:
-        raise TooLongError(f"stopped after {limit} s: {structure.status}")
+        raise StructureError(f"stopped after {limit} s: {structure.status}")
     return structure
 
 
@@ -113,7 +85,7 @@ def row(name: str, value: float, cells: int, limit: int) -> str:
         start = time.perf_counter()
         structure = run(osc, limit, cells=(cells, cells))
         seconds = time.perf_counter() - start
-    except (VibrokitError, TooLongError) as error:
+    except (VibrokitError, KeyboardInterrupt) as error:
         return f"{head}  {type(error).__name__}: {error}"
     kinds = ", ".join(f"{attractor.kind} {attractor.period}" for attractor in structure.attractors[:4])
     kinds += f" and {len(structure.attractors) - 4} more" if len(structure.attractors) > 4 else ""
@@ -124,7 +96,7 @@ def row(name: str, value: float, cells: int, limit: int) -> str:
         labels, expected = renamed(structure, reference), reference.basins.labels
         shift = max(abs(np.mean(labels == name) - np.mean(expected == name)) for name in np.unique(expected))
         error = f"{np.mean(labels != expected):9.1e}{shift:9.1e}"
-    except (VibrokitError, TooLongError) as problem:
+    except (VibrokitError, KeyboardInterrupt) as problem:
         error, words = f"{'none':>9}{'none':>9}", f"{words}; tightened, {type(problem).__name__}: {problem}"
     shares = f"{basins.fraction(UNSETTLED):10.1e}{basins.fraction(ESCAPED):9.1e}"
     return f"{head}{seconds:9.1f}{error}{shares}  {words}"

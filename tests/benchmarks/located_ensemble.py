@@ -1,26 +1,21 @@
 """Ensembles with stops: steppers that locate contacts against RK4, at the same error.
 
-    python tests/benchmarks/located_ensemble.py [--rounds 5] [--trajectories 4096] [--periods 5] [--scene hertz-0.570]
-                                                [--errors 1e-6 1e-10]
+    python -m tests.benchmarks.located_ensemble [--rounds 5] [--trajectories 4096] [--periods 5] [--scene hertz-0.570]
+                                                   [--errors 1e-6 1e-10]
 
 Trajectories start near the last attractor of the scene, with momenta of 1e-3, and cost microseconds per trajectory and
 period, on all threads. The error is the median distance in (x, v), after all periods, from the reference: FreeFlight at
 1e-13 for Order8 and RK4, Order8 at 1e-13 for FreeFlight. With --errors, the tolerances are the loosest ones that have
-these errors. Every round runs all contestants one after another; a row has the median of the ratios to RK4(256) of the
-same round, with their smallest and largest.
+these errors.
 """
 
 import argparse
-import statistics
-import sys
-import time
 import warnings
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
+from tests.benchmarks.races import race, report, timed
 from vibrokit.kernels.ensemble import compiled_kernel, run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -70,23 +65,14 @@ class Contest:
 
     def measure(self, steppers, rounds):
         """Print a row for each stepper."""
-        seconds, errors = {}, {}
         for stepper in steppers:
             compiled_kernel(self.scene, self.flow, stepper)
-        for _ in range(rounds):
-            for stepper in steppers:
-                begun = time.perf_counter()
-                ended = self.run(stepper)
-                seconds.setdefault(stepper, []).append(time.perf_counter() - begun)
-                errors[stepper] = self.error(stepper, ended)
-        for stepper in steppers:
-            ratios = [one / base for one, base in zip(seconds[stepper], seconds[steppers[0]], strict=True)]
-            each = 1e6 * statistics.median(seconds[stepper]) / len(self.starts) / self.periods
-            print(
-                f"{self.flow.value:24} {stepper!r:28} {errors[stepper]:8.1e} {each:8.2f} µs  "
-                f"{statistics.median(ratios):6.1f} ({min(ratios):.1f} - {max(ratios):.1f})",
-                flush=True,
-            )
+        runs = race({repr(one): lambda _, one=one: timed(self.run, one) for one in steppers}, rounds)
+        each = 1e6 / len(self.starts) / self.periods
+        errors = {repr(one): f"   error {self.error(one, runs[repr(one)][-1][0]):.1e}" for one in steppers}
+        costs = {name: [each * seconds for _, seconds in times] for name, times in runs.items()}
+        print(self.flow.value)
+        report(costs, repr(steppers[0]), "µs", errors)
 
 
 def main():
@@ -100,7 +86,6 @@ def main():
     warnings.simplefilter("ignore")  # RK4 has too few steps for stiff stops
     scene = vk.load_scene(given.scene)
     point = vk.find_structure(scene, manifolds=False).attractors[-1].points[0, :2]
-    print("flow, stepper, median error, cost per trajectory and period, ratio to RK4(256) (least - most)")
     for flow in FLOWS:
         contest = Contest(scene, flow, starts_near(point, flow, given.trajectories), given.periods)
         if given.errors:

@@ -1,6 +1,6 @@
 """Scenes of other people with known right values, by default settings: the share of the values that is met.
 
-    python tests/benchmarks/public_cases.py [WORDS …] [--limit 300] [--list]
+    python -m tests.benchmarks.public_cases [WORDS …] [--limit 300] [--list]
 
 `public_cases.toml` has the scenes, their sources, the right values and the tolerances. Each case whose name has all
 the words runs in a process of its own. A row is one value: whether it is met within the tolerance beside it, the
@@ -13,8 +13,6 @@ import argparse
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 import time
 import tomllib
 from collections.abc import Callable, Mapping
@@ -24,6 +22,7 @@ from typing import Any
 import numpy as np
 
 import vibrokit as vk
+from tests.benchmarks.apart import apart
 from vibrokit.errors import VibrokitError
 from vibrokit.scene_file import scene_from_data
 
@@ -235,20 +234,11 @@ def answers(case: Case) -> list[dict[str, Any]]:
 _NOT_ASKED = {"question", "value", "absolute", "relative", "by"}
 
 
-def apart(name: str, limit: float) -> list[dict[str, Any]]:
+def answers_apart(name: str, limit: float) -> list[dict[str, Any]]:
     """The answers of a case, from a process of its own."""
-    command = [sys.executable, __file__, "--case", name, "--limit", str(limit)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=4 * limit, check=False)
-    except subprocess.TimeoutExpired:
-        return _failed(name, "did not end")
-    if done.returncode:
-        return _failed(name, (done.stderr.strip().splitlines() or ["?"])[-1])
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def _failed(name: str, why: str) -> list[dict[str, Any]]:
-    return [{"check": c, "found": math.nan, "why": why, "seconds": math.nan} for c in read_cases()[name]["checks"]]
+    rows, why = apart("public_cases", "--case", name, "--limit", limit, seconds=4 * limit)
+    checks = read_cases()[name]["checks"]
+    return rows or [{"check": check, "found": math.nan, "why": why, "seconds": math.nan} for check in checks]
 
 
 def show(name: str, rows: list[dict[str, Any]]) -> None:
@@ -287,7 +277,7 @@ def main() -> None:
         return
     right = []
     for name in names:
-        rows = apart(name, given.limit)
+        rows = answers_apart(name, given.limit)
         show(name, rows)
         right.append([met(row["check"], row["found"]) for row in rows])
     print(

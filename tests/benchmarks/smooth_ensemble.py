@@ -1,28 +1,23 @@
 """Smooth ensembles: RK8, Order8 and RK4 against heyoka's batch integrator, one thread each, at the same error.
 
-    python tests/benchmarks/smooth_ensemble.py [--rounds 5] [--trajectories 8192] [--periods 20]
+    python -m tests.benchmarks.smooth_ensemble [--rounds 5] [--trajectories 8192] [--periods 20]
 
 A forced Duffing oscillator, x″ + 0.1 x′ + x + 0.3 x³ = 0.4 cos 1.4 t, and Hamilton's equations with momenta of 1e-3.
 Each contestant has the coarsest of its settings whose median error after all periods is at most the wanted one; the
-reference is heyoka at 1e-17. Every round runs all contestants one after another; a row has the median of the ratios to
-heyoka of the same round, with their smallest and largest. heyoka (pip install heyoka) integrates batches of as many
-trajectories as its registers hold, with one integrator for all of them.
+reference is heyoka at 1e-17. heyoka (pip install heyoka) integrates batches of as many trajectories as its registers
+hold, with one integrator for all of them.
 """
 
 import argparse
 import concurrent.futures as futures
 import functools
 import math
-import statistics
-import sys
-import time
-from pathlib import Path
 
 import heyoka
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 import vibrokit as vk
+from tests.benchmarks.races import race, report, timed
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -79,10 +74,10 @@ def main():
     print(f"heyoka {heyoka.__version__}, batches of {heyoka.recommended_simd_size()}; one thread each")
     with futures.ThreadPoolExecutor(1) as one_thread:
         for flow in (Flow.STATE, Flow.HAMILTONIAN):
-            race(flow, given, one_thread)
+            contest(flow, given, one_thread)
 
 
-def race(flow, given, one_thread):
+def contest(flow, given, one_thread):
     starts = starts_of(flow, given.trajectories)
     reference = heyoka_ends(flow, 1e-17, starts, given.periods)
     ours = functools.partial(our_ends, flow, starts=starts, periods=given.periods, executor=one_thread)
@@ -111,20 +106,13 @@ def race(flow, given, one_thread):
             name: next(((setting, run, error) for setting, run, error in rows if error <= wanted), None)
             for name, rows in errors.items()
         }
-        seconds = {name: [] for name, one in chosen.items() if one is not None}
-        for _ in range(given.rounds):
-            for name in seconds:
-                began = time.perf_counter()
-                chosen[name][1]()
-                seconds[name].append((time.perf_counter() - began) / given.trajectories / given.periods)
-        for name, times in seconds.items():
-            ratios = [their / own for their, own in zip(seconds["heyoka"], times, strict=True)]
-            print(
-                f"{flow.value:12s} error {wanted:g}: {name:7s} {chosen[name][0]:16s} median {chosen[name][2]:.1e}, "
-                f"{1e6 * statistics.median(times):7.3f} µs a period, {statistics.median(ratios):5.2f} times as fast "
-                f"({min(ratios):.2f} to {max(ratios):.2f})",
-                flush=True,
-            )
+        racing = {name: one for name, one in chosen.items() if one is not None}
+        runs = race({name: lambda _, run=run: timed(run) for name, (_, run, _) in racing.items()}, given.rounds)
+        each = 1e6 / given.trajectories / given.periods
+        costs = {name: [each * seconds for _, seconds in times] for name, times in runs.items()}
+        texts = {name: f"   {setting}, error {error:.1e}" for name, (setting, _, error) in racing.items()}
+        print(f"{flow.value}, error {wanted:g}")
+        report(costs, "heyoka", "µs a period", texts)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Structure at the extremes, by default settings: what is found, or the reason, and the seconds.
 
-    python tests/benchmarks/structure_extremes.py [WORDS …] [--limit 60] [--list]
+    python -m tests.benchmarks.structure_extremes [WORDS …] [--limit 60] [--list]
 
 Each scene whose name contains all the words runs in a process of its own, with a time limit. A row has the number of
 attractors of each kind, of saddles, the share of the region that reaches no attractor, the stepper of the basins, and
@@ -11,11 +11,10 @@ import argparse
 import collections
 import json
 import math
-import subprocess
-import sys
 import time
 
 import vibrokit as vk
+from tests.benchmarks.apart import apart
 from vibrokit.errors import VibrokitError
 
 SCENES = {}
@@ -83,17 +82,6 @@ def row_of(name, limit):
     }
 
 
-def limited(name, limit):
-    command = [sys.executable, "-W", "ignore", __file__, "--scene", name, "--limit", str(limit)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=2 * limit + 60, check=False)
-    except subprocess.TimeoutExpired:
-        return {"found": "did not stop when its time was over", "seconds": math.inf}
-    if done.returncode:
-        return {"found": (done.stderr.strip().splitlines() or ["?"])[-1], "seconds": math.nan}
-    return json.loads(done.stdout.splitlines()[-1])
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
@@ -110,7 +98,8 @@ def main():
         return
     late = []
     for name in names:
-        row = limited(name, given.limit)
+        row, why = apart("structure_extremes", "--scene", name, "--limit", given.limit, seconds=2 * given.limit + 60)
+        row = row or {"found": why, "seconds": math.nan}
         late += [name] if not row["seconds"] <= 30 else []
         more = " ".join(str(row[key]) for key in ("stepper", "findings", "stages") if row.get(key))
         print(f"{name:40s} {row['seconds']:6.1f} s  {row['found']}  {more}", flush=True)
