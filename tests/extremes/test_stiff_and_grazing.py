@@ -33,9 +33,7 @@ def check_periods(stepper, law, stiffness, excess):
     place = 0.3
     speed = place * (1 + excess)
     make, power = {"hertz": (vk.Hertz, 1.5), "linear": (vk.Linear, 1.0)}[law]
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.0, barriers=(vk.Barrier(make(stiffness), place, "right"),)
-    )
+    osc = scene(vk.Barrier(make(stiffness), place, "right"), damping_ratio=0.0)
     period = exact_period(stiffness, power, place, speed)
     path = osc.trajectory([0.0, speed], duration=CYCLES * period, samples=1, stepper=stepper)
     allowed = max(1e-8, rounding_after(CYCLES, stiffness, power, place, speed))
@@ -46,10 +44,8 @@ def check_periods(stepper, law, stiffness, excess):
 @pytest.mark.parametrize("stiffness", [1.0, 1e6, 1e12])
 def test_zero_gap(stepper, stiffness):
     """Both stops at 0: a mass that is always in one of them."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.0,
-        barriers=(vk.Barrier(vk.Hertz(stiffness), 0.0, "right"), vk.Barrier(vk.Hertz(stiffness), 0.0, "left")),
+    osc = scene(
+        vk.Barrier(vk.Hertz(stiffness), 0.0, "right"), vk.Barrier(vk.Hertz(stiffness), 0.0, "left"), damping_ratio=0.0
     )
     half = exact_period(stiffness, 1.5, 0.0, 0.8) - np.pi  # the right half; the left one is its mirror image
     path = osc.trajectory([0.0, 0.8], duration=CYCLES * 2 * half, samples=1, stepper=stepper)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 
 
 def energy(x, v, k, b, power):
@@ -31,11 +32,7 @@ HERTZ, LINEAR = (vk.Hertz(50.0), 1.5), (vk.Linear(300.0), 1.0)
     ids=str,
 )
 def test_energy_is_kept(law, power, stepper, tolerance):
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.0,
-        barriers=(vk.Barrier(law, 0.3, "right"), vk.Barrier(law, -0.3, "left")),
-    )
+    osc = scene(vk.Barrier(law, 0.3, "right"), vk.Barrier(law, -0.3, "left"), damping_ratio=0.0)
     path = osc.trajectory([0.1, 0.8], 20, stepper=stepper, samples=64)
     values = energy(path.x, path.v, law.stiffness, 0.3, power)
     assert np.abs(values / values[0] - 1).max() < tolerance
@@ -45,7 +42,7 @@ def test_energy_is_kept(law, power, stepper, tolerance):
 @pytest.mark.slow
 @pytest.mark.parametrize("stepper", [vk.Order8(1e-12), vk.FreeFlight(1e-12), vk.RK4(4096)], ids=str)
 def test_friction_takes_what_it_should(stepper):
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, barriers=(vk.Barrier(vk.Hertz(50.0), 0.3, "right"),))
+    osc = scene(vk.Barrier(vk.Hertz(50.0), 0.3, "right"), damping_ratio=0.05)
     path = osc.trajectory([0.0, 0.8], 5, stepper=stepper, samples=4000)
     depth = np.maximum(path.x - 0.3, 0.0)
     values = 0.5 * path.v**2 + 0.5 * path.x**2 + 50.0 * depth**2.5 / 2.5

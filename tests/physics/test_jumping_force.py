@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import scene
 from vibrokit.errors import DerivationError, StepperError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.structure.linear_map import linear_map
@@ -16,10 +17,9 @@ LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
 
 def kelvin_voigt(adhesive=False, noise=None):
     law = vk.CustomLaw("k*depth + c*rate", k=200.0, c=3.0)
-    return vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.01,
-        barriers=(vk.Barrier(law, 0.5, "right", adhesive), vk.Barrier(law, -0.5, "left", adhesive)),
+    return scene(
+        vk.Barrier(law, 0.5, "right", adhesive),
+        vk.Barrier(law, -0.5, "left", adhesive),
         excitations=(vk.Harmonic(0.18, 0.57), vk.Constant(0.2)),
         noise=noise,
     )
@@ -43,11 +43,7 @@ def test_derivatives_are_those_of_the_map(stepper, adhesive):
 def test_one_adhesive_bounce_in_closed_form(stepper):
     """Inside an adhesive Kelvin–Voigt stop at 0 the motion is linear: it leaves after half a damped period."""
     k, c = 200.0, 3.0
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.0,
-        barriers=(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=k, c=c), 0.0, "right", adhesive=True),),
-    )
+    osc = scene(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=k, c=c), 0.0, "right", adhesive=True), damping_ratio=0.0)
     damped = math.sqrt(1 + k - c**2 / 4)
     inside = math.pi / damped
     speed = 0.7 * math.exp(-c / 2 * inside)
@@ -68,9 +64,7 @@ def test_fixed_steps_refuse_derivatives():
 
 @pytest.mark.parametrize("formula", ["1/depth", "-log(depth)"])
 def test_a_force_without_bound_is_refused(formula):
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.01, barriers=(vk.Barrier(vk.CustomLaw(formula), 0.0, "right"),)
-    )
+    osc = scene(vk.Barrier(vk.CustomLaw(formula), 0.0, "right"))
     with pytest.raises(DerivationError, match="unbounded at first touch"):
         osc.trajectory((0.0, 0.5), duration=1.0)
 

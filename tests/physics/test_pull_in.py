@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 import vibrokit as vk
 from tests.layers import long, slow
+from tests.scenes import scene
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.codes import Code
 
@@ -144,10 +145,9 @@ def test_a_switch_latches_before_the_pole():
 @pytest.mark.slow
 def test_a_comb_between_two_poles():
     a, damping = 0.05, 0.1
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping, spring=vk.CustomSpring("x - a/(1-x)**2 + a/(1+x)**2", a=a),
-        noise=vk.WhiteNoise(1e-3),
-    )  # fmt: skip
+    osc = scene(
+        damping_ratio=damping, spring=vk.CustomSpring("x - a/(1-x)**2 + a/(1+x)**2", a=a), noise=vk.WhiteNoise(1e-3)
+    )
     found = vk.find_structure(osc, **COARSE)
     top = brentq(lambda x: x - a / (1 - x) ** 2 + a / (1 + x) ** 2, 0.5, 0.9)
     assert sorted(saddle.points[0, 0] for saddle in found.saddles) == pytest.approx([-top, top], rel=1e-9)
@@ -166,7 +166,7 @@ def test_a_comb_between_two_poles():
     ],
 )
 def test_all_motion_settles_on_one_side_of_a_wall(formula, rest):
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(formula))
+    osc = scene(damping_ratio=0.05, spring=vk.CustomSpring(formula))
     found = vk.find_structure(osc, **COARSE)
     (attractor,) = found.attractors
     assert attractor.points[0, 0] == pytest.approx(brentq(rest, 0.5, 9.0), rel=1e-9)
@@ -177,7 +177,7 @@ def test_all_motion_settles_on_one_side_of_a_wall(formula, rest):
 
 @pytest.mark.slow
 def test_two_wells_between_the_poles_of_a_tangent():
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring("tan(x) - 1.5*x"))
+    osc = scene(damping_ratio=0.05, spring=vk.CustomSpring("tan(x) - 1.5*x"))
     found = vk.find_structure(osc, **COARSE)
     rest = brentq(lambda x: math.tan(x) - 1.5 * x, 0.5, 1.5)
     assert [a.points[0, 0] for a in found.attractors] == pytest.approx([-rest, rest], rel=1e-9)
@@ -199,9 +199,7 @@ def test_no_exit_leads_across_a_pole():
 @pytest.mark.long
 def test_rates_between_two_poles_agree():
     """By simulation and by the density, neither of which crosses a pole, and by symmetry."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring("tan(x) - 1.5*x"), noise=vk.WhiteNoise(0.014)
-    )
+    osc = scene(damping_ratio=0.1, spring=vk.CustomSpring("tan(x) - 1.5*x"), noise=vk.WhiteNoise(0.014))
     found = vk.find_structure(osc, **COARSE)
     rates = [
         rate
@@ -216,10 +214,7 @@ def test_rates_between_two_poles_agree():
 
 def shaken(formula, **values):
     """In units of the gap and 1/ω_n, with a weak force beside the rest."""
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.1, spring=vk.CustomSpring(formula, **values),
-        excitations=(vk.Harmonic(0.01, 0.8),),
-    )  # fmt: skip
+    return scene(damping_ratio=0.1, spring=vk.CustomSpring(formula, **values), excitations=(vk.Harmonic(0.01, 0.8),))
 
 
 def settled(spring):
