@@ -12,10 +12,9 @@ def scene(*stops, **more):
     return vk.Oscillator(**{"natural_frequency": 1.0, "damping_ratio": 0.01, "barriers": stops} | more)
 
 
-def double_well(stiffening=1.0, **more):
-    """x″ + 0.1 x′ − x + x³ = 0."""
-    spring = vk.CubicSpring(linear=-1.0, cubic=stiffening)
-    return scene(damping_ratio=0.05, spring=spring, **more)
+def double_well(stiffening=1.0, *, damping_ratio=0.05, **more):
+    """x″ + 2ζ x′ − x + x³ = 0."""
+    return scene(damping_ratio=damping_ratio, spring=vk.CubicSpring(linear=-1.0, cubic=stiffening), **more)
 
 
 class Coloured(vk.NoiseModel):

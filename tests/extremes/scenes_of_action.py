@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.scenes import double_well
 
 Law = Callable[[float], vk.Hertz | vk.Linear]
 LAWS: dict[str, tuple[Law, float]] = {"hertz": (vk.Hertz, 1.5), "linear": (vk.Linear, 1.0)}  # and power of the depth
@@ -161,10 +162,7 @@ def paper_scene(law: str, *, stiffness=50.0, damping=0.01, amplitude=0.18, clear
 
 
 def _well(damping, barriers=(), excitations=()) -> vk.Oscillator:
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=damping, spring=vk.CubicSpring(-1.0, 1.0),
-        barriers=barriers, excitations=excitations, noise=vk.WhiteNoise(0.01),
-    )  # fmt: skip
+    return double_well(damping_ratio=damping, barriers=barriers, excitations=excitations, noise=vk.WhiteNoise(0.01))
 
 
 def _bottom(k: float, power: float) -> float:

@@ -5,7 +5,7 @@ import pytest
 
 import vibrokit as vk
 from tests.extremes.exact import exact_period, rounding_after
-from tests.scenes import scene
+from tests.scenes import double_well, scene
 from vibrokit.structure.linear_map import gaussian_map
 
 pytestmark = pytest.mark.slow
@@ -54,10 +54,8 @@ def test_zero_gap(stepper, stiffness):
 
 def test_a_rest_that_touches_a_stop_with_a_rate_too_small_to_move():
     """At x = 1 all forces are 0, and the rounding error of a rest may be a positive velocity."""
-    spring = vk.CubicSpring(linear=-1.0, cubic=1.0)
-    osc = scene(
-        vk.Barrier(vk.Hertz(1e3), 1.0, "right"), damping_ratio=0.1, spring=spring, noise=vk.WhiteNoise(intensity=1e-2)
-    )
+    stops = (vk.Barrier(vk.Hertz(1e3), 1.0, "right"),)
+    osc = double_well(damping_ratio=0.1, barriers=stops, noise=vk.WhiteNoise(intensity=1e-2))
     rates = np.array([0.0, 1e-21, 1e-18])
     found = gaussian_map(osc, np.stack([np.ones(3), rates], axis=1), vk.Order8(1e-10))
     assert np.abs(found.images - [1.0, 0.0]).max() < 1e-15

@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import vibrokit as vk
+from tests.scenes import double_well
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 
@@ -18,10 +19,8 @@ DAMPING, FORCE, FREQUENCY = 0.15, 0.3, 1.2
 @pytest.fixture(scope="module")
 def found():
     """Two chaotic attractors of a double well, each the mirror image of the other half a period later."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=DAMPING, spring=vk.CubicSpring(-1.0, 1.0),
-        excitations=(vk.Harmonic(amplitude=FORCE, frequency=FREQUENCY),), noise=vk.WhiteNoise(1e-6),
-    )  # fmt: skip
+    forces = (vk.Harmonic(amplitude=FORCE, frequency=FREQUENCY),)
+    osc = double_well(damping_ratio=DAMPING, excitations=forces, noise=vk.WhiteNoise(1e-6))
     structure = vk.find_structure(osc, manifolds=False)
     assert [each.kind for each in structure.attractors] == ["chaotic", "chaotic"]
     return structure, vk.LeastAction(graph=None).run(osc, structure)

@@ -108,11 +108,7 @@ def test_the_first_state_in_another_basin_is_that_of_simulated_trajectories():
 def test_rates_of_a_double_well(damping):
     barrier = damping  # ΔU = 4ζ times the barrier of 1/4
     intensities = tuple(barrier / ratio for ratio in (8.0, 12.0, 16.0, 20.0, 25.0))
-    osc = scene(
-        damping_ratio=damping,
-        spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
-        noise=vk.WhiteNoise(intensity=barrier / 12),
-    )
+    osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(intensity=barrier / 12))
     structure = vk.find_structure(osc, cells=(40, 40), manifolds=False, rng=0)
     found = vk.SGCM(source=0, intensities=intensities, nodes=(120, 120)).run(osc, structure)
     for rate in found.rates:

@@ -8,7 +8,7 @@ import pytest
 import vibrokit as vk
 from tests.klein_kramers import double_well_rate
 from tests.layers import long
-from tests.scenes import scene
+from tests.scenes import double_well
 from vibrokit.analyzers.sgcm import cores
 from vibrokit.results.codes import Code
 
@@ -62,7 +62,7 @@ def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side)
 @pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), (0.5, 30)])
 def test_rates_are_exact_wherever_states_are_committed(damping, depth, monkeypatch):
     """Also nearer to the basin's edge, farther from it, and in the core only: the exact rate is in the stated error."""
-    osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))
+    osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(damping))
     structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
     intensity = damping / depth  # ΔU = 4ζ × 1/4
     exact = double_well_rate(damping, intensity)
@@ -147,7 +147,7 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
 @pytest.mark.parametrize("damping", [0.2, long(1.0)])
 def test_rates_of_states_that_do_not_last_are_those_of_simulations_all_the_same(damping):
     """Wells as deep as ΔU/D = 1 and 2, core to core: what counts as an exit decides the rate, and is no error of it."""
-    osc = scene(damping_ratio=damping, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=vk.WhiteNoise(damping))
+    osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(damping))
     structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
     given = {"source": 0, "intensities": (damping, damping / 2)}
     simulated = vk.MFET(target_error=0.01, splitting=False, **given).run(osc, structure)

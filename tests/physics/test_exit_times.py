@@ -10,7 +10,7 @@ from scipy import integrate, stats
 import vibrokit as vk
 from tests.klein_kramers import double_well_rate
 from tests.layers import long
-from tests.scenes import Coloured, scene
+from tests.scenes import Coloured, double_well, scene
 from vibrokit.analyzers.checkpoint import Checkpoint
 from vibrokit.analyzers.mfet.importance import from_distances
 from vibrokit.analyzers.mfet.measurement import rate_around
@@ -23,11 +23,7 @@ pytestmark = pytest.mark.slow
 
 
 def well(damping):
-    return scene(
-        damping_ratio=damping,
-        spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
-        noise=vk.WhiteNoise(intensity=damping / 12),
-    )
+    return double_well(damping_ratio=damping, noise=vk.WhiteNoise(intensity=damping / 12))
 
 
 def rate_at(osc, structure, ratio, **settings):

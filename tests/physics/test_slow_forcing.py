@@ -12,6 +12,7 @@ from scipy.sparse.linalg import spsolve
 
 import vibrokit as vk
 from tests.layers import long
+from tests.scenes import double_well
 from vibrokit.analyzers.paths import slow_relaxation
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.polishing.ends import pieces_of
@@ -25,10 +26,8 @@ SLOW = (0.3, 0.1, 0.05)
 
 @functools.cache
 def scene(frequency):
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=ZETA, spring=vk.CubicSpring(linear=-1.0, cubic=1.0),
-        excitations=(vk.Harmonic(amplitude=TILT, frequency=frequency),), noise=vk.WhiteNoise(intensity=1e-4),
-    )  # fmt: skip
+    forces = (vk.Harmonic(amplitude=TILT, frequency=frequency),)
+    return double_well(damping_ratio=ZETA, excitations=forces, noise=vk.WhiteNoise(intensity=1e-4))
 
 
 @functools.cache
