@@ -56,20 +56,22 @@ class ExitRoad:
         self._graph = next((source for source in sources if isinstance(source, Graph)), None)
         self._shots = next((source for source in sources if isinstance(source, Shots)), None)
         self._least = detailed_balance.least_actions(problem)
-        self._minima_sought = False  # whether paths that may attain the proven minima were proposed
         self._polishings: list[Polishing] | None = None  # one for each orbit that paths leave; None before the first
         self._cut = False  # whether a step was stopped
         self._findings: list[Finding] = []
 
     def run(self) -> Analysis:
         """Propose, polish and bound, until the end, until all exits are proven, or until the work is stopped."""
-        first = [(source.name, self._taking(source)) for source in self.sources if not source.last_resort]
-        last = [(source.name, self._taking(source)) for source in self.sources if source.last_resort]
         with Stoppable("", self.problem.source) as work:
-            for work.doing, step in (*first, ("graph", self._refine), *last, ("graph", self._begin_otherwise)):
-                step()
-                if self.stopped or (self._minima_sought and self._is_exact):
+            for source in self.sources:
+                work.doing = source.name
+                self._take(source)
+                if self._is_over:
                     break
+            work.doing = "graph"
+            for step in (self._refine, self._begin_otherwise):
+                if not self._is_over:
+                    step()
         self._findings += work.findings
         self._cut |= work.stopped
         return self.analysis()
@@ -103,20 +105,15 @@ class ExitRoad:
 
     # --- propose and solve
 
-    def _taking(self, source: Source) -> Callable[[], None]:
-        """A step that polishes what a source proposes."""
-
-        def take() -> None:
-            found = self._asked(source, functools.partial(source.propose, self.problem, self._polished[0]))
-            self._findings += source.findings
-            if source.attains:
-                self._least = detailed_balance.with_paths(self.problem, self._least, found)
-                self._minima_sought = True
-            waiting = self._polishings is not None and source.effort > Effort.SHOOT  # candidates of sources before
-            if found or waiting:
-                self._polish(found, source.effort)
-
-        return take
+    def _take(self, source: Source) -> None:
+        """Polish what a source proposes."""
+        found = self._asked(source, functools.partial(source.propose, self.problem, self._polished[0]))
+        self._findings += source.findings
+        if source.attains:
+            self._least = detailed_balance.with_paths(self.problem, self._least, found)
+        waiting = self._polishings is not None and source.effort > Effort.SHOOT  # candidates of sources before
+        if found or waiting:
+            self._polish(found, source.effort)
 
     def _asked(self, source: Source, propose: Callable[[], Iterable[Candidate]]) -> Sequence[Candidate]:
         """What a source proposes; its error is a finding, unless nothing else searches and nothing is known."""
@@ -215,10 +212,10 @@ class ExitRoad:
         return Evidence(self.problem.attractor, self._polished[0], solution, tuple(self._least), beyond)
 
     @property
-    def _is_exact(self) -> bool:
-        """Whether all exits attain the proven minimum."""
+    def _is_over(self) -> bool:
+        """Whether the work was stopped, or all exits attain the proven minimum."""
         least = {each.target for each in self._least}
-        return bool(least) and least <= self._evidence.exact
+        return self.stopped or (bool(least) and least <= self._evidence.exact)
 
     def _unpolished(self, evidence: Evidence) -> tuple[ActivationEnergy, ...]:
         """The action plot's energies of exits without a polished path; their errors take time, which may be over."""

@@ -36,8 +36,6 @@ class Source(ABC):
         Whether it looks everywhere. The error of the only source that does is an error of the road.
     attains : bool
         Whether its paths attain the proven minimum where detailed balance holds.
-    last_resort : bool
-        Whether it proposes after the graph was refined.
     effort : Effort
         The most effort of polishing, for its candidates and for all that led to no path so far.
     findings : tuple of Finding
@@ -47,7 +45,6 @@ class Source(ABC):
     name: ClassVar[str]
     searches: ClassVar[bool] = False
     attains: ClassVar[bool] = False
-    last_resort: ClassVar[bool] = False
     effort: Effort = Effort.SHOOT
     findings: tuple[Finding, ...] = ()
 
@@ -168,7 +165,6 @@ class ClosestApproach(Source):
     """Where a chaotic attractor comes nearest to a saddle, for exits that the graph gives no path to."""
 
     name = closest_approach.FINDER
-    last_resort = True
     effort = Effort.FROM_ORBIT
 
     def __init__(self, graph: Graph | None) -> None:
