@@ -19,7 +19,6 @@ from vibrokit.structure.parameter_values import ParameterLine, ordered_values, p
 from vibrokit.structure.validation import check_means, seed_of
 
 _CALLER = "energy_continuation"
-_ROUNDING_OF_VALUES = 1e-12  # relative, as of linspace
 
 Array = NDArray[np.float64]
 
@@ -104,7 +103,7 @@ def search_places(line: ParameterLine, values: Array, search: Any) -> list[int]:
     found = []
     for value in ordered_values(f"{_CALLER}: search", search):
         place = int(np.argmin(np.abs(values - value)))
-        if not np.isclose(values[place], value, rtol=_ROUNDING_OF_VALUES, atol=0):
+        if not np.isclose(values[place], value, rtol=1e-12, atol=0):
             raise ParameterError(f"{_CALLER}: search must contain some of the values, and {value:g} is none of them.")
         found.append(place)
     return sorted(found, key=lambda place: abs(values[place] - line.own))

@@ -27,11 +27,6 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import ParameterLine
 
-_SHORTEST = 1 / 64  # of the distance between two values: shortest step, after which a path counts as lost
-# A step stays on its path if the action changes as its derivatives predict, within the sum of these two.
-_TRAPEZOID = 0.1  # of the change
-_ROUNDING = 1e-6  # of the action
-
 Array = NDArray[np.float64]
 
 
@@ -200,7 +195,7 @@ class EnergyRun:
         if self.still:
             self._copy(curve, here, there)
             return True
-        path, slope, least = curve.paths[here], curve.slopes[here], _SHORTEST * abs(end - at)
+        path, slope, least = curve.paths[here], curve.slopes[here], abs(end - at) / 64
         while at != end:
             length = min(curve.step, abs(end - at))
             ahead = end if length >= 0.99 * abs(end - at) else at + np.copysign(length, end - at)
@@ -253,7 +248,8 @@ class EnergyRun:
         slope_ahead = self.line.derivative(ahead.derivative)
         moved = ahead.found.action - path.found.action
         predicted = change * (slope + slope_ahead) / 2
-        allowed = _TRAPEZOID * max(abs(moved), abs(predicted)) + _ROUNDING * path.found.action
+        # A tenth of the change is room for the trapezoidal rule, and 1e-6 of the action for rounding.
+        allowed = 0.1 * max(abs(moved), abs(predicted)) + 1e-6 * path.found.action
         if not abs(moved - predicted) <= allowed:
             raise StructureError(
                 f"the action changes by {moved:.3g} where its derivative predicts {predicted:.3g}: it is another path."

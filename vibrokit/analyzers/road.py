@@ -32,8 +32,6 @@ from vibrokit.structure.orbits import Orbit
 from vibrokit.structure.unstable_orbits import orbits_inside
 from vibrokit.symbolic.flow_kind import Flow
 
-_LONGEST_ORBIT = 64  # periods of an orbit inside a chaotic attractor
-
 
 class ExitRoad:
     """The exits of one attractor: what is found by all sources, polished, and bounded by the graph among them.
@@ -152,7 +150,7 @@ class ExitRoad:
             return ()
         stepper = problem.single_stepper(Flow.STATE_VARIATIONAL)
         with stage("orbits inside the attractor"):
-            found = orbits_inside(problem.scene, attractor.points, stepper, self._orbits, _LONGEST_ORBIT)
+            found = orbits_inside(problem.scene, attractor.points, stepper, self._orbits, 64)
         periods = [orbit.period for orbit in found]
         self._findings.append(Finding.of(Code.CHAOTIC_SOURCE, problem.source, count=len(found), periods=periods))
         return found

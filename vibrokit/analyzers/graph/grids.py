@@ -7,9 +7,6 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-_MARGIN = 0.1  # of the width of the nodes that a closer grid has to cover, added on each side
-_MARGIN_IN_NODES = 3
-_WIDER = 0.3  # of the width: how much a grid grows at a side
 _FEWEST_NODES = 16  # along a side of the coarse grids
 _EDGE = 3  # nodes at a side that make it grow
 
@@ -96,7 +93,7 @@ class Grids:
         """Return grids that reach farther on each side where needed nodes lie; the same grids if there are none."""
         boxes = self.boxes.copy()
         for phase, mask in enumerate(needed):
-            more = _WIDER * np.diff(self.boxes[phase], axis=1)[:, 0]
+            more = 0.3 * np.diff(self.boxes[phase], axis=1)[:, 0]
             for axis, edge in enumerate((mask, mask.T)):
                 boxes[phase, axis, 0] -= more[axis] * bool(edge[:_EDGE].any())
                 boxes[phase, axis, 1] += more[axis] * bool(edge[-_EDGE:].any())
@@ -109,7 +106,7 @@ class Grids:
             if mask.any():
                 states = self.nodes(phase)[mask]
                 low, high = states.min(axis=0), states.max(axis=0)
-                margin = _MARGIN * (high - low) + _MARGIN_IN_NODES * self.spacing(phase)
+                margin = 0.1 * (high - low) + 3 * self.spacing(phase)
                 closer = np.stack([low - margin, high + margin], axis=1)
                 boxes[phase] = closer if beyond else np.clip(closer, *boxes[phase].T[..., None])
         return dataclasses.replace(self, boxes=boxes)

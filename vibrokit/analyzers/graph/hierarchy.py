@@ -28,9 +28,6 @@ from vibrokit.progress import stage
 from vibrokit.results.energy import ActivationEnergy
 
 _FAR_SMALLER = 0.5  # of the area: grids around known paths, which grow, that are worth beginning anew
-# Along a side where several section intervals have grids: half as many found the islands around an orbit of period 3 of
-# a weakly damped Duffing oscillator, and 26 did not.
-_FEWEST_APART = 90
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -291,5 +288,6 @@ class HierarchySearch:
 
 def _shared(shape: Shape, intervals: int) -> Shape:
     """Nodes along each side where the grids of several intervals take together what one takes, unless those are few."""
-    nx, nv = (max(min(nodes, _FEWEST_APART), round(nodes / intervals**0.5)) for nodes in shape)
+    # Half of 90 found the islands around an orbit of period 3 of a weakly damped Duffing oscillator, and 26 did not.
+    nx, nv = (max(min(nodes, 90), round(nodes / intervals**0.5)) for nodes in shape)
     return nx, nv

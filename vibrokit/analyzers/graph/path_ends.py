@@ -17,9 +17,6 @@ from vibrokit.results.saddle import Saddle
 from vibrokit.structure.basins.stop_cells import agreeing
 from vibrokit.structure.orbits import unstable_direction
 
-_DEPTH = 2  # cells of the basin grid, from the boundary to the nearest cell that surely lies inside
-_GENEROUS = 10  # times the cost of a straight path to a face
-
 Array = NDArray[np.float64]
 
 
@@ -65,7 +62,7 @@ def _(end: InBasin, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     region, labels = problem.structure.basins.region, problem.structure.basins.labels
     certain = np.where(agreeing(labels, 1), labels, -1).ravel()
     centres = region.cell_centres(labels.shape)
-    depth = _DEPTH * np.diff(region.bounds, axis=1)[:, 0] / labels.shape
+    depth = 2 * np.diff(region.bounds, axis=1)[:, 0] / labels.shape  # of the nearest cell that surely lies inside
     targets: list[ExitTarget] = []
     for label in end.targets:
         points = problem.structure.attractors[label].points[:, :2]
@@ -79,7 +76,7 @@ def _(end: AtFace, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     # Noise moves v by Δv within a time τ at the cost Δv²/(2τ), and x by Δx at about that of Δv = ω_n Δx.
     frequency = problem.scene.natural_frequency
     distance = (end.level - float(problem.attractor.points[0, end.axis])) * (frequency if end.axis == 0 else 1.0)
-    scale = _GENEROUS * distance**2 / (2 * max(1 / frequency, problem.scene.section_interval))
+    scale = 10 * distance**2 / (2 * max(1 / frequency, problem.scene.section_interval))
     return [FaceTarget(end.targets[:1], -1, scale, model, end.axis, end.level)]
 
 

@@ -12,7 +12,6 @@ from vibrokit.analyzers.graph.grids import Grids
 from vibrokit.kernels.sweeps import interpolate_all
 
 _BLUR = 2  # nodes within which a grid does not resolve V
-_NEARBY = 2  # nodes: what lies farther from where V is low has no part in interpolation there
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -40,7 +39,8 @@ class Potential:
             return [np.ones(grids.shape, dtype=bool)] * grids.phases
         most, last, found = min(level, self.ceiling), np.array(self.grids.shape) - 1, []
         for phase in range(grids.phases):
-            below = ndimage.maximum_filter(self.values[every * phase] < most, size=2 * _NEARBY + 1)
+            # What lies more than 2 nodes from where V is low has no part in interpolation there.
+            below = ndimage.maximum_filter(self.values[every * phase] < most, size=5)
             index = self.grids.nearest(every * phase, grids.nodes(phase))
             inside = np.clip(index, 0, last)
             found.append(below[inside[..., 0], inside[..., 1]] | np.any(index != inside, axis=-1))

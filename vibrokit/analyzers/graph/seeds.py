@@ -14,10 +14,6 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.structure.orbits import refine_orbit
 
 _SEED_REACH = 2.6  # nodes that the ellipse of seeds covers in x and in v: enough for interpolation next to it
-_PER_NODE = 4  # points of a curve between two nodes
-_ANGLES = 24  # directions in which linearity is tested
-_NONLINEAR = 0.02  # relative to the distance from the orbit: deviation of an image from the linear one that is accepted
-_LOWER, _LOWERINGS = 0.25, 40  # factor and number of trials for a smaller ellipse
 
 Array = NDArray[np.float64]
 
@@ -94,11 +90,11 @@ def orbit_visits(model: StepModel, attractor: Attractor, grids: Grids) -> list[V
 
 def _linear_level(model: StepModel, grids: Grids, visits: list[Visit], level: float) -> float:
     """Lower a level until the motion on its ellipses is linear in every step; 0 if it never is."""
-    levels = level * _LOWER ** np.arange(_LOWERINGS)
-    angles = np.linspace(0, 2 * np.pi, _ANGLES, endpoint=False)
+    levels = level * 0.25 ** np.arange(40)
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)])
     sizes = np.sqrt(2 * levels)[:, None, None]
-    worst = np.zeros(_LOWERINGS)
+    worst = np.zeros(len(levels))
     for visit, after in zip(visits, [*visits[1:], visits[0]], strict=True):
         offsets = sizes * (np.linalg.cholesky(visit.covariance) @ circle).T  # (levels, angles, 2)
         states = visit.point + offsets
@@ -106,13 +102,13 @@ def _linear_level(model: StepModel, grids: Grids, visits: list[Visit], level: fl
         deviations = (images - after.point - offsets @ visit.slope.T) / sizes
         distances = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(after.covariance), deviations.mT), axis=1)
         worst = np.maximum(worst, np.where(np.isfinite(distances), distances, np.inf).max(axis=1))
-    linear = worst <= _NONLINEAR
+    linear = worst <= 0.02  # of the distance from the orbit
     return float(levels[np.argmax(linear)]) if linear.any() else 0.0
 
 
 def _dense(curve: Array, grids: Grids) -> Array:
     """Points along a curve, several from node to node."""
     lengths = np.linalg.norm(np.diff(curve[:, :2], axis=0) / grids.spacing(0), axis=1)
-    between = max(1, int(np.ceil(_PER_NODE * lengths.max())))
+    between = max(1, int(np.ceil(4 * lengths.max())))
     at = np.linspace(0, len(curve) - 1, between * (len(curve) - 1) + 1)
     return np.column_stack([np.interp(at, np.arange(len(curve)), curve[:, axis]) for axis in (0, 1)])

@@ -16,9 +16,6 @@ from vibrokit.kernels.sweeps import descend_all
 _BEYOND = (1.5, 3.0)  # nodes from a saddle to where paths over it are traced back from
 _PARTS = 8  # of a step, at whose ends the face is evaluated before the minimum is refined
 _PER_NODE = 2  # states on the face for each node along it
-_ITERATIONS = 60  # of the refinement, which takes some 40 of them to its tolerance
-_TOLERANCE = 1e-3  # of the refinement, in units of the distances above: the cost is quadratic there
-_SHORTEST = 0.01  # of a step: the covariance of a shorter one is close to singular
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -169,12 +166,13 @@ class FaceTarget(ExitTarget):
 
         def cost(shifts: Array) -> float:
             when, where = middle + shifts * apart
-            if not _SHORTEST * grids.step <= when <= grids.step:
+            if not 0.01 * grids.step <= when <= grids.step:  # the covariance of a shorter one is close to singular
                 return np.inf
             return float(self._costs(potential, phase, when, np.array([where]))[0][0])
 
         simplex = np.array([(0.0, 0.0), (-0.5, 0.5), (0.5, 0.5)])
-        options = {"initial_simplex": simplex, "maxiter": _ITERATIONS, "xatol": _TOLERANCE, "fatol": 0.0}
+        # The cost is quadratic there: 1e-3 of these distances is enough, and takes some 40 iterations.
+        options = {"initial_simplex": simplex, "maxiter": 60, "xatol": 1e-3, "fatol": 0.0}
         found = scipy.optimize.minimize(cost, simplex[0], method="Nelder-Mead", options=options)
         duration, place = middle + found.x * apart
         return float(found.fun), phase, float(duration), float(place)

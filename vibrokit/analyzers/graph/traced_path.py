@@ -21,12 +21,9 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.symbolic.flow_kind import Flow
 
-_SAME = 1e-4  # relative difference of the actions of paths that count as one
 # Relaxation times on the attractor. A path that has t relaxation times to reach a state near it costs 1/(1 − e^(−2t))
 # of what one without a beginning costs up to there, by the linearized equations: 0.03 % more.
 _RELAXATIONS = 4.0
-_LONGEST = 250  # section intervals of a lead-in
-_CONVERGED = 1e-5  # of the action, that another step of the descent would gain
 
 Array = NDArray[np.float64]
 
@@ -53,7 +50,7 @@ def distinct(paths: Iterable[TracedPath]) -> list[TracedPath]:
     """Return each path once, the cheapest first."""
     kept: list[TracedPath] = []
     for path in sorted(paths, key=lambda path: path.candidate.action):
-        if not any(same_action(path.candidate.action, other.candidate.action, _SAME) for other in kept):
+        if not any(same_action(path.candidate.action, other.candidate.action, 1e-4) for other in kept):
             kept.append(path)
     return kept
 
@@ -74,7 +71,7 @@ def whole_action(problem: ExitProblem, path: TracedPath) -> float:
         points, _ = gauss_newton(propagator, 0, states, end.last, end.free)
     except StructureError:
         return math.inf
-    _, action = descend_action(propagator, 0, points, last=end.last, free=end.free, converged=_CONVERGED)
+    _, action = descend_action(propagator, 0, points, last=end.last, free=end.free, converged=1e-5)
     return action if math.isfinite(action) else math.inf
 
 
@@ -98,7 +95,7 @@ def lead_in(attractor: Attractor, propagator: SegmentPropagator, state: Array) -
     """
     steps, interval = propagator.pieces, propagator.osc.section_interval
     units = np.array([propagator.osc.natural_frequency, 1.0])
-    intervals = min(_LONGEST, max(1, math.ceil(_RELAXATIONS * _relaxation(attractor) / interval)))
+    intervals = min(250, max(1, math.ceil(_RELAXATIONS * _relaxation(attractor) / interval)))
     curve = attractor.orbit if attractor.kind == "limit cycle" else attractor.points
     place = int(np.argmin(np.linalg.norm((curve[:, :2] - state) * units, axis=1)))
     if attractor.kind == "limit cycle":

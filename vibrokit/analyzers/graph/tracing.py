@@ -21,13 +21,7 @@ from vibrokit.kernels.sweeps import descend_all
 from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "graph"
-_FEWEST = 3  # nodes of a path with anything between its ends to relax
-_RELAXATIONS = 30  # steps of the descent: enough for generic paths; polishing goes on from where the others stop
-_RELAXED = 1e-3  # of the action, that another step would gain: below the error of V on the default grid
-_LONGEST = 250  # section intervals
 _STEP_WEIGHT = 1 / 1.1  # of a step's cost against V: below 1, so that no path lingers near an unstable orbit
-_LIGHTER, _LEAST_WEIGHT = 0.5, 1e-4  # where V, interpolated, has a hollow that a path would never leave
-_LOSS = 1e-3  # of the lowest V yet, that a path has to lose in a section interval; else the weight is lowered
 _CORNERS = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
 Array = NDArray[np.float64]
@@ -93,7 +87,7 @@ class SolvedGrid:
     def _traced(self, target: ExitTarget, value: float, start: TraceStart) -> TracedPath | None:
         problem, potential, fixed = self.problem, self.potential, self.problem.attractor.is_fixed
         found = backtrack(self.model, potential, start.state, start.phase)
-        if found is None or len(found[0]) < _FEWEST:
+        if found is None or len(found[0]) < 3:  # nothing between its ends to relax
             return None
         states, before = found
         stepper = problem.single_stepper(Flow.HAMILTONIAN_VARIATIONAL)
@@ -104,7 +98,8 @@ class SolvedGrid:
             points, quadratic = gauss_newton(propagator, 0, states)
         except StructureError:
             return None
-        points, action = descend_action(propagator, 0, points, iterations=_RELAXATIONS, converged=_RELAXED)
+        # Enough for generic paths, and below the error of V on the default grid; polishing goes on from there.
+        points, action = descend_action(propagator, 0, points, iterations=30, converged=1e-3)
         if not np.isfinite(action):
             return None
         if len(start.beyond):
@@ -129,7 +124,7 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
     states = [end]
     per_interval = grids.steps
     weight, lowest = _STEP_WEIGHT, np.inf
-    for count in range(1, _LONGEST * per_interval):
+    for count in range(1, 250 * per_interval):
         before = (phase - count) % grids.phases
         costs = model.into(states[-1][None], grids, before)
         tries = _tries(potential, before, states[-1], costs)
@@ -141,10 +136,10 @@ def backtrack(model: StepModel, potential: Potential, end: Array, phase: int = 0
         if not np.isfinite(costs.cost(index)[0]):
             return None
         if count % per_interval == 0:
-            lower = totals[0] < (1 - _LOSS) * lowest
-            weight = _STEP_WEIGHT if lower else weight * _LIGHTER
+            lower = totals[0] < 0.999 * lowest
+            weight = _STEP_WEIGHT if lower else weight / 2  # V, interpolated, may have a hollow that it never leaves
             lowest = min(lowest, float(totals[0]))
-            if weight < _LEAST_WEIGHT:
+            if weight < 1e-4:
                 return None
         nearest = np.clip(np.rint(index[0]), 0, np.array(grids.shape) - 1).astype(int)
         if before == 0 and potential.seeded[tuple(nearest)]:

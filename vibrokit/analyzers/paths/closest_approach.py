@@ -13,8 +13,6 @@ from vibrokit.symbolic.flow_kind import Flow
 
 FINDER = "closest approach"
 _BEFORE = 16  # section intervals on the attractor before noise acts
-_ACTING = (1, 2, 4)  # section intervals in which noise acts
-_MOST = 4  # candidates, at most one for each saddle
 
 Array = NDArray[np.float64]
 
@@ -30,7 +28,7 @@ def closest_approaches(problem: ExitProblem) -> list[Candidate]:
         return []
     stepper, best = problem.ensemble_stepper(Flow.LINEARISED), dict[int, Candidate]()
     own = [end for end in problem.path_ends if isinstance(end, AtSaddle) and end.on_own_boundary]
-    for acting in _ACTING:
+    for acting in (1, 2, 4):  # section intervals in which noise acts
         starts = attractor.points[_BEFORE:-acting]
         reached = gaussian_map(osc, starts, stepper, intervals=acting)
         for end in own:
@@ -45,7 +43,7 @@ def closest_approaches(problem: ExitProblem) -> list[Candidate]:
                 times = osc.section_interval * np.arange(len(states), dtype=np.float64)
                 action = float(costs[place, goal])
                 best[end.number] = Candidate(problem.source, end.targets[0], times, states, action, FINDER)
-    return sorted(best.values(), key=lambda each: each.action)[:_MOST]
+    return sorted(best.values(), key=lambda each: each.action)[:4]
 
 
 def _costs(goals: Array, images: Array, covariances: Array) -> Array:

@@ -31,12 +31,6 @@ from vibrokit.structure.autonomous import equilibria
 from vibrokit.symbolic.flow_kind import Flow
 
 METHOD = "detailed balance"
-_RELATIVE = 1e-11  # error of the potential energy
-_PARTS = 200  # of an interval, at most
-_ROUNDING = 1e-15  # of a force of the size ω_n² x
-_AROUND = 0.01  # of the distance from the first place to the last
-_BESIDE = 1e-3  # of the way to the attractor: so near to its end a relaxation begins
-_ALIKE = 0.01  # of an energy: its path, sampled and integrated by the trapezoidal rule, costs the same
 
 
 def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
@@ -55,7 +49,7 @@ def least_actions(problem: ExitProblem) -> tuple[ActivationEnergy, ...]:
         return ()
     start = float(attractor.points[0, 0])
     low, high = min([start, *places.values()]), max([start, *places.values()])
-    around = _AROUND * (high - low)  # a saddle may be close to the start
+    around = 0.01 * (high - low)  # a saddle may be close to the start
     rests = equilibria(problem.scene, low - around, high + around)  # the structure may have been stopped
     summits = [float(rest.point[0]) for rest in rests]
     least: dict[int, ActivationEnergy] = {}
@@ -102,10 +96,10 @@ def _nearest(problem: ExitProblem, energy: ActivationEnergy, relaxations: Sequen
     among = (
         one
         for one in relaxations
-        if any(abs(one.states[-1, 0] - place) <= _BESIDE * abs(start - place) for place in places)
+        if any(abs(one.states[-1, 0] - place) <= 1e-3 * abs(start - place) for place in places)
     )
     found = min(among, key=lambda one: abs(one.action - energy.value), default=None)
-    return found if found is not None and abs(found.action - energy.value) <= _ALIKE * energy.value else None
+    return found if found is not None and abs(found.action - energy.value) <= 0.01 * energy.value else None
 
 
 def _path(problem: ExitProblem, relaxation: Candidate) -> ExitPath:
@@ -144,9 +138,9 @@ def _highest(scene: Oscillator, places: list[float]) -> tuple[float, float, bool
     for one, other in itertools.pairwise(places):
         kinks = [x for x in stops if min(one, other) < x < max(one, other)]
         work, error = quad(
-            force, one, other, epsabs=0.0, epsrel=_RELATIVE, limit=_PARTS, points=kinks or None, full_output=True
+            force, one, other, epsabs=0.0, epsrel=1e-11, limit=200, points=kinks or None, full_output=True
         )[:2]  # it would warn where rounding limits the accuracy
-        rounding = _ROUNDING * scene.natural_frequency**2 * max(abs(one), abs(other)) * abs(other - one)
+        rounding = 1e-15 * scene.natural_frequency**2 * max(abs(one), abs(other)) * abs(other - one)
         energy, total = energy - work, total + error + rounding
         if energy > highest[0]:
             highest = energy, total, other == places[-1]

@@ -19,10 +19,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, ExitPath
 
 FINDER = "mirror images"
-_ALIKE = 1e-2  # of the region's widths: largest distance between samples of an orbit and those of its mirror image
 _COMPARED, _TIMES = 32, 4  # samples of an orbit, of the region and of each stop that are compared; at these many times
-_SHALLOW = 1e-9  # of the region: least depth past a stop
-_ODD = 1e-9  # of the rates: difference of the two sides, from rounding
 
 Array = NDArray[np.float64]
 
@@ -65,7 +62,7 @@ class Mirror:
         for other in self._problem.structure.attractors:
             if attractor.repeats and (other.kind, other.period) == (attractor.kind, attractor.period):
                 offsets = np.linalg.norm((some + other.orbit) / widths, axis=2)
-                if offsets.min(axis=1).max() < _ALIKE:
+                if offsets.min(axis=1).max() < 1e-2:  # of the region's widths
                     return other.label
         return None
 
@@ -77,7 +74,7 @@ class Mirror:
         for time in self._problem.scene.section_interval * np.arange(_TIMES) / _TIMES:
             here = field.hamiltonian_rate(points[:, :n], points[:, n:], time)
             there = -field.hamiltonian_rate(-points[:, :n], -points[:, n:], time + later)
-            if not (np.abs(there - here) <= _ODD * (np.abs(here) + np.median(np.abs(here), axis=0))).all():
+            if not (np.abs(there - here) <= 1e-9 * (np.abs(here) + np.median(np.abs(here), axis=0))).all():
                 return False
         return True
 
@@ -89,7 +86,7 @@ class Mirror:
         reach = np.abs(bounds).max(axis=1)
         states[:, :2] *= reach
         for number, barrier in enumerate(scene.barriers, start=1):
-            depths = reach[0] * np.geomspace(_SHALLOW, 1.0, _COMPARED)
+            depths = reach[0] * np.geomspace(1e-9, 1.0, _COMPARED)
             states[number * _COMPARED : (number + 1) * _COMPARED, 0] = barrier.position + barrier.sign * depths
         return states
 

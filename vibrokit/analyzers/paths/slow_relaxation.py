@@ -30,9 +30,7 @@ from vibrokit.structure.scales import doublings_of
 _APART = 16  # of the section interval: nearer to each other, only the cheapest path is kept
 _DECAY = math.log(1e3)  # logarithm of the factor by which a deviation from the attractor has fallen
 _BESIDE = 1e-4  # of the distance from the saddle to the attractor: so far from the saddle a path ends
-_ARRIVED = 0.1  # of that distance: so near to the attractor a path must begin
 _PRECISION, _LEAST = 1e-5, 1e-6  # of guesses: relative error of a step, and relative to the size of the motion
-_MOST = 2  # for each saddle, the cheapest
 _MOST_EVALUATIONS = 40_000  # of the rates of all motions at once: some ten seconds, where contacts are short
 
 Array = NDArray[np.float64]
@@ -81,7 +79,7 @@ class _Relaxations:
         costs = np.array([found[phase].action if phase in found else math.inf for phase in range(self._phases)])
         least = minimum_filter1d(costs, 2 * (self._propagator.pieces // _APART) + 1, mode="wrap")
         minima = np.flatnonzero((costs == least) & np.isfinite(costs))
-        return [found[at] for at in sorted(minima.tolist(), key=costs.__getitem__)[:_MOST]]
+        return [found[at] for at in sorted(minima.tolist(), key=costs.__getitem__)[:2]]
 
     def _ending(self) -> dict[int, Candidate]:
         """The cheaper of both motions by the phase of its end (pieces), where one arrives."""
@@ -161,7 +159,7 @@ class _Relaxations:
         if not self._around.contains(path).all() or problem.is_out(path[:-1]).any():
             return None
         away = np.linalg.norm((path[0] - self._orbits(times[0])[:2]) / self._propagator.units)
-        if away > _ARRIVED * self._distance(phase * piece):
+        if away > 0.1 * self._distance(phase * piece):
             return None
         momenta, rates = momenta_of(self._field, path, self._flipped(times, path), times)
         action = float(np.trapezoid(rates, times)) if np.isfinite(momenta).all() else math.inf
