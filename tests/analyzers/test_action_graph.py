@@ -86,23 +86,18 @@ def test_barrier_of_the_double_well_by_default(damping):
     assert energy.lower == max(0.0, energy.value - energy.numerical_error) <= exact
     assert exact <= energy.upper <= energy.value + energy.numerical_error  # the action of a path
     assert found.energies == found.estimates
+    assert misses(found, damping).max() <= 0.02  # in the whole well
 
 
-@pytest.mark.parametrize("damping", WELLS)
-def test_the_whole_well_by_default(damping):
-    assert misses(solved(damping), damping).max() <= 0.02
-
-
-@pytest.mark.parametrize(("damping", "nodes"), [(0.1, 80), (0.1, 160), (0.1, 320), (0.3, 80), (0.3, 160)])
-def test_the_error_estimate_holds_as_nodes_refine(damping, nodes):
-    energy = best(solved(damping, nodes), 1)
-    assert abs(energy.value - 4 * damping * BARRIER) <= energy.numerical_error
-
-
-@pytest.mark.parametrize("damping", [0.05, 0.3])
-@pytest.mark.parametrize("steps", [4, 8, 16])
-def test_the_error_estimate_holds_as_steps_refine(damping, steps):
-    energy = best(solved(damping, 160, steps), 1)
+@pytest.mark.parametrize(
+    ("damping", "nodes", "steps"),
+    [
+        *[(damping, nodes, None) for damping, nodes in [(0.1, 80), (0.1, 160), (0.1, 320), (0.3, 80), (0.3, 160)]],
+        *[(damping, 160, steps) for damping in (0.05, 0.3) for steps in (4, 8, 16)],
+    ],
+)
+def test_the_error_estimate_holds_as_nodes_and_steps_refine(damping, nodes, steps):
+    energy = best(solved(damping, nodes, steps), 1)
     assert abs(energy.value - 4 * damping * BARRIER) <= energy.numerical_error
 
 
@@ -160,8 +155,8 @@ def least_touch(damping, natural):
 
 
 @pytest.mark.parametrize(("damping", "natural"), SCENES)
-def test_quadratic_potential_of_the_linear_scene(damping, natural):
-    """At every phase, up to half of what the touch costs."""
+def test_the_potential_and_the_first_touch_of_the_linear_scene(damping, natural):
+    """V is the quadratic form at every phase, up to half of what the touch costs."""
     *_, found = touching(damping, natural)
     grids, exact = found.potential.grids, least_touch(damping, natural)
     for phase in range(grids.phases):
@@ -171,12 +166,6 @@ def test_quadratic_potential_of_the_linear_scene(damping, natural):
         low = (psi < 0.5 * exact) & (grids.nodes(phase)[..., 0] < STOP)
         assert low.any()
         assert np.abs(found.potential.values[phase] - psi)[low].max() <= 0.02 * exact
-
-
-@pytest.mark.parametrize(("damping", "natural"), SCENES)
-def test_first_touch_of_the_linear_scene(damping, natural):
-    *_, found = touching(damping, natural)
-    exact = least_touch(damping, natural)
     energy = best(found, -1)
     assert energy.value == pytest.approx(exact, rel=0.02)
     assert abs(energy.value - exact) <= energy.numerical_error
@@ -269,15 +258,11 @@ def test_the_data_are_those_of_the_search_with_units(result):
         assert array.attrs["long_name"]
 
 
-@pytest.mark.parametrize("source", [None, 0, "right-rest"])
-def test_pictures(result, source, tmp_path):
+def test_pictures(result, tmp_path):
     result.save(tmp_path / "graph.nc")
-    artists = vk.load_result(tmp_path / "graph.nc").plot(source=source)
-    artists.figure.savefig(tmp_path / "graph.png")
-    assert (tmp_path / "graph.png").stat().st_size > 5000
-
-
-def test_no_picture_of_an_unknown_attractor(result):
+    for source in (None, 0, "right-rest"):
+        vk.load_result(tmp_path / "graph.nc").plot(source=source).figure.savefig(tmp_path / "graph.png")
+        assert (tmp_path / "graph.png").stat().st_size > 5000
     with pytest.raises(StructureError, match="no attractor 7"):
         result.plot(source=7)
 
