@@ -27,11 +27,11 @@ from tests.builders import (
 from vibrokit import registry
 from vibrokit.errors import UnknownNameError
 from vibrokit.registry import Group, names
+from vibrokit.results.atomic import save_figure
 from vibrokit.results.basins import Basins
 from vibrokit.results.codes import Code, Severity
 from vibrokit.results.files import PlainRecord, ResultFileError, nested, records_in
 from vibrokit.results.finding import Finding
-from vibrokit.results.pictures import save_figure
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.trajectory import Trajectory

@@ -30,10 +30,9 @@ from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.files import nested, records_in
 from vibrokit.results.labels import goal_of, label_of
 from vibrokit.results.one_scene import analyzed_labels, part_of
-from vibrokit.results.record import Record
+from vibrokit.results.record import Record, Summary
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
-from vibrokit.results.summary import Summary
 
 STRUCTURE = "structure"
 """Name of the structure among the records of an assessment."""

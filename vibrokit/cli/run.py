@@ -22,9 +22,9 @@ from vibrokit.progress import checked_time_limit
 from vibrokit.registry import Group, load
 from vibrokit.report.data import findings_data, run_data
 from vibrokit.report.text import record_text
+from vibrokit.results.atomic import save_figure
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
-from vibrokit.results.pictures import save_figure
 from vibrokit.results.record import Record, versions
 from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable

@@ -10,8 +10,8 @@ from vibrokit.cli.long_work import check_targets
 from vibrokit.comparison.reconcile import reconcile
 from vibrokit.report.data import reconciliation_data
 from vibrokit.report.text import record_text
+from vibrokit.results.atomic import save_figure
 from vibrokit.results.files import load_result
-from vibrokit.results.pictures import save_figure
 from vibrokit.results.record import versions
 
 

@@ -12,7 +12,7 @@ from vibrokit.errors import VibrokitError
 from vibrokit.plots.trade import work_precision
 from vibrokit.progress import working
 from vibrokit.registry import Group, names
-from vibrokit.results.pictures import save_figure
+from vibrokit.results.atomic import save_figure
 from vibrokit.scene_file import bundled_scenes, load_scene
 from vibrokit.testing import check
 from vibrokit.trade.assessments import measure_assessments

@@ -20,7 +20,7 @@ from vibrokit.errors import ParameterError, shown
 from vibrokit.report.assessment import Question, assessment_data, assessment_text
 from vibrokit.report.text import record_text
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
-from vibrokit.results.pictures import save_figure
+from vibrokit.results.atomic import save_figure
 from vibrokit.results.record import versions
 from vibrokit.scene_file import load_scene
 from vibrokit.structure.parameter_values import parameter_line

@@ -14,8 +14,7 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.fields import Whole
 from vibrokit.results.labels import goal_of, label_of
-from vibrokit.results.record import Record
-from vibrokit.results.summary import Summary
+from vibrokit.results.record import Record, Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from vibrokit.reproduction.figures import Figure, figures
 from vibrokit.reproduction.published import STATES
 from vibrokit.reproduction.steps import Records, do, steps
 from vibrokit.reproduction.verdicts import Match, Verdict, verdicts
-from vibrokit.results.atomic import made_folder
-from vibrokit.results.pictures import save_figure
+from vibrokit.results.atomic import made_folder, save_figure
 from vibrokit.text_table import number_text
 
 PAGE = "reproduction.html"

@@ -7,10 +7,19 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from vibrokit.results.arrays import Arrays
+from vibrokit.results.fields import Word
 from vibrokit.results.record import Record
+from vibrokit.results.table import Table
 from vibrokit.text_units import parameter_text, size_of
 
-_TEXTS = ("parameter", "symbol", "unit")
+_PARAMETER = Table(
+    "",
+    {
+        "parameter": Word("path of the parameter"),
+        "symbol": Word("symbol of the parameter"),
+        "unit": Word("unit of the parameter"),
+    },
+)
 
 
 class AlongParameter(Record, ABC):
@@ -54,14 +63,10 @@ class AlongParameter(Record, ABC):
 
     def parameter_variables(self) -> dict[str, Any]:
         """Return the arrays that hold the parameter."""
-        return {
-            "parameter": ((), self.parameter, {"long_name": "path of the parameter"}),
-            "symbol": ((), self.symbol, {"long_name": "symbol of the parameter"}),
-            "unit": ((), self.unit or "", {"long_name": "unit of the parameter"}),
-        }
+        return _PARAMETER.variables([self], unit=[self.unit or ""])
 
     @staticmethod
     def read_parameter(arrays: Arrays) -> dict[str, Any]:
         """Return the parameter of some arrays, by attribute; raises ResultFileError."""
-        parameter, symbol, unit = (arrays.words(name, ())[0] for name in _TEXTS)
-        return {"parameter": parameter, "symbol": symbol, "unit": unit or None}
+        (found,) = _PARAMETER.read(arrays)
+        return found | {"unit": found["unit"] or None}

@@ -1,13 +1,18 @@
-"""Writes files whole or not at all, into folders that it makes."""
+"""Writes files and pictures whole or not at all, into folders that it makes."""
 
 from __future__ import annotations
 
+import io
 import os
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vibrokit.arguments import path_of
-from vibrokit.errors import FileError, NoSuchFileError, reason
+from vibrokit.errors import FileError, NoSuchFileError, VibrokitError, reason
+
+if TYPE_CHECKING:
+    from vibrokit.plots.artists import Artists
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
@@ -63,3 +68,22 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+_FORMATS = (".png", ".pdf", ".svg")
+
+
+def checked_picture(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a picture; raises VibrokitError if its ending is not that of a picture."""
+    target = path_of(path)
+    if target.suffix not in _FORMATS:
+        raise VibrokitError(f"{target} ends in {target.suffix!r}; a picture ends in {', '.join(_FORMATS)}.")
+    return target
+
+
+def save_figure(artists: Artists, path: str | os.PathLike[str]) -> None:
+    """Save the figure of a picture; the file's ending chooses the format. Raises VibrokitError for other endings."""
+    target = checked_picture(path)
+    content = io.BytesIO()
+    artists.printable.savefig(content, format=target.suffix[1:], dpi=150)
+    write_atomically(target, content.getvalue())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import (
     PLANE,
     STATE,
-    BySide,
+    ByName,
     Length,
     Number,
     Series,
@@ -79,6 +79,7 @@ _MULTIPLIERS = Spectrum(
     "multipliers of the section map over one orbit, of the flow over 2π/ω_n at rest; none of motion that never repeats",
     length=Length("multiplier", "multipliers"),
 )
+_STOPS: dict[str, Any] = {"what": "side", "low": 0.0, "known": ("left", "right")}
 _EXPONENTS = Spectrum(  # −∞ where a multiplier is 0
     "rates at which deviations grow: eigenvalues at rest, log(multipliers)/duration of an orbit, otherwise the largest "
     "Lyapunov exponent",
@@ -100,9 +101,9 @@ class Attractor:
     multipliers: Annotated[Complex, _MULTIPLIERS]
     exponents: Annotated[Complex, _EXPONENTS]
     exponent_error: Annotated[float, "standard error of a Lyapunov exponent; 0 for the others", "s-1"]
-    hits: Annotated[Sides, BySide("hits of each stop per orbit; per forcing period for motion that never repeats")]
-    peak_depth: Annotated[Sides, BySide("largest depth past each stop", "m")]
-    peak_force: Annotated[Sides, BySide("largest push of each stop", "m s-2")]
+    hits: Annotated[Sides, ByName("hits of each stop per orbit; per forcing period if it never repeats", "1", **_STOPS)]
+    peak_depth: Annotated[Sides, ByName("largest depth past each stop", "m", **_STOPS)]
+    peak_force: Annotated[Sides, ByName("largest push of each stop", "m s-2", **_STOPS)]
     basin_fraction: Annotated[float, Number("share of the region's cells that lead to the attractor", "1", 0.0, 1.0)]
     basin_fraction_error: Annotated[
         float, Number("standard error of the share; above 0 also where all cells lead to one attractor", "1", 0.0, 1.0)

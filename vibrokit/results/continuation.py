@@ -21,8 +21,8 @@ from vibrokit.results.fields import LARGEST, STATE, Field, Length, Number, Varia
 from vibrokit.results.finding import Finding
 from vibrokit.results.labels import label_of
 from vibrokit.results.provenance import findings_data, findings_from, json_data, json_text
+from vibrokit.results.record import Summary
 from vibrokit.results.region import Region
-from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.arrays import Arrays
-from vibrokit.results.record import Record
-from vibrokit.results.summary import Summary
+from vibrokit.results.record import Record, Summary
 
 if TYPE_CHECKING:
     from vibrokit.plots.densities import MarginalArtists

@@ -16,7 +16,7 @@ from vibrokit.errors import ResultFileError, StructureError, counted, shown
 from vibrokit.results.along_parameter import AlongParameter
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import LARGEST
-from vibrokit.results.summary import Summary
+from vibrokit.results.record import Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:

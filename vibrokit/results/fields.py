@@ -23,7 +23,6 @@ from vibrokit.results.arrays import LARGEST_WHOLE, Arrays
 Variable = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 Array = NDArray[np.float64]
 
-SIDES = ("left", "right")
 LARGEST = float(np.finfo(float).max)
 
 
@@ -34,7 +33,10 @@ def _about(long_name: str, units: str = "1") -> dict[str, Any]:
 
 @dataclasses.dataclass(frozen=True)
 class Field(ABC):
-    """One attribute of many records. In every method `record` is their dimension and `name` that of the array."""
+    """One attribute of many records. In every method `record` is their dimension and `name` that of the array.
+
+    A scalar of a single record has no dimension: `record` is empty then.
+    """
 
     noun: ClassVar[str] = ""  # the type of the attribute, if the annotation does not tell it
 
@@ -57,7 +59,14 @@ class Scalar(Field):
     dtype: ClassVar[type] = float
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
-        yield name, ((record,), np.array(values, dtype=self.dtype), _about(self.long_name, self.units))
+        about = _about(self.long_name, self.units)
+        array: NDArray[Any] = np.array(values, dtype=self.dtype)
+        yield name, (((record,), array, about) if record else ((), array.reshape(()), about))
+
+    @staticmethod
+    def shape(arrays: Arrays, record: str) -> tuple[int, ...]:
+        """Return the shape that the array should have."""
+        return (arrays.size(record),) if record else ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +78,8 @@ class Number(Scalar):
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
         bounded = self.low > -np.inf or self.high < np.inf
-        return arrays.numbers(name, (arrays.size(record),), self.low, self.high, finite=bounded).tolist()
+        values = arrays.numbers(name, self.shape(arrays, record), self.low, self.high, finite=bounded)
+        return values.ravel().tolist()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +92,7 @@ class Whole(Scalar):
     high: int = LARGEST_WHOLE
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        return arrays.wholes(name, (arrays.size(record),), self.low, self.high).tolist()
+        return arrays.wholes(name, self.shape(arrays, record), self.low, self.high).ravel().tolist()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +104,7 @@ class Flag(Scalar):
     units: str = ""
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        return [bool(value) for value in arrays.wholes(name, (arrays.size(record),), 0, 1)]
+        return arrays.wholes(name, self.shape(arrays, record), 0, 1).astype(bool).ravel().tolist()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,24 +117,8 @@ class Word(Scalar):
     known: tuple[str, ...] | type[StrEnum] = ()
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        words = arrays.words(name, (arrays.size(record),), tuple(self.known))
+        words = arrays.words(name, self.shape(arrays, record), tuple(self.known))
         return words if isinstance(self.known, tuple) else [self.known(word) for word in words]
-
-
-@dataclasses.dataclass(frozen=True)
-class BySide(Scalar):
-    """A number, 0 or more, for each side of the mass; NaN on a side without a stop."""
-
-    noun: ClassVar[str] = "dict of str to float"
-
-    def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
-        rows = np.array([[value.get(side, np.nan) for side in SIDES] for value in values], dtype=float)
-        yield "side", (("side",), np.array(SIDES), {"long_name": "side of the mass on which the stop is"})
-        yield name, ((record, "side"), rows.reshape(len(values), len(SIDES)), _about(self.long_name, self.units))
-
-    def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        rows = arrays.numbers(name, (arrays.size(record), len(SIDES)), 0.0, LARGEST, finite=False)
-        return [{s: float(n) for s, n in zip(SIDES, row, strict=True) if not np.isnan(n)} for row in rows]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,19 +128,24 @@ class ByName(Field):
     noun: ClassVar[str] = "dict of str to float"
 
     what: str = ""  # is named
+    low: float = -np.inf
+    known: tuple[str, ...] = ()  # all names, if they are the same for records of every kind
 
     def variables(self, record: str, name: str, values: Sequence[Any]) -> Iterator[tuple[str, Variable]]:
-        dimension = f"{record}_{self.what}"
-        names = list(dict.fromkeys(key for value in values for key in value))
+        dimension = self._dimension(record)
+        names = self.known or tuple(dict.fromkeys(key for value in values for key in value))
         rows = np.array([[value.get(key, np.nan) for key in names] for value in values], dtype=float)
         yield dimension, ((dimension,), np.array(names, dtype=str), {"long_name": f"name of the {self.what}"})
         yield name, ((record, dimension), rows.reshape(len(values), len(names)), _about(self.long_name, self.units))
 
     def read(self, arrays: Arrays, record: str, name: str) -> list[Any]:
-        dimension = f"{record}_{self.what}"
-        names = arrays.words(dimension, (arrays.size(dimension),))
-        rows = arrays.numbers(name, (arrays.size(record), len(names)), finite=False)
+        dimension = self._dimension(record)
+        names = self.known or tuple(arrays.words(dimension, (arrays.size(dimension),)))
+        rows = arrays.numbers(name, (arrays.size(record), len(names)), self.low, finite=False)
         return [{key: float(n) for key, n in zip(names, row, strict=True) if not np.isnan(n)} for row in rows]
+
+    def _dimension(self, record: str) -> str:
+        return self.what if self.known else f"{record}_{self.what}"
 
 
 @dataclasses.dataclass(frozen=True)

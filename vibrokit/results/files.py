@@ -19,8 +19,7 @@ from vibrokit.results.energy import ActivationEnergy, read_energies
 from vibrokit.results.finding import Finding
 from vibrokit.results.netcdf import arrays_in, opened
 from vibrokit.results.provenance import FORMAT, json_data, json_text, provenance_from
-from vibrokit.results.record import Record
-from vibrokit.results.summary import Summary
+from vibrokit.results.record import Record, Summary
 
 __all__ = ["ResultFileError", "load_result", "record_from"]
 

@@ -1,4 +1,4 @@
-"""Record: what every saved outcome has: where it came from, what was found, and how it is saved and drawn."""
+"""Record: what every saved outcome has: where it came from, what was found, and how it is saved, shown and drawn."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import inspect
 import os
 import platform
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from html import escape
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed, called
@@ -17,10 +18,9 @@ from vibrokit.errors import ResultFileError
 from vibrokit.progress import Stats
 from vibrokit.results.atomic import write_atomically
 from vibrokit.results.codes import Code, Severity
-from vibrokit.results.finding import Finding, check_findings
+from vibrokit.results.finding import Finding, check_findings, together
 from vibrokit.results.netcdf import content_of
 from vibrokit.results.provenance import provenance_data
-from vibrokit.results.summary import Summary
 
 if TYPE_CHECKING:
     import xarray
@@ -31,12 +31,37 @@ if TYPE_CHECKING:
 Data = Mapping[str, Any]
 
 _SETTINGS = "the arguments or the analyzer's configuration as plain data, from which the same can be built again"
-_LIBRARIES = ("vibrokit", "numpy", "scipy", "sympy", "numba")
 
 
 def versions() -> dict[str, str]:
     """Return the versions of Python, the toolkit and the libraries it uses, by name."""
-    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in _LIBRARIES}
+    libraries = ("vibrokit", "numpy", "scipy", "sympy", "numba")
+    return {"python": platform.python_version()} | {name: importlib.metadata.version(name) for name in libraries}
+
+
+@documented
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """A title and a table."""
+
+    title: Annotated[str, "the title"]
+    rows: Annotated[tuple[tuple[str, ...], ...], "the first cell of each row is its name"] = ()
+
+    def text(self, findings: Sequence[Finding], names: Sequence[str]) -> str:
+        """Return at most five lines: the title, the first rows, the first warning or error."""
+        lines = [self.title, *(f"  {row[0]}: {', '.join(row[1:])}" for row in self.rows[:3])]
+        if len(self.rows) > 3:
+            lines[-1] += f" … and {len(self.rows) - 3} more"
+        serious = [finding for finding in together(findings) if finding.severity is not Severity.INFO]
+        lines += [f"  {one.severity}: {' '.join(one.sentence(names).split())}" for one in serious[:1]]
+        return "\n".join(line if len(line) <= 160 else f"{line[:160]}…" for line in lines)
+
+    def html(self, findings: Sequence[Finding], names: Sequence[str]) -> str:
+        """Return the title, the table and all findings as HTML."""
+        body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
+        table = f"<table>{body}</table>" if body else ""
+        items = "".join(f"<li>{one.severity}: {escape(one.sentence(names))}</li>" for one in together(findings))
+        return f"<p><b>{escape(self.title)}</b></p>{table}{f'<ul>{items}</ul>' if items else ''}"
 
 
 @documented

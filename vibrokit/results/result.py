@@ -16,10 +16,9 @@ from vibrokit.results.data import check_names, data_in, joined
 from vibrokit.results.energy import ActivationEnergy, ExitPath, bounds_text, energy_variables, read_energies
 from vibrokit.results.exit_rate import ExitRate
 from vibrokit.results.labels import exit_between, goal_of, label_of, source_among
-from vibrokit.results.record import Record
+from vibrokit.results.record import Record, Summary
 from vibrokit.results.section import Section
 from vibrokit.results.structure import Structure
-from vibrokit.results.summary import Summary
 
 if TYPE_CHECKING:
     from vibrokit.analyzers.analyzer import Analyzer

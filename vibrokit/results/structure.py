@@ -11,11 +11,11 @@ from vibrokit.errors import ResultFileError, counted
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.attractor import Attractor, Survival, attractor_variables, read_attractors
 from vibrokit.results.basins import Basins, grid_variables, read_grid
+from vibrokit.results.fields import LARGEST, Number
 from vibrokit.results.labels import label_of
-from vibrokit.results.record import Record
+from vibrokit.results.record import Record, Summary
 from vibrokit.results.region import Region
 from vibrokit.results.saddle import Manifold, Saddle
-from vibrokit.results.summary import Summary
 from vibrokit.results.table import Table, fields_of
 
 if TYPE_CHECKING:
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 _ATTRACTORS = Table("attractor", fields_of(Attractor), index="label")
 _SADDLES = Table("saddle", fields_of(Saddle))
 _MANIFOLDS = Table("manifold", fields_of(Manifold))
+
+_REACHED = "distance at which an attractor counts as reached, as a fraction of the region's widths"
+_SETTLING = Number(_REACHED, low=0.0, high=LARGEST)
+_SHIFT = Number("distance along x that changes no motion: one turn; 0 for none", "m", 0.0, LARGEST)
 
 
 class Structure(Record):
@@ -37,10 +41,10 @@ class Structure(Record):
     saddles: Annotated[tuple[Saddle, ...], "those on the boundaries of the basins"] = ()
     manifolds: Annotated[tuple[Manifold, ...], "branches of the saddles' stable and unstable manifolds"] = ()
     survival: Annotated[tuple[Survival, ...], "how long starts went on without settling; none if all settled soon"] = ()
-    settling: Annotated[float, "distance at which an attractor counts as reached, as a fraction of the region's widths"]
+    settling: Annotated[float, _SETTLING]
     budget: Annotated[int, "largest number of periods for which a trajectory was followed"]
     stepper: Annotated[str, 'stepper of the basin grid, as `vibrokit run --stepper` reads it: "rk4:256"']
-    shift: Annotated[float, "distance along x that changes no motion: one turn; 0 for none", "m"] = 0.0
+    shift: Annotated[float, _SHIFT] = 0.0
     circle: Annotated[bool, "whether states a turn apart count as one; if not, motion to a copy has escaped"] = False
 
     @property
@@ -112,27 +116,13 @@ class Structure(Record):
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays with dimensions, coordinates, units and long names."""
-        about = {"long_name": "distance at which an attractor counts as reached", "units": "1"}
-        longest = {"long_name": "largest number of forcing periods that a trajectory was followed", "units": "1"}
         return xarray.Dataset(
             {
                 **grid_variables(self.basins.labels, self.basins.region, self.names),
                 **attractor_variables(_ATTRACTORS, self.attractors, self.survival),
                 **_SADDLES.variables(self.saddles),
                 **_MANIFOLDS.variables(self.manifolds),
-                "settling": ((), self.settling, about),
-                "budget": ((), self.budget, longest),
-                "stepper": ((), self.stepper, {"long_name": "stepper of the basin grid"}),
-                "circle": (
-                    (),
-                    int(self.circle),
-                    {"long_name": "whether states a shift apart count as one", "units": "1"},
-                ),
-                "shift": (
-                    (),
-                    self.shift,
-                    {"long_name": "shift along x that changes no motion; 0 for none", "units": "m"},
-                ),
+                **_SCALARS.variables([self]),
             }
         ).set_coords("attractor_name")
 
@@ -151,13 +141,14 @@ class Structure(Record):
             manifolds=_manifolds(arrays, saddles),
             basins=Basins(*read_grid(arrays, len(attractors))),
             survival=survival,
-            settling=float(arrays.numbers("settling", (), 0.0, 1e300)),
-            budget=int(arrays.wholes("budget", ())),
-            stepper=arrays.words("stepper", ())[0],
-            shift=float(arrays.numbers("shift", (), 0.0, 1e300)),
-            circle=bool(arrays.wholes("circle", (), 0, 1)),
+            **_SCALARS.read(arrays)[0],
             **provenance,
         )
+
+
+_SCALARS = Table(
+    "", {name: fields_of(Structure)[name] for name in ("settling", "budget", "stepper", "shift", "circle")}
+)
 
 
 def _described(attractor: Attractor) -> str:

@@ -20,7 +20,7 @@ from vibrokit.results.continuation import Continuation
 from vibrokit.results.energy_continuation import EnergyContinuation
 from vibrokit.results.fields import LARGEST, Number, Word
 from vibrokit.results.files import nested, records_in
-from vibrokit.results.summary import Summary
+from vibrokit.results.record import Summary
 from vibrokit.results.table import Table
 
 if TYPE_CHECKING:

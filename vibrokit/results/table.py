@@ -23,7 +23,7 @@ from vibrokit.results.fields import Field, Flag, Number, Scalar, Variable, Whole
 class Table:
     """Records of one kind."""
 
-    record: str  # name of their dimension, which also goes before the name of each array
+    record: str  # name of their dimension, which also goes before the name of each array; empty for a single record
     fields: Mapping[str, Field]  # by attribute
     index: str = ""  # attribute that is the coordinate of the dimension
 
@@ -44,7 +44,7 @@ class Table:
         return [dict(zip(self.fields, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def _name(self, attribute: str) -> str:
-        return self.record if attribute == self.index else f"{self.record}_{attribute}"
+        return self.record if attribute == self.index else f"{self.record}_{attribute}".lstrip("_")
 
 
 @dataclasses.dataclass(frozen=True)
