@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,8 @@ from vibrokit.plots.axes import (
     span,
 )
 from vibrokit.plots.basins import SectionArtists, cell_samples, section_portrait
+
+_RING: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none", "markeredgewidth": 1.1, "zorder": 8}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -98,16 +100,18 @@ def exit_paths(
     for marker, visits in zip(section.attractors, points, strict=True):
         if len(rows(visits)) > CROWD:
             marker.set(**DOTS, zorder=4)
-    drawn: list[tuple[tuple[Line2D, ...], Line2D, Line2D]] = []
+    lines, starts, ends = list[tuple[Line2D, ...]](), list[Line2D](), list[Line2D]()
     for index, (path, source) in enumerate(zip(paths, sources, strict=True)):
-        whole = bool(curves) and curves[index]
-        strands = 1 if whole or not 0 <= source < len(points) else len(rows(points[source]))
+        place, whole = rows(path), bool(curves) and curves[index]
+        count = 1 if whole or not 0 <= source < len(points) else len(rows(points[source]))
         title = titles[index] if titles else f"exit path from {attractor_name(source, names)}"
-        drawn.append(_draw_path(axes, rows(path), strands, index, colour(source), mark(sources, index), title))
-        if whole:
-            drawn[-1][0][0].set_marker("")
-    lines, starts, ends = (tuple(part) for part in zip(*drawn, strict=True)) if drawn else ((), (), ())
-    artists = ExitPathArtists(axes, section, lines, starts, ends)
+        shape, dashes = mark(sources, index)
+        style = {"color": colour(source), "marker": "" if whole else shape, "linestyle": dashes}
+        lines.append(_strands(axes, place, count, title, style))
+        ring = _RING | {"markersize": 9.5 + 3 * index, "markeredgecolor": colour(source)}
+        starts.append(draw(axes, place[:1], marker="o", label="_more" if index else "start of a path", **ring))
+        ends.append(draw(axes, place[-1:], marker="s", label="_more" if index else "end of a path", **ring))
+    artists = ExitPathArtists(axes, section, tuple(lines), tuple(starts), tuple(ends))
     _add_legend(artists, ax, labels)
     return artists
 
@@ -125,22 +129,17 @@ def _add_legend(artists: ExitPathArtists, given: Axes | None, labels: NDArray[An
         )  # fmt: skip
 
 
-def _draw_path(
-    axes: Axes, place: NDArray[np.float64], strands: int, index: int, ink: str, look: tuple[str, Any], title: str
-) -> tuple[tuple[Line2D, ...], Line2D, Line2D]:
-    joined = strands <= CROWD
-    lone = {"linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black"}
-    style = {**DOTS, "linestyle": look[1]} if joined else lone
-    lines: list[Line2D] = []
-    for first in range(strands if joined else 1):
-        some, label = place[first::strands] if joined else place, "_strand" if first else title
-        lines.append(draw(axes, some, color=ink, marker=look[0], linewidth=0.9, zorder=5, label=label, **style))
-    ring = {"linestyle": "none", "markersize": 9.5 + 3 * index, "markerfacecolor": "none", "markeredgewidth": 1.1}
-    start, end = (
-        draw(axes, some, marker=marker, label="_more" if index else word, markeredgecolor=ink, zorder=8, **ring)
-        for some, marker, word in ((place[:1], "o", "start of a path"), (place[-1:], "s", "end of a path"))
+def _strands(
+    axes: Axes, place: NDArray[np.float64], count: int, title: str, style: Mapping[str, Any]
+) -> tuple[Line2D, ...]:
+    """Join every so many points of a path; those of motion that never repeats are not joined."""
+    if count > CROWD:
+        lone = {"linestyle": "none", "markersize": 3.6, "markeredgewidth": 0.5, "markeredgecolor": "black"}
+        return (draw(axes, place, label=title, zorder=5, **{**style, **lone}),)
+    return tuple(
+        draw(axes, place[first::count], label="_strand" if first else title, zorder=5, linewidth=0.9, **DOTS, **style)
+        for first in range(count)
     )
-    return tuple(lines), start, end
 
 
 def path_history(

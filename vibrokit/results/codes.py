@@ -90,9 +90,7 @@ class Code(StrEnum):
         "starts-diverged", WARNING, "{count} of {starts:start} diverged.",
         "Narrow the region, or check the signs of the forces.",
     )  # fmt: skip
-    STARTS_ENDED = (
-        "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged.",
-    )  # fmt: skip
+    STARTS_ENDED = "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged."
     STARTS_STALLED = (
         "starts-stalled", WARNING,
         "{count} of {starts:start} were not followed to their end, because they need too many steps in a section "
@@ -216,11 +214,7 @@ class Code(StrEnum):
     FOUND_BY_NEIGHBOUR = (
         "found-by-neighbour", INFO, "Steady states found from a neighbouring value and not by the search: {count}.",
     )  # fmt: skip
-    ENERGY_BRANCHES = (
-        "energy-branches",
-        INFO,
-        "Exit paths followed over {values:value} of {parameter}: {branches}.",
-    )
+    ENERGY_BRANCHES = "energy-branches", INFO, "Exit paths followed over {values:value} of {parameter}: {branches}."
     PATH_LOST = (
         "path-lost", INFO, "The exit path {state} could not be followed from {parameter} = {value:.8g} to {next:.8g}: "
         "{reason}", "The path folds, grazes a stop or meets another path; pass a value beyond in search=.",

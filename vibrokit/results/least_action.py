@@ -115,11 +115,8 @@ class ActionPlotResult(Result):
         if "angle" not in arrays:
             return {}
         labels = arrays.wholes("source", (None,), 0, len(self.names) - 1)
-        columns = [
-            arrays.numbers(name, (len(labels), arrays.size("start")), finite=False)
-            for name in ("angle", "radius", "action")
-        ]
-        found = {}
+        shape, found = (len(labels), arrays.size("start")), {}
+        columns = [arrays.numbers(name, shape, finite=False) for name in ("angle", "radius", "action")]
         for label, angle, radius, action in zip(labels.tolist(), *columns, strict=True):
             kept = np.isfinite(angle)  # shorter ones end in NaN
             found[label] = angle[kept], radius[kept], action[kept]

@@ -54,15 +54,10 @@ class Prefactor:
 class Existence:
     """From where to where a branch of steady states exists without a gap.
 
-    Attributes
-    ----------
-    name : str
-    first, last : float
-        Of the parameter: located where the branch ends in a bifurcation, otherwise between the last value at which it
-        was found and the next; the last value itself at an end of the sweep, and where there is no state at the next.
-    begins, ends : str
-        The kind of the bifurcation; ``"goes on"`` at an end of the sweep, ``"nothing beyond"`` where the scene is
-        refused at the next value or has no state there, ``"not located"`` otherwise.
+    `first` and `last` are values of the parameter: located where the branch ends in a bifurcation, otherwise between
+    the last value at which it was found and the next; the last value itself at an end of the sweep, and where there is
+    no state at the next. `begins` and `ends` are the kind of the bifurcation; ``"goes on"`` at an end of the sweep,
+    ``"nothing beyond"`` where the next value has no state or is refused, ``"not located"`` otherwise.
     """
 
     name: str
@@ -193,9 +188,7 @@ class Sweep(AlongParameter):
         StructureError
             No exit path of this state was found.
         """
-        if self.energies is None:
-            raise StructureError("the sweep has no exit paths; see its status.")
-        return self.energies.energy(source)
+        return self._exits.energy(source)
 
     @called
     def sensitivity(self, source: str) -> Array:
@@ -203,9 +196,13 @@ class Sweep(AlongParameter):
 
         Parameters that are tied change together.
         """
+        return self._exits.sensitivity(source)
+
+    @property
+    def _exits(self) -> EnergyContinuation:
         if self.energies is None:
             raise StructureError("the sweep has no exit paths; see its status.")
-        return self.energies.sensitivity(source)
+        return self.energies
 
     @called
     def log_mean_time(self, source: str, intensity: float | None = None) -> tuple[Array, Array]:
