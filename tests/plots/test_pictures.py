@@ -294,6 +294,14 @@ def test_slopes_of_exact_exit_times_are_the_energy():
     assert to_rgba(artists.limits[0].get_color()) == to_rgba(line.get_color()) == to_rgba(colour(1))
 
 
+@pytest.mark.parametrize(("lower", "upper"), [(0.009, np.inf), (np.nan, 0.012)])
+def test_a_bound_that_is_not_known_is_shaded_to_the_edge(lower, upper):
+    artists = exit_slopes([TIMES], [(1, "exact", 0.01, lower, upper)])
+    (low, high), (band,) = artists.ax.get_ylim(), artists.bounds
+    ends = (0.009, high) if np.isinf(upper) else (low, 0.012)
+    assert (band.get_y(), band.get_y() + band.get_height()) == pytest.approx(ends, rel=1e-12)
+
+
 def test_one_intensity_has_no_slope(tmp_path):
     artists = exit_slopes([ExitTimes([1e-3], [2.0], [0.1])])
     assert artists.points == ()

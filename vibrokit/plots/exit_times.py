@@ -170,13 +170,15 @@ def exit_slopes(
         places = 2.0 / (inverse[1:] + inverse[:-1])
         points.append(axes.errorbar(places, slopes, spreads, color=colour(one.label), label=one.title, **_POINTS))
         seen += [slopes - spreads, slopes + spreads]
+    seen += [end for *_, lower, upper in limits for end in (lower, upper)]
+    low, high = span(seen)
     lines, bounds = list[Line2D](), list[Rectangle]()
     for label, title, value, lower, upper in limits:
         lines.append(axes.axhline(value, color=colour(label), linestyle="--", linewidth=1.2, label=title))
-        bounds.append(axes.axhspan(lower, upper, color=colour(label), alpha=0.15, linewidth=0))
-        seen += [lower, upper]
+        ends = lower if np.isfinite(lower) else low, upper if np.isfinite(upper) else high  # or nothing is shaded
+        bounds.append(axes.axhspan(*ends, color=colour(label), alpha=0.15, linewidth=0))
     axes.set_xlim(left=0.0)
-    axes.set_ylim(span(seen))
+    axes.set_ylim(low, high)
     axes.set_xlabel(r"noise intensity $D$ (m$^2$ s$^{-3}$)")
     axes.set_ylabel(r"slope $\mathrm{d}\ln\tau\,/\,\mathrm{d}(1/D)$ (m$^2$ s$^{-3}$)")
     powers_of_ten(axes)
