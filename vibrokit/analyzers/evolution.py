@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.neighbourhoods import nearest
+from vibrokit.analyzers.metastability import nearest
 from vibrokit.analyzers.sgcm.density_flow import DensityFlow, check_memory, check_steps, steps_for
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid, checked_nodes, resolved
 from vibrokit.analyzers.sgcm.propagator import Propagator, checked_noise
@@ -32,7 +32,6 @@ from vibrokit.structure.validation import check_means, gibibytes, plain
 from vibrokit.symbolic.flow_kind import Flow
 
 _DEPTH = 60.0  # in ln p below the maximum that is resolved
-_KEPT = 0.01  # change of the probability that a finding reports
 
 Array = NDArray[np.float64]
 
@@ -97,15 +96,11 @@ def evolve_density(
     check_means(osc, stepper, executor)
     noise, shape, wanted = checked_noise(osc), checked_nodes("evolve_density", nodes), _checked_times(intervals)
     area, begins = Region.of(region), _checked_phase(phase)
-    grid = DensityGrid.of(osc, area, shape)
-    count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
-    check_steps("evolve_density", count)
-    check_memory(osc, shape, count, gibibytes("evolve_density: max_memory_gib", max_memory_gib))
+    flow = _flow(osc, DensityGrid.of(osc, area, shape), steps, max_memory_gib, stepper)
+    propagator, grid = Propagator(flow, noise.intensity, executor), flow.grid
     begun, reached = _start(grid, start), list[tuple[Array, float]]()
     with working(progress, time_limit) as work:
         with Stoppable("evolve_density") as walk:
-            flow = DensityFlow(osc, stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL), grid, count)
-            propagator = Propagator(flow, noise.intensity, executor)
             for one in _at([begins + time for time in wanted], begins, propagator, begun):
                 reached.append(one)
         times = np.array(wanted[: len(reached)]) * osc.section_interval
@@ -119,12 +114,22 @@ def evolve_density(
             log_density=np.array([resolved(phi) for phi, _ in reached]).reshape(-1, *shape),
             mass=np.array(masses),
             scene=scene_data(osc),
-            settings=plain(arguments | {"steps": count, "stepper": stepper}),
+            settings=plain(arguments | {"steps": flow.steps, "stepper": stepper}),
             findings=(*walk.findings, *_findings(times, masses, [change for _, change in reached])),
             stats=work.stats,
             complete=len(reached) == len(wanted),
             seconds=work.seconds,
         )
+
+
+def _flow(
+    osc: Oscillator, grid: DensityGrid, steps: int | None, max_memory_gib: float, stepper: Stepper | None
+) -> DensityFlow:
+    """The flow on a grid; raises StructureError if noise cannot act so often, or if that needs too much memory."""
+    count = steps_for(osc, grid.nodes.reshape(-1, 2)) if steps is None else steps
+    check_steps("evolve_density", count)
+    check_memory(osc, grid.shape, count, gibibytes("evolve_density: max_memory_gib", max_memory_gib))
+    return DensityFlow(osc, stepper or ensemble_stepper(osc, Flow.STATE_VARIATIONAL), grid, count)
 
 
 def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> Iterator[tuple[Array, float]]:
@@ -147,13 +152,13 @@ def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> It
 
 
 def _findings(times: Array, masses: list[float], changes: list[float]) -> list[Finding]:
-    """What was lost over the edge, and what truncation would have changed, where they are largest."""
+    """What was lost over the edge, and what truncation would have changed, where either is largest and above 1 %."""
     found = [
         Finding.of(Code.MASS_NOT_KEPT, time=float(time), mass=mass)
         for time, mass in zip(times, masses, strict=True)
-        if abs(mass - 1) > _KEPT
+        if abs(mass - 1) > 0.01
     ][-1:]
-    if changes and max(map(abs, changes)) > _KEPT:
+    if changes and max(map(abs, changes)) > 0.01:
         worst = int(np.argmax(np.abs(changes)))
         found.append(Finding.of(Code.DENSITY_TRUNCATED, time=float(times[worst]), change=math.expm1(changes[worst])))
     return found

@@ -10,14 +10,13 @@ import numpy as np
 
 from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.checkpoint import Slot
-from vibrokit.analyzers.metastability import with_states
+from vibrokit.analyzers.metastability import covariances_of, with_states
 from vibrokit.analyzers.mfet.dataset import dataset_of
 from vibrokit.analyzers.mfet.direct import DirectRun
 from vibrokit.analyzers.mfet.importance import Importance, from_distances
 from vibrokit.analyzers.mfet.measurement import AtIntensity, from_direct, from_splitting
 from vibrokit.analyzers.mfet.splitting import SplittingRun
 from vibrokit.analyzers.mfet.walk import Walk
-from vibrokit.analyzers.neighbourhoods import covariances_of
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.rate_analyzer import RateAnalyzer
 from vibrokit.analyzers.sgcm.stages import committor_stages

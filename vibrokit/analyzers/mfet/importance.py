@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.analyzers.metastability import metrics_of, nearest
 from vibrokit.analyzers.mfet.walk import Walk
-from vibrokit.analyzers.neighbourhoods import metrics_of, nearest
 from vibrokit.analyzers.paths.local_potential import potential_along
 from vibrokit.kernels.climbing import climb
 from vibrokit.results.attractor import Attractor

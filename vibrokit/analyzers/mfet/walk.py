@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import core_of, nearest, noise_strength, relaxation_of
+from vibrokit.analyzers.metastability import core_of, nearest, noise_strength, relaxation_of, targets_at
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import Ensemble, Stop, run_ensemble

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-from vibrokit.analyzers.metastability import targets_at
-from vibrokit.analyzers.neighbourhoods import core_of, covariances_of, nearest, relaxation_of
+from vibrokit.analyzers.metastability import core_of, covariances_of, nearest, relaxation_of, targets_at
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.results.attractor import Attractor

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibrokit.analyzers.neighbourhoods import noise_strength
+from vibrokit.analyzers.metastability import noise_strength
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError
