@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from vibrokit.analyzers.shooting.tolerances import TOLERANCES
+
 FINEST = 26
 """Most splits of a box: 3^−26 of a side is at the level of rounding."""
 
@@ -66,12 +68,11 @@ class Boxes:
         """Return about `count` boxes to split: of each size, those with the least values in their neighbourhoods.
 
         Half of them are taken where neighbours differ in kind or by a jump in value, because nothing else reveals a
-        narrow exit path between two plateaus. A jump is a ratio above 1.5: smooth branches vary less between boxes.
-        Values (boxes,) are infinite where nothing is known.
+        narrow exit path between two plateaus. Values (boxes,) are infinite where nothing is known.
         """
         near = nearest(self.centres, self.first)
         reachable, highest = values[near].min(axis=1), values[near].max(axis=1)
-        jumps = (highest > 1.5 * reachable) | (kinds[near] != kinds[:, None]).any(axis=1)
+        jumps = (highest > TOLERANCES.jump * reachable) | (kinds[near] != kinds[:, None]).any(axis=1)
         eligible = np.isfinite(reachable) & (self.splits < FINEST)
         sizes = np.unique(self.splits[eligible])
         chosen = []

@@ -76,8 +76,7 @@ class Shooter:
         """Confirm exits, in place, until all below `factor` times the least action of their target are certain.
 
         First the cheapest ones settle in batches until the best one to each target is certain, because most of them
-        are never needed; then all others up to `factor` settle at once, because a few take as long as many. This ends:
-        each exit settles for good, or goes on and spends its budget.
+        are never needed; then all others settle at once, because a few take as long as many.
         """
         for up_to in sorted({1.0, factor}):
             while len(doubtful := self._doubtful(outcomes, up_to)):
@@ -86,7 +85,7 @@ class Shooter:
                 self._settle(outcomes, ranked[:some])
 
     def _doubtful(self, outcomes: Outcomes, factor: float) -> Whole:
-        """Return the exits below `factor` times the least action of their target that are not confirmed."""
+        """The exits below `factor` times the least action of their target that are not confirmed."""
         open_ = np.flatnonzero(np.isin(outcomes.status, (LEFT_BASIN, LEFT_REGION)) & ~outcomes.confirmed)
         least = outcomes.least(len(self.problem.structure.attractors))
         ceilings = factor * np.append(least[:-1], least.min())
@@ -95,9 +94,9 @@ class Shooter:
     def _settle(self, outcomes: Outcomes, which: Whole) -> None:
         """Let the motion without noise decide about some exits, in place.
 
-        If it settles on a target, the exit is confirmed. If it settles on the source, or on an attractor that is no
-        target, the path only touched coarse cells of the basin boundary and is continued, each time for twice as long
-        before it is tested again: it may stay in those cells. If it settles nowhere, the path is no exit.
+        If it settles on a target, the exit is confirmed. If it settles on another attractor, the path only touched
+        coarse cells of the basin boundary and is continued, each time for twice as long before it is tested again. If
+        it settles nowhere, the path is no exit.
         """
         states = outcomes.states[which]
         reached = self._classifier.labels(states[:, : (states.shape[1] - 1) // 2])

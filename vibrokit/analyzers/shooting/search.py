@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.shooting.shots import Shots
+from vibrokit.analyzers.shooting.tolerances import TOLERANCES
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, GRAZED, LEFT_REGION, STALLED
 from vibrokit.progress import TRAJECTORIES, put_off, stage
@@ -37,7 +38,7 @@ class Branch:
     middle: tuple[Array, ...]  # those of them where most of the action accumulates
 
     def same(self, other: Branch) -> bool:
-        """Whether half of the middle states lie within 3 % of the middle's extent from the other path's, by phases."""
+        """Whether half of the middle states are near the other path, each compared at its phase."""
         extent = np.max([np.ptp(here, axis=0) for here in self.middle if len(here)], axis=0, initial=1e-300)
         gaps = [
             cKDTree(there / extent).query(here / extent)[0]
@@ -45,7 +46,7 @@ class Branch:
             if len(there)
         ]
         near = np.concatenate(gaps) if gaps else np.empty(0)
-        return bool(near.size and np.median(near) <= 0.03)
+        return bool(near.size and np.median(near) <= TOLERANCES.same)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -96,15 +97,13 @@ class Search:
 
 
 def _branches(shots: Shots) -> Iterator[Branch]:
-    """Yield the distinct paths among the 64 cheapest minima, for each target at most 8, up to 3 times its least action.
-
-    These limits bound the work of polishing; they do not decide what the least action is.
-    """
+    """Yield the distinct paths among the cheapest minima: so many as polishing has time for."""
     found: list[Branch] = []
-    for index in shots.minima()[:64]:
+    for index in shots.minima()[: TOLERANCES.paths**2]:
         target, action = int(shots.outcomes.targets[index]), float(shots.outcomes.actions[index])
         known = [branch for branch in found if branch.candidate.target == target]
-        if len(known) == 8 or (known and action > 3.0 * known[0].candidate.action):
+        dear = known and action > TOLERANCES.dearest * known[0].candidate.action
+        if dear or len(known) == TOLERANCES.paths:
             continue
         branch = _branch(shots, int(index))
         if not any(branch.same(other) for other in known):
@@ -138,7 +137,7 @@ def _branch(shots: Shots, index: int) -> Branch:
 
 
 def _sampled(shots: Shots, index: int, per_interval: int) -> tuple[Array, Array]:
-    """Return times (s) and (q, p, S) of a path from its first section to the exit test at which it was out."""
+    """Times (s) and (q, p, S) of a path from its first section to the exit test at which it was out."""
     problem, outcomes = shots.shooter.problem, shots.outcomes
     interval = problem.scene.section_interval
     count = math.ceil(int(outcomes.checks[index]) * per_interval / problem.checks)
@@ -181,7 +180,7 @@ def _per_check(shots: Shots) -> int:
 
 
 def _energy(shots: Shots, branch: Branch) -> ActivationEnergy:
-    """Return the energy of one exit path, whose numerical error is not known."""
+    """The energy of one exit path, without its numerical error."""
     problem = shots.shooter.problem
     times, z = _sampled(shots, branch.index, _per_check(shots) * problem.checks)
     size = (z.shape[1] - 1) // 2
@@ -200,7 +199,7 @@ def _energy(shots: Shots, branch: Branch) -> ActivationEnergy:
 
 
 def _with_error(shots: Shots, branch: Branch, energy: ActivationEnergy) -> ActivationEnergy:
-    """Return an energy with its numerical error: the sum of those of the search, of the steps and of the exit tests."""
+    """An energy with its numerical error: the sum of those of the search, of the steps and of the exit tests."""
     assert energy.path is not None
     error = _search_error(shots, branch) + _step_error(shots, branch) + _check_error(shots, energy.path, energy.value)
     return dataclasses.replace(energy, upper=upper_bound(energy.value, error), numerical_error=error)
@@ -224,7 +223,7 @@ def _step_error(shots: Shots, branch: Branch) -> float:
     shooter = dataclasses.replace(shots.shooter, stepper=shots.shooter.stepper.refined())
     starts = shots.starts.with_stepper(shooter.problem, shooter.stepper)
     finer = Shots.over(starts, shooter, shots.boxes.around(branch.index))
-    for refined in finer.refinements(rounds=12, tolerance=1e-5):
+    for refined in finer.refinements(rounds=12, tolerance=TOLERANCES.steps):
         finer = refined
     action, again = branch.candidate.action, float(finer.least[branch.candidate.target])
     return abs(action - again) if math.isfinite(again) else action

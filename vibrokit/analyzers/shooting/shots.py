@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.shooting.boxes import Boxes
 from vibrokit.analyzers.shooting.outcomes import Outcomes, Shooter
 from vibrokit.analyzers.shooting.starts import Starts
+from vibrokit.analyzers.shooting.tolerances import TOLERANCES
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, GRAZED, LEFT_BASIN, LEFT_REGION, STALLED
 
 Array = NDArray[np.float64]
@@ -131,6 +132,6 @@ class Shots:
         boxes = self.boxes.split(which)
         new = self.shooter.shoot(*self.starts.states(boxes.centres[len(self.boxes.centres) :]))
         outcomes = self.outcomes.joined(new)
-        self.shooter.confirm(outcomes, factor=1.5)  # so that paths somewhat above the least are among the minima
+        self.shooter.confirm(outcomes, factor=TOLERANCES.jump)
         least = outcomes.least(len(self.shooter.problem.structure.attractors))
         return dataclasses.replace(self, boxes=boxes, outcomes=outcomes, history=(*self.history, least))

@@ -1,7 +1,4 @@
-"""Where extremal paths start: points of a unit cube that stand for states near an attractor.
-
-Starts are near enough to the attractor for the quadratic form, and no nearer.
-"""
+"""Where extremal paths start: points of a unit cube that stand for states near an attractor."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.paths.local_potential import LocalPotential, Phase, local_potential, potential_along
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.boxes import FINEST
+from vibrokit.analyzers.shooting.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.stepper import Stepper
@@ -191,14 +189,11 @@ def _phases(problem: ExitProblem, stepper: Stepper) -> tuple[Phase, ...]:
 
 
 def shells_of(phases: Sequence[Phase]) -> tuple[Shell, ...]:
-    """Make the fewest shells, equally spaced in time, across each of which radii grow by at most a factor of 10.
-
-    So the outer edge remains in the linear range.
-    """
+    """Make the fewest shells, equally spaced in time, across each of which radii grow little."""
     count = len(phases)
     for shells in (number for number in range(1, count + 1) if count % number == 0):
         made = tuple(_shell(phases, last, count // shells) for last in range(0, count, count // shells))
-        if all(1 / np.linalg.svd(shell.back, compute_uv=False)[-1] <= 10 for shell in made):
+        if all(1 / np.linalg.svd(shell.back, compute_uv=False)[-1] <= TOLERANCES.growth for shell in made):
             break
     return made
 
@@ -224,23 +219,19 @@ def on_sphere(places: Array) -> Array:
 
 
 def fitted_domain(problem: ExitProblem, stepper: Stepper) -> FundamentalDomain:
-    """Return the fundamental domain with the largest inner edge in the linear range, at most 1 % of the exit distance.
+    """Return the fundamental domain with the largest inner edge in the linear range.
 
-    The quadratic form misses a cubic term, so a start at the relative radius ε misses ε³ of the action to be found,
-    1e-6 at one hundredth; the duration of a path grows only with log(1/ε). An attractor that nearly touches a stop has
-    a smaller linear range than its basin: the edge shrinks until paths from all over the domain, one shell later, have
-    the action of the quadratic form there to within 2 %.
-
+    The edge shrinks until paths from all over the domain, one shell later, have the action of the quadratic form there.
     Raises StructureError if no edge down to a relative radius of about 1e-7 is in the linear range.
     """
     shells = shells_of(_phases(problem, stepper))
     distance = _exit_distance(problem, shells[0])
     rates = -np.log(np.maximum(np.abs(problem.attractor.multipliers), np.finfo(float).tiny))
     ratio = float(rates.max() / rates.min())
-    for relative in (0.01 / 4**shrunk for shrunk in range(9)):
+    for relative in (TOLERANCES.edge / 4**shrunk for shrunk in range(9)):
         domain = FundamentalDomain(shells, relative * distance, relative, ratio, problem.scene.autonomous)
         error = _nonlinearity(problem, domain, stepper)
-        if error <= 0.02:
+        if error <= TOLERANCES.linear:
             return domain
     raise StructureError(
         f"the quadratic quasi-potential is off by {error:.2g} (relative) even at {relative:.1g} of the distance to the "
@@ -249,10 +240,7 @@ def fitted_domain(problem: ExitProblem, stepper: Stepper) -> FundamentalDomain:
 
 
 def _exit_distance(problem: ExitProblem, shell: Shell) -> float:
-    """Return the least distance, in whitened coordinates, from the attractor to a cell that counts as left.
-
-    These are cells of other basins, or those out by position; without any, the nearest edge of the region counts.
-    """
+    """The least distance, in whitened coordinates, to a cell that counts as left, or else to the region's edge."""
     basins = problem.structure.basins
     cells = basins.region.cell_centres(basins.labels.shape)
     labels = basins.labels.ravel()
@@ -266,7 +254,7 @@ def _exit_distance(problem: ExitProblem, shell: Shell) -> float:
 
 
 def _nonlinearity(problem: ExitProblem, domain: FundamentalDomain, stepper: Stepper) -> float:
-    """Return the largest relative difference of 64 actions, one shell later, from the quadratic form there."""
+    """The largest relative difference of 64 actions, one shell later, from the quadratic form there."""
     osc, shells = problem.scene, domain.shells
     duration = osc.section_interval * problem.attractor.period / len(shells)
     size = len(shells[0].point)
