@@ -119,22 +119,12 @@ class SplittingRun:
         rng = np.random.default_rng(self.walk.key(3, number))
         excursions.follow(replicas[going].ravel())
         for _ in range(_LEVELS):
-            replaced, higher = list[Whole](), list[int]()
-            for k in going.tolist():
-                own = excursions.scores[replicas[k]]
-                level = float(np.sort(own)[_WALKERS // 4 - 1])
-                lost = own <= level
-                if level == np.inf or lost.all():
-                    continue
-                log_values[k] += math.log1p(-lost.mean())
-                parents = rng.choice(replicas[k][~lost], int(lost.sum()))
-                excursions.replace(replicas[k][lost], parents, level)
-                replaced.append(replicas[k][lost])
-                higher.append(k)
-            if not replaced:
+            replaced = {k: excursions.raised(replicas[k], rng) for k in going.tolist()}
+            going = np.array([k for k, some in replaced.items() if len(some)])
+            if not len(going):
                 break
-            going = np.array(higher)
-            fresh = np.concatenate(replaced)
+            log_values[going] += [math.log1p(-len(replaced[k]) / _WALKERS) for k in going.tolist()]
+            fresh = np.concatenate(list(replaced.values()))
             excursions.follow(fresh[np.isfinite(excursions.scores[fresh])])
         known = replicas[:, 0] >= 0
         targets[known] = excursions.targets[replicas[known]]
@@ -202,11 +192,7 @@ class Excursions:
         self._records: list[list[tuple[float, Array, int]]] = [[(score, state, 0)] for score, state in begun]
 
     def follow(self, which: Whole) -> None:
-        """Follow some of them to their ends.
-
-        One that neither left nor returned in 10 000 relaxations is given up. Excursions are looked after every eight
-        relaxations, or 64 states.
-        """
+        """Follow some of them to their ends, eight relaxations or 64 states at once, for 10 000 relaxations at most."""
         walk, looks, each = self._walk, self._looks, self._pieces // self._looks
         limit = math.ceil(10_000.0 * walk.relaxation * looks)
         at_once = max(looks, min(64, math.ceil(8.0 * walk.relaxation * looks)))
@@ -236,7 +222,17 @@ class Excursions:
             which = which[~over]
             passed += at_once
 
-    def replace(self, which: Whole, parents: Whole, level: float) -> None:
+    def raised(self, which: Whole, rng: np.random.Generator) -> Whole:
+        """Replace the quarter of some that came least far; return those, none if all have left or came equally far."""
+        scores = self.scores[which]
+        level = float(np.sort(scores)[len(which) // 4 - 1])
+        lost = scores <= level
+        if level == np.inf or lost.all():
+            return which[:0]
+        self._replace(which[lost], rng.choice(which[~lost], int(lost.sum())), level)
+        return which[lost]
+
+    def _replace(self, which: Whole, parents: Whole, level: float) -> None:
         """Let some begin anew, each where a parent first came above a level, with random streams of their own."""
         self._streams[which] = self._fresh(len(which))
         for place, parent in zip(which.tolist(), parents.tolist(), strict=True):

@@ -21,10 +21,6 @@ from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
 from vibrokit.structure.orbits import Orbit
 
-_NEAR = 3.0  # times the distance to the nearest end: other ends that near are tried too
-_INSIDE = 2  # orbits inside a chaotic set that a candidate is polished to, the nearest ones
-_MOST_FAILURES = 6  # candidates that lead to no path to an end, after which only cheaper ones are tried
-
 
 class CandidatePolisher:
     """Polishes candidates that leave one orbit, by default the attractor itself, and keeps each path once.
@@ -142,14 +138,14 @@ class CandidatePolisher:
         return [end for end in self._passing.ends if candidate.target in end.targets]
 
     def _is_wanted(self, end: PathEnd, candidate: Candidate) -> bool:
-        """Whether to look for a path to an end: not after many failures, nor inside a set if others cost less.
+        """Whether to look for a path to an end: not after six failures, nor inside a set if others cost less.
 
         A candidate that is cheaper than all that failed, as of a finer graph, is tried all the same.
         """
         failed = self._failed[end]
         known = any(one.end is end for one in self.solved)
         cheapest = min((each.action for each in failed), default=np.inf)
-        if candidate in failed or (len(failed) >= _MOST_FAILURES and not known and candidate.action >= cheapest):
+        if candidate in failed or (len(failed) >= 6 and not known and candidate.action >= cheapest):
             return False
         others = (other for other in self.ends if set(other.targets) & set(end.targets))
         return not end.one_of_many or candidate.action < self._least(others)
@@ -160,12 +156,12 @@ class CandidatePolisher:
         return min((one.action for one in self.solved if one.end in among), default=np.inf)
 
     def _ends_near(self, candidate: Candidate) -> list[PathEnd]:
-        """The ends that a candidate comes near, the nearest first."""
+        """The ends up to three times as far from a candidate as the nearest, two at most inside a chaotic set."""
         distances = [self.nodes.distance(end, candidate) for end in self.ends]
         order = [int(number) for number in np.argsort(distances) if np.isfinite(distances[number])]
-        near = [self.ends[number] for number in order if distances[number] <= _NEAR * distances[order[0]]]
+        near = [self.ends[number] for number in order if distances[number] <= 3.0 * distances[order[0]]]
         inside = [end for end in near if end.one_of_many]
-        return [end for end in near if end not in inside[_INSIDE:]]
+        return [end for end in near if end not in inside[2:]]
 
     def _solve_in_legs(self, end: PathEnd, candidate: Candidate) -> bool:
         """Whether a path to an end through an orbit that a candidate passes is known, or found and added."""

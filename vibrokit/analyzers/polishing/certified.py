@@ -27,8 +27,6 @@ from vibrokit.results.labels import goal_name
 METHOD = "least action"
 _FARTHER = 10.0  # times as far from its source: the error of the linearized start grows 100-fold, so that it shows
 _COMPETING = 0.01  # of the least action: at ΔU/D = 100 such a path still carries a third as many exits
-_FLAT = 1e-3  # sine of the angle between the manifolds
-_ROUNDING = 1e-12  # of an action, which is a sum of thousands of terms
 
 Array = NDArray[np.float64]
 
@@ -54,7 +52,7 @@ def certified(problem: ExitProblem, solved: SolvedPath, findings: list[Finding])
     return energies(
         problem,
         solved,
-        error=certificate.error + _ROUNDING * action,
+        error=certificate.error + 1e-12 * action,  # that is rounding of a sum of thousands of terms
         residual=certificate.residual,
         certificate=certificate,
         sensitivity={name: sum(each[name].value for each in derivatives) for name in names},
@@ -78,10 +76,7 @@ def remarks(problem: ExitProblem, solved: SolvedPath) -> list[Finding]:
 def energies(
     problem: ExitProblem, solved: SolvedPath, *, error: float | None = None, **evidence: Any
 ) -> list[ActivationEnergy]:
-    """The energy of a path, once for each attractor that it leads to.
-
-    Without a certificate, the error is the change by which the path was accepted as long enough.
-    """
+    """The energy of a path, once for each attractor that it leads to; without an error, with that of its length."""
     action = solved.action
     error = TOLERANCES.lasting * action if error is None else error
     known = {"residual": max(max(leg.found.residual, leg.found.slack) for leg in solved.legs)} | evidence
@@ -119,7 +114,7 @@ def valleys(branches: Sequence[ActivationEnergy]) -> list[Finding]:
             )
         )  # fmt: skip
     sine = 1.0 if best.certificate is None else best.certificate.transversality
-    if sine < _FLAT:
+    if sine < 1e-3:
         findings.append(Finding.of(Code.FLAT_VALLEY, best.source, best.target, sine=sine))
     return findings
 

@@ -21,7 +21,6 @@ from vibrokit.kernels.stopping import COMPLETED
 from vibrokit.results.energy import ExitPath
 from vibrokit.symbolic.flow_kind import Flow
 
-_AFTER = 32  # section intervals of noise-free motion after a candidate: it may pass a saddle that far beyond its end
 _ROUNDING = 1e-6  # of a piece: difference of two times that are equal
 
 Array = NDArray[np.float64]
@@ -150,7 +149,8 @@ def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledC
     """Bring a candidate to the nodes, and follow the noise-free motion from its end.
 
     Between the samples of a candidate, motion follows Hamilton's equations where momenta are known, and is free of
-    noise otherwise. Raises StructureError if the candidate has no duration, or states that are not finite.
+    noise otherwise. After its end it may pass a saddle within 32 section intervals. Raises StructureError if the
+    candidate has no duration, or states that are not finite.
     """
     if not np.isfinite(candidate.states).all():
         raise StructureError("it has states that are not finite.")
@@ -168,7 +168,7 @@ def resampled(propagator: SegmentPropagator, candidate: Candidate) -> ResampledC
             for time, last in zip(at, before, strict=True)
         ]
     )
-    after = propagator.onward(points[-1, :n], nodes, _AFTER * propagator.pieces)
+    after = propagator.onward(points[-1, :n], nodes, 32 * propagator.pieces)
     return ResampledCandidate(candidate, points[:, :n], after, None if momenta is None else points[:, n:])
 
 

@@ -16,11 +16,6 @@ from vibrokit.analyzers.polishing.ending import Cut, Ending, ResampledCandidate
 from vibrokit.analyzers.polishing.linearized_orbit import LinearizedOrbit
 from vibrokit.results.energy import ExitPath
 
-_ROUNDING = 1e-9  # of a path's extent: samples this far beyond the face still count as inside
-_SHORT = 1e-4  # of a piece: time over which ∂H/∂t is taken
-_SETTLING = 4.0  # e-foldings at the saddle that are added to a cut candidate
-_MOST_ADDED = 40  # section intervals
-
 Array = NDArray[np.float64]
 
 
@@ -69,7 +64,7 @@ class FaceEnding(Ending):
         in_point, n = np.eye(len(point))[self._coordinates], self.propagator.size
         in_time = np.zeros((len(in_point), int(self.free_time)))
         if self._asks_hamiltonian:
-            rate, short = self.propagator.rate(point, time), _SHORT * self.propagator.piece
+            rate, short = self.propagator.rate(point, time), 1e-4 * self.propagator.piece
             gradient = np.concatenate([-rate[n:], rate[:n]]) * scale / self._energy(scale)
             change = self._hamiltonian(point, time + short) - self._hamiltonian(point, time - short)
             in_point = np.vstack([in_point, gradient])
@@ -92,7 +87,8 @@ class FaceEnding(Ending):
         return np.arange(self.propagator.size) > 1 if self.face.axis == 0 else np.arange(self.propagator.size) != 1
 
     def crossing(self, path: ExitPath) -> int | None:
-        outside = np.flatnonzero(self._gaps(path.q[:-1]) < -_ROUNDING * float(np.ptp(path.q[:, self.face.axis])))
+        rounding = 1e-9 * float(np.ptp(path.q[:, self.face.axis]))
+        outside = np.flatnonzero(self._gaps(path.q[:-1]) < -rounding)
         return int(outside[0]) if outside.size else None
 
     @property
@@ -146,11 +142,11 @@ class SaddleEnding(Ending):
         return self._closest(candidate)[0]
 
     def cuts(self, candidate: ResampledCandidate) -> list[Cut]:
-        """Cut where the candidate is closest to the orbit, and stay on the orbit from there, up to a section."""
+        """Cut where the candidate is closest to the orbit, and stay on it for four e-foldings, up to a section."""
         _, node, place = self._closest(candidate)
         (orbit, phase), pieces = self.orbit.starting(place), self.propagator.pieces
-        periods = math.ceil(_SETTLING / (orbit.slowest_rate * pieces))
-        added = min(max(2, periods), _MOST_ADDED) * pieces + -node % self.propagator.grain
+        periods = math.ceil(4.0 / (orbit.slowest_rate * pieces))
+        added = min(max(2, periods), 40) * pieces + -node % self.propagator.grain
         states = np.concatenate([candidate.all_states[: node + 1], orbit.along(phase + 1, added)])
         ending = dataclasses.replace(self, orbit=orbit, phase=phase + added)
         momenta = candidate.momenta_of(node + 1, len(states))

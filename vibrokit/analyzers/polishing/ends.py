@@ -20,7 +20,6 @@ from vibrokit.results.finding import Finding
 from vibrokit.structure.scales import doublings_of
 from vibrokit.symbolic.flow_kind import Flow
 
-_PIECES = (8, 16)  # in a section interval, more in a long one: the finer ones where the coarser ones do not converge
 _CHAOTIC = "chaotic"
 
 
@@ -102,6 +101,6 @@ def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator)
 
 
 def pieces_of(scene: Oscillator) -> tuple[int, int]:
-    """Return the numbers of pieces of a section interval that paths are solved with, in turn."""
-    coarse, fine = (pieces * 2 ** doublings_of(scene) for pieces in _PIECES)
-    return coarse, fine
+    """Return the numbers of pieces of a section interval that paths are solved with, in turn; more in a long one."""
+    coarse = 8 * 2 ** doublings_of(scene)
+    return coarse, 2 * coarse

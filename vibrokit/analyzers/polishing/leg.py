@@ -32,11 +32,6 @@ from vibrokit.structure.scales import doublings_of
 from vibrokit.symbolic.flow_kind import Flow
 
 _SAMPLES = 128  # in a section interval, more in a long one: enough for pictures, and for quadrature to about 1e-6
-_ROUNDS = 4  # how often a path is cut where it has already left
-_SAME = 0.05  # of a path's extent: distance between two paths that are one, one of them at its samples
-_BESIDE = 1e-3  # of a leg's extent: distance from a saddle at which motion towards an attractor begins
-_ARRIVED = 1e-2  # of a leg's extent: distance from that attractor at which it ends
-_STRETCH, _MOST_STRETCHES = 64, 64  # section intervals of that motion that are run at once
 
 Array = NDArray[np.float64]
 
@@ -115,7 +110,7 @@ class LegSolver:
         self, end: PathEnd, candidate: Candidate, effort: Effort, others: Sequence[PathEnd], least: float
     ) -> Leg:
         nodes, ending = self.nodes, self.nodes.ending(end)
-        for _ in range(_ROUNDS):
+        for _ in range(4):
             found = self._solver(end).solve(ending.cuts(nodes.resampled(candidate)), effort, least)
             if not found.action > 0:
                 raise StructureError(f"the path has the action {found.action:.3g}, so it does not leave the attractor.")
@@ -129,7 +124,7 @@ class LegSolver:
             candidate = dataclasses.replace(
                 candidate, times=path.t[inside], states=path.q[inside], momenta=path.p[inside]
             )  # fmt: skip
-        raise StructureError(f"after {_ROUNDS} cuts where it has already left, the path still leaves before its end.")
+        raise StructureError("after 4 cuts where it has already left, the path still leaves before its end.")
 
 
 def _dense_path(propagator: SegmentPropagator, found: ExtremalPath) -> ExitPath:
@@ -189,21 +184,21 @@ class SolvedPath:
         return tuple(leg.left.name for leg in self.legs[1:])
 
     def is_same(self, other: SolvedPath) -> bool:
-        """Return whether two paths are one, shifted in time: of one action, and at one place where half is spent."""
+        """Return whether two paths are one, shifted in time: of one action, and near each other where half is spent.
+
+        Near is within 0.05 of the extent, because only one of them is compared at its samples.
+        """
         one, action = self.path, self.action
         if self.end is not other.end or not same_action(action, other.action):
             return False
         middle = min(int(np.searchsorted(one.action, 0.5 * action)), len(one.t) - 1)
         place = np.concatenate([one.q[middle], one.p[middle]])
         offsets = (np.hstack([other.path.q, other.path.p]) - place) / self.legs[0].found.scale
-        return bool(np.abs(offsets).max(axis=1).min() < _SAME)
+        return bool(np.abs(offsets).max(axis=1).min() < 0.05)
 
 
 def _appended(path: ExitPath, between: Array, after: ExitPath, scene: Oscillator) -> ExitPath:
-    """The path, the states between, and another path, whose first sample is one time step after the last of these.
-
-    The last sample of the path gives way to the first of what follows: both are on the section at one time.
-    """
+    """The path without its last sample, the states between, and another path that begins one time step later."""
     kept, count, n = len(path.t) - 1, len(between), path.q.shape[1]
     samples = samples_of(scene)
     step = scene.section_interval / samples
@@ -249,7 +244,11 @@ def _along(scene: Oscillator, saddle: Saddle, stepper: Stepper, here: Array, the
 def _relaxation(
     problem: ExitProblem, saddle: Saddle, left: Departure, here: Array, there: Array, extent: Array
 ) -> Array:
-    """The motion from a saddle to an attractor, until it is near the state `there` on the section."""
+    """The motion from a saddle to an attractor, until it is near the state `there` on the section.
+
+    It begins at 1e-3 of the leg's extent beside the saddle, and ends at 1e-2 of it from the attractor. Both sides are
+    followed by turns, for 64 times 64 section intervals at most.
+    """
     scene, stepper = problem.scene, problem.single_stepper(Flow.STATE)
     visit, by = _nearest(scene, saddle.points, here), problem.single_stepper(Flow.STATE_VARIATIONAL)
     start, nodes = saddle.points[visit], nodes_from(visit, saddle.nodes, saddle.points)
@@ -257,19 +256,19 @@ def _relaxation(
     if direction is None:
         raise StructureError(f"motion from the saddle at ({start[0]:.6g}, {start[1]:.6g}) diverges.")
     direction = direction / np.linalg.norm(direction / extent)
-    samples = samples_of(scene)
+    samples, stretch = samples_of(scene), 64
     spacing, every = scene.section_interval / samples, 1 if scene.autonomous else samples
-    motions = [start + side * _BESIDE * direction for side in (1, -1)]
+    motions = [start + side * 1e-3 * direction for side in (1, -1)]
     parts: list[list[Array]] = [[], []]
-    for _ in range(_MOST_STRETCHES):
+    for _ in range(64):
         for side, state in enumerate(motions):
-            motion = record(scene, Flow.STATE, stepper, state, 0.0, spacing, _STRETCH * samples)
-            if len(motion) <= _STRETCH * samples:  # it diverged
+            motion = record(scene, Flow.STATE, stepper, state, 0.0, spacing, stretch * samples)
+            if len(motion) <= stretch * samples:  # it diverged
                 continue
             near = np.linalg.norm((motion[::every] - there) / extent, axis=1)
             parts[side].append(motion[:-1])
-            if near.min() <= _ARRIVED:
-                parts[side][-1] = motion[: every * int(np.argmax(near <= _ARRIVED))]
+            if near.min() <= 1e-2:
+                parts[side][-1] = motion[: every * int(np.argmax(near <= 1e-2))]
                 return np.concatenate(parts[side])
             motions[side] = motion[-1]
     raise StructureError(f"motion from the saddle at ({start[0]:.6g}, {start[1]:.6g}) does not come near {left.name}.")

@@ -26,9 +26,6 @@ from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map
 from vibrokit.structure.orbits import multipliers_of, refine_orbit, states_along
 
-_FAST = 16.0  # logarithm of a multiplier above which the map over the orbit has fewer than nine digits for the others
-_TURNED = 40.0  # logarithm of the factor by which a wrong part of a space must shrink
-
 Array = NDArray[np.float64]
 
 
@@ -121,13 +118,10 @@ class LinearizedAtNodes(LinearizedOrbit):
 
 
 def _at_nodes(propagator: SegmentPropagator, guess: Array, period: int) -> LinearizedAtNodes:
-    """Linearize Hamilton's equations along an orbit of any stability that repeats after some section intervals.
+    """Linearize along an orbit that repeats after some section intervals; the guess (count, n) is refined.
 
     From the section, the spaces are carried to the other nodes, the unstable one forward and the stable one backward:
     in these directions they attract.
-
-    The guess (count, n) consists of nodes as of `refine_orbit`; it is refined. Raises StructureError if there is no
-    orbit, or if it is not hyperbolic, or if the stepper fails along it.
     """
     osc, stepper, pieces = propagator.osc, propagator.stepper, propagator.pieces
     nodes = refine_orbit(osc, guess, period, stepper).nodes if len(guess) == 1 else guess
@@ -147,15 +141,16 @@ def _spaces(
 ) -> tuple[Array, Array]:
     """The unstable and the stable space at all nodes.
 
-    At the first node they are invariant spaces of the map over the whole orbit. Where deviations grow so much that
-    these would be lost in rounding errors, almost any two spaces turn into them while they are carried along the orbit.
+    At the first node they are invariant spaces of the map over the whole orbit. Where a multiplier is above e¹⁶, that
+    map has fewer than nine digits for the others; there almost any two spaces turn into them while they are carried
+    along the orbit, until a wrong part has shrunk by e⁻⁴⁰.
     """
     n = linear.images.shape[1]
     logarithms = np.log(np.abs(multipliers))
-    if logarithms.max() < _FAST:
+    if logarithms.max() < 16.0:
         monodromy, covariance = linear.composed()
         spaces = invariant_spaces(monodromy, covariance, np.empty((n, 0)))
         return carried_along(linear, *spaces, scale_of(propagator, covariance))
-    turns = math.ceil(_TURNED / (2 * float(np.abs(logarithms).min())))
+    turns = math.ceil(40.0 / (2 * float(np.abs(logarithms).min())))
     scale = scale_of(propagator, linear.covariances.sum(axis=0))
     return carried_around(linear, turns, scale)

@@ -24,8 +24,6 @@ from vibrokit.structure.autonomous import Cycle, refine_cycle
 from vibrokit.structure.linear_map import GaussianMap, gaussian_map, gaussian_pieces
 
 _NODES = 512  # along a cycle: a polyline through them is within about 2e-5 of its extent from it
-_PROJECTIONS = 8  # iterations towards that time; each gains the ratio of the distance to the radius of curvature
-_SHORT = 1e-4  # of the duration: time over which the spaces are compared
 _SAME_TIME = 1e-13  # of the duration
 
 Array = NDArray[np.float64]
@@ -94,7 +92,7 @@ class LinearizedCycle(LinearizedOrbit):
 
     def through(self, point: Array, phase: int, *, leaving: bool) -> Self:
         moved = self
-        for _ in range(_PROJECTIONS):
+        for _ in range(8):  # each gains the ratio of the distance to the radius of curvature
             shift = float(moved._ahead(phase, leaving=leaving) @ (point - moved.point(phase)))
             if not math.isfinite(shift):
                 return self
@@ -120,7 +118,7 @@ class LinearizedCycle(LinearizedOrbit):
         Where manifolds meet at an angle as small as the distance from the cycle, the change of the conditions counts.
         """
         normals = self.conditions(phase, scale, leaving=leaving)
-        short = _SHORT * self.cycle.duration
+        short = 1e-4 * self.cycle.duration
         before, after = (
             dataclasses.replace(self, start=self.start + shift).conditions(phase, scale, leaving=leaving)
             for shift in (-short, short)

@@ -17,9 +17,6 @@ from vibrokit.analyzers.polishing.linear_spaces import normals_of
 from vibrokit.errors import StructureError
 from vibrokit.structure.linear_map import hamiltonian_map
 
-_GONE = 1e-100  # offset below which squares of its parts could underflow
-_PATIENCE = 5.0  # times the time in which the slowest motion decays: transient growth and spirals take longer
-
 Array = NDArray[np.float64]
 
 
@@ -162,7 +159,7 @@ class LinearizedOrbit(ABC):
             shares[: self.neutral] = 0.0  # what is not in the space would not decay
             carried = self.carried(min(phase, phase + sign), leaving=leaving)
             shares = np.asarray(np.linalg.solve(carried, shares)) if leaving else carried @ shares
-            shares[np.abs(shares) < _GONE] = 0.0
+            shares[np.abs(shares) < 1e-100] = 0.0  # the squares of smaller ones could underflow
             phase += sign
             yield self.space_at(phase, leaving=leaving) @ shares
 
@@ -179,7 +176,8 @@ class LinearizedOrbit(ABC):
 
         The points (nodes, 2n) run from that end of the path, the start (sign −1) or the end (1); the phase is that of
         the first of them. Nodes are added or dropped `grain` at once. Raises StructureError if the linearized motion
-        does not come within the radius in several times the time that its slowest rate takes.
+        does not come within the radius in five times the time of its slowest rate: transient growth and spirals take
+        longer than that time.
         """
         last = phase - sign * (len(points) - 1)
         orbit = self.along(min(phase, last), len(points))[::-sign][::grain]
@@ -187,7 +185,7 @@ class LinearizedOrbit(ABC):
         if not outside[0]:
             return -grain * (int(np.argmax(outside)) - 1)
         distance = float(np.linalg.norm(points[0, :2] - orbit[0, :2]))
-        most = _PATIENCE * (math.log(distance / radius) / self.slowest_rate + self.period_nodes)
+        most = 5.0 * (math.log(distance / radius) / self.slowest_rate + self.period_nodes)
         offsets = itertools.islice(self.offsets(points[0], phase, sign), grain - 1, None, grain)
         for added, offset in zip(itertools.count(grain, grain), offsets, strict=False):
             if np.linalg.norm(offset[:2]) <= radius:

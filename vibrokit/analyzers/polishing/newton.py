@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import scipy.sparse.linalg
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.analyzers.paths.gauss_newton import sparse_blocks
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -22,12 +22,6 @@ from vibrokit.structure.linear_map import HamiltonianMap
 
 _EXACT = 1e-13  # misfit that is rounding
 _SMALL = 1e-11  # Newton step, relative: the next one would be rounding
-_LONGEST_STEP = 1.0  # of a path's size: a longer one leads where the motion may grow without bound
-_SHORTEST_STEP = 1e-4  # share of a Newton step
-_LONGEST_LAST = 3.0  # pieces
-_NEARER = 10.0  # times as near to its source: start of a path that nearly converges
-_GAINING = 10.0  # ratio of the misfits before and after a step in all but that direction that is worth another one
-_MATCHED = 1e-4  # of that step: length of what is left of Newton's step when all else is matched
 
 Array = NDArray[np.float64]
 
@@ -70,7 +64,7 @@ def extremal_path(
     """
     found = _Matching(propagator, source, first, ending, points, last).solve(points, evaluations, accepted)
     if accepted < found.residual < nearly and not source.start_on_orbit:
-        added = math.ceil(math.log(_NEARER) / (source.slowest_rate * propagator.grain)) * propagator.grain
+        added = math.ceil(math.log(10.0) / (source.slowest_rate * propagator.grain)) * propagator.grain
         points = np.concatenate([source.continued(found.points[0], first, -added), found.points])
         first -= added
         found = _Matching(propagator, source, first, ending, points, found.last).solve(points, evaluations, accepted)
@@ -81,6 +75,10 @@ def extremal_path(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Evaluation:
+    """Points of a path, the number that is unknown besides, and how far they are from solving the equations."""
+
+    points: Array  # (nodes, 2n)
+    number: Array  # (1,), or (0,) if none is unknown
     source: LinearizedOrbit  # so shifted in time, if it may be, that the first point is nearest to its phase
     ending: Ending  # shifted likewise
     carried: HamiltonianMap
@@ -128,18 +126,17 @@ class _Matching:
             points[short] = self.propagator.extremal_from(points[short - 1], self.first + short - 1, None).images
         return points
 
-    def _arranged(self, points: Array, number: Array) -> tuple[Array, _Evaluation]:
+    def _arranged(self, points: Array, number: Array) -> _Evaluation:
         """Choose what is unknown by where the points are, and evaluate them."""
         unknown = self._unknown(points)
-        points = self._joined(points, unknown)
-        return points, self.evaluate(points, number, unknown)
+        return self.evaluate(self._joined(points, unknown), number, unknown)
 
     def evaluate(self, points: Array, number: Array, unknown: NDArray[np.intp]) -> _Evaluation:
         """Carry all pieces and compare."""
         last = self._last(number)
-        if not 0 < last < _LONGEST_LAST * self.propagator.piece:
+        if not 0 < last < 3.0 * self.propagator.piece:
             nothing = HamiltonianMap(points, points, points)
-            return _Evaluation(self.source, self.ending, nothing, unknown, points, math.inf)
+            return _Evaluation(points, number, self.source, self.ending, nothing, unknown, points, math.inf)
         carried = self.propagator.extremal(points[:-1], self.first, last)
         source, ending = self.source.through(points[0], self.first, leaving=True), self.ending.through(points[-1])
         parts = [
@@ -153,11 +150,11 @@ class _Matching:
         misfits = np.concatenate(parts)
         largest = float(np.abs(misfits).max())
         largest = largest if math.isfinite(largest) else math.inf
-        return _Evaluation(source, ending, carried, unknown, misfits, largest)
+        return _Evaluation(points, number, source, ending, carried, unknown, misfits, largest)
 
-    def derivatives(self, points: Array, number: Array, current: _Evaluation) -> scipy.sparse.csc_array:
+    def derivatives(self, current: _Evaluation) -> scipy.sparse.csc_array:
         """Derivatives of the misfits in the scaled points and the number."""
-        unknown, double = current.unknown, points.shape[1]
+        points, number, unknown, double = current.points, current.number, current.unknown, len(self.scale)
         at_start = current.source.misfit_derivatives(points[0], self.first, self.scale, leaving=True)
         pieces = len(unknown) - 1
         size, ahead = double * (pieces + 1), len(at_start)
@@ -168,7 +165,7 @@ class _Matching:
         over_two = np.flatnonzero(np.diff(unknown) == 2)
         steps[over_two] = over_one[unknown[over_two] + 1] @ steps[over_two]
         starts, ones = double * np.arange(pieces), np.arange(pieces * double)
-        table = [
+        table: list[tuple[Array, ArrayLike, ArrayLike]] = [
             (at_start, 0, 0),
             (-steps, ahead + starts, starts),
             (np.ones((len(ones), 1, 1)), ahead + ones, double + ones),
@@ -192,56 +189,68 @@ class _Matching:
         may be small enough already. If not, the path moves along the family, a short step at a time.
         """
         number = np.array([self.last] if self.ending.free_time else [0.0] if self.gauge is not None else [])
-        (points, current), flat, before = self._arranged(points, number), False, math.inf
+        current, flat, before = self._arranged(points, number), False, math.inf
         while evaluations > 0 and _EXACT < current.largest < math.inf:
             count(newton_iterations=1)
             try:
-                factors = scipy.sparse.linalg.splu(self.derivatives(points, number, current))
+                factors = scipy.sparse.linalg.splu(self.derivatives(current))
             except RuntimeError:  # singular: the guess is far from any path
                 break
             step = -factors.solve(current.misfits)
             null = NearNullDirection.of(factors, step)
             rest = null.without(step)
             if null.flat or null.most < np.abs(null.direction @ step):
-                if np.linalg.norm(rest) > _MATCHED * null.most or accepted < current.largest < before / _GAINING:
+                # Worth a step in all other directions: what is left of it, or what the last one has gained.
+                if np.linalg.norm(rest) > 1e-4 * null.most or accepted < current.largest < before / 10.0:
                     step, before = rest, current.largest
                 elif current.largest <= accepted:
                     flat = True
                     break
                 else:
                     step = rest + null.limited(step) * null.direction
-            length = float(np.linalg.norm(step))
-            share = min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), _SMALL))
-            while share > _SHORTEST_STEP:
-                moved = self._moved(points, number, share * step, current.unknown)
-                tried = self.evaluate(*moved, current.unknown)
-                evaluations -= 1
-                if math.isfinite(tried.largest):
-                    ahead = float(np.linalg.norm(null.without(factors.solve(tried.misfits))))
-                    if ahead <= (1 - share / 4) * length or tried.largest < _EXACT:
-                        break
-                share /= 2
-            else:
+            tries, tried = self._shortened(current, step, factors, null)
+            evaluations -= tries
+            if tried is None:
                 break
-            (points, number), current = moved, tried
-            if length < _SMALL * math.sqrt(len(step)):
+            current = tried
+            if float(np.linalg.norm(step)) < _SMALL * math.sqrt(len(step)):
                 break
-            if not np.array_equal(self._unknown(points), current.unknown):
-                points, current = self._arranged(points, number)
-        slack = 0.0 if self.gauge is None else abs(float(number[0]))
+            if not np.array_equal(self._unknown(current.points), current.unknown):
+                current = self._arranged(current.points, current.number)
+        slack = 0.0 if self.gauge is None else abs(float(current.number[0]))
         return ExtremalPath(
-            current.source, self.first, current.ending, points, self._last(number),
-            current.carried.derivatives, current.carried.actions, _over_jumps(points, current.carried.images),
+            current.source, self.first, current.ending, current.points, self._last(current.number),
+            current.carried.derivatives, current.carried.actions, _over_jumps(current.points, current.carried.images),
             current.largest, slack, self.scale, flat,
         )  # fmt: skip
+
+    def _shortened(
+        self, current: _Evaluation, step: Array, factors: scipy.sparse.linalg.SuperLU, null: NearNullDirection
+    ) -> tuple[int, _Evaluation | None]:
+        """How many shares of a step were tried, and the evaluation after the first that makes the next step shorter.
+
+        No share is longer than the path, beyond which the motion may grow without bound; None if 1e-4 is too long.
+        """
+        length, tries = float(np.linalg.norm(step)), 0
+        share = min(1.0, 1.0 / max(float(np.abs(step).max()), _SMALL))
+        while share > 1e-4:
+            tried = self._moved(current, share * step)
+            tries += 1
+            if math.isfinite(tried.largest):
+                ahead = float(np.linalg.norm(null.without(factors.solve(tried.misfits))))
+                if ahead <= (1 - share / 4) * length or tried.largest < _EXACT:
+                    return tries, tried
+            share /= 2
+        return tries, None
 
     def _last(self, number: Array) -> float:
         return float(number[0]) if self.ending.free_time else self.last
 
-    def _moved(self, points: Array, number: Array, step: Array, unknown: NDArray[np.intp]) -> tuple[Array, Array]:
-        moved, parted = points.copy(), len(unknown) * points.shape[1]
-        moved[unknown] += self.scale * step[:parted].reshape(-1, points.shape[1])
-        return self._joined(moved, unknown), number + step[parted:]
+    def _moved(self, current: _Evaluation, step: Array) -> _Evaluation:
+        moved, parted = current.points.copy(), len(current.unknown) * len(self.scale)
+        moved[current.unknown] += self.scale * step[:parted].reshape(-1, len(self.scale))
+        number = current.number + step[parted:]
+        return self.evaluate(self._joined(moved, current.unknown), number, current.unknown)
 
     def _jump(self, unknown: NDArray[np.intp]) -> slice:
         """The misfits at the node where H may jump."""
@@ -256,7 +265,7 @@ def _over_jumps(points: Array, images: Array) -> float:
 
 
 def _sizes(points: Array, origin: Array) -> Array:
-    """Extent of a path in each coordinate, at least a rounding error of the others."""
+    """Extent of a path in each coordinate, at least 1e-6 of the others."""
     n = len(origin) // 2
     sizes = np.abs(points - origin).max(axis=0)
     for part in (slice(0, n), slice(n, 2 * n)):

@@ -21,7 +21,6 @@ from vibrokit.analyzers.polishing.tolerances import TOLERANCES
 from vibrokit.errors import StructureError
 
 _PASSED = 0.05  # of a candidate's extent: distance from an orbit that it passes; grids place it to 0.003 to 0.04
-_MOST_TRIES = 3  # candidates for a leg from one orbit to one end
 
 Array = NDArray[np.float64]
 
@@ -54,11 +53,11 @@ class PassingSearch:
         ]
 
     def solve(self, end: PathEnd, candidate: Candidate, known: Sequence[SolvedPath]) -> SolvedPath | None:
-        """Return a path to an end of which a known path is the first part; None if none is found."""
+        """Return a path to an end of which a known path is the first part, tried three times; None if none is found."""
         with contextlib.suppress(StructureError):  # one of the orbits is not hyperbolic
             for first, solver, rest in self._splits(end, candidate, known):
                 self._tries[solver, end] += 1
-                if self._tries[solver, end] <= _MOST_TRIES:
+                if self._tries[solver, end] <= 3:
                     with contextlib.suppress(StructureError):
                         leg = solver.solve(end, rest, Effort.DESCEND)
                         if first.action + leg.found.action <= TOLERANCES.worth * candidate.action:

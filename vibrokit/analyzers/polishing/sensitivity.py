@@ -17,11 +17,6 @@ from vibrokit.errors import ParameterError, SceneError
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.scene import Entry
 
-_PROBE = 1e-6  # of a parameter, or of 1 where it is 0: first change, from which the size of the others is chosen
-_MOVED = 3e-5  # of a path's size: change of the pieces; its square and the error of the integration over it are alike
-_LARGEST = 1e-2  # of a parameter: largest change
-_SAME_SECTION = 0.1  # relative change of the section interval above which two frequencies lost their common period
-
 Array = NDArray[np.float64]
 
 # Places, and the weights of the changes there in the derivative from the nearer and from the farther ones.
@@ -96,7 +91,11 @@ class _ActionChange:
 
 
 def _derivative(change: _ActionChange, entry: Entry) -> Sensitivity | None:
-    """By differences on both sides, or on one where the other is not allowed; None if neither is."""
+    """By differences on both sides, or on one where the other is not allowed; None if neither is.
+
+    A first change of 1e-6 shows for which one, at most 1e-2 of the parameter, pieces move by 3e-5 of the path's size:
+    its square and the error of the integration over it are alike.
+    """
     osc, value = change.problem.osc, float(entry.value)
     interval = osc.section_interval
 
@@ -105,22 +104,22 @@ def _derivative(change: _ActionChange, entry: Entry) -> Sensitivity | None:
         for offset in offsets:
             try:
                 there = osc.replace({entry.path: value + offset})
-                if abs(there.section_interval / interval - 1) > _SAME_SECTION:
+                if abs(there.section_interval / interval - 1) > 0.1:  # two frequencies lost their common period
                     return None
             except (ParameterError, SceneError):
                 return None
             found.append(change.at(there))
         return found
 
-    step = _PROBE * (abs(value) or 1.0)
+    step = 1e-6 * (abs(value) or 1.0)
     probe = at([step]) or at([-step])
     if probe is None:
         return None
     (_, moved), *_ = probe
     if not math.isfinite(moved):
         return None
-    step *= _MOVED / moved if moved else 1.0
-    step = min(step, _LARGEST * abs(value)) if value else step
+    step *= 3e-5 / moved if moved else 1.0
+    step = min(step, 1e-2 * abs(value)) if value else step
     for places, nearer, farther in (_BOTH_SIDES, _ABOVE, _BELOW):
         found = at([place * step for place in places])
         if found is not None:

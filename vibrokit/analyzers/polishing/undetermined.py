@@ -13,9 +13,6 @@ from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.errors import StructureError
 
 _NULL = 1e-2  # singular value of the matching below which paths are nearly a family; generic ones are above it
-_FLAT = 1e-7  # singular value below which nothing in double precision tells those paths apart
-_INVERSE_ITERATIONS = 3  # for that value; each gains its square over the one of the next value
-_LONGEST_SHIFT = 0.03  # of a path's extent: change along that family in one step
 
 Array = NDArray[np.float64]
 
@@ -42,11 +39,11 @@ class NearNullDirection:
 
     @classmethod
     def of(cls, factors: scipy.sparse.linalg.SuperLU, guess: Array) -> NearNullDirection:
-        """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value."""
+        """By inverse iteration: J⁻¹J⁻ᵀ grows the direction of the least singular value by its square."""
         direction, value = guess, math.inf
         if not np.any(guess):
             return cls(guess, math.inf)
-        for _ in range(_INVERSE_ITERATIONS):
+        for _ in range(3):
             left = factors.solve(direction / np.linalg.norm(direction), trans="T")
             direction = factors.solve(left / np.linalg.norm(left))
             value = 1 / float(np.linalg.norm(direction))
@@ -55,13 +52,13 @@ class NearNullDirection:
     @property
     def flat(self) -> bool:
         """Whether a shift as long as the path itself makes no misfit, so that rounding decides on its length."""
-        return self.value < _FLAT
+        return self.value < 1e-7
 
     @property
     def most(self) -> float:
-        """Length of the longest step in this direction."""
+        """Length of the longest step in this direction, which changes no coordinate by more than 0.03 of its extent."""
         largest = float(np.abs(self.direction).max())
-        return _LONGEST_SHIFT / largest if largest else math.inf
+        return 0.03 / largest if largest else math.inf
 
     def limited(self, step: Array) -> float:
         """Return how far a step goes in this direction, or the longest way."""

@@ -122,9 +122,9 @@ class Cores:
         return np.minimum(covered, 1.0 - own)
 
     def _inner(self, label: int, grid: DensityGrid, own: Array, deviations: float) -> Array:
-        """How much of each cell is in a basin, so far from its edge in units of the deviations that D = 1 makes.
+        """How much of each cell is in a basin, so far from its edge in units of the larger deviations that D = 1 makes.
 
-        Those are the largest around both attractors. Nothing is known of them if one never repeats.
+        Nothing is known of them if one of both attractors never repeats.
         """
         basins, problem = self.problem.structure.basins, self.problem
         pair = problem.attractor, problem.structure.attractors[label]
@@ -145,9 +145,6 @@ class Cores:
         return variances.max(axis=0)
 
     def _core(self, attractor: Attractor, grid: DensityGrid, intensity: float, size: float) -> Array:
-        """How much of each cell belongs to a core, with semi-axes of 2.5 node spacings at least.
-
-        So its area is known to a few per cent.
-        """
+        """How much of each cell belongs to a core, whose area 2.5 node spacings as semi-axes show to a few per cent."""
         ellipses = core_of(self.problem, attractor, intensity, size, lambda points: 2.5 * grid.local_spacing(points))
         return grid.covered(lambda states: nearest(states, *ellipses, self.problem.turn) <= 1)

@@ -111,10 +111,7 @@ class DensityFlow:
         return arrivals
 
     def _made(self, start: float, end: float) -> list[tuple[Leg, Leg]]:
-        """Legs of a part of a section interval, in both directions.
-
-        Those of an autonomous scene that are equally long share their arrays.
-        """
+        """Legs in both directions; those of an autonomous scene that are equally long share their arrays."""
         known: dict[int, tuple[Leg, Leg]] = {}
         legs, pieces = [], list(self._pieces(start, end))
         with stage("flow between nodes", unit="legs", total=len(pieces)):
@@ -138,9 +135,9 @@ class DensityFlow:
             yield begin, stop, 0.5 * step if stop < end else 0.0
 
     def _leg(self, start: float, end: float) -> tuple[Leg, Leg]:
-        """Integrate backwards in time from all nodes, and forwards again for the derivatives; and forwards from all.
+        """A leg, backwards from all nodes and forwards again for the derivatives, and one forwards from all nodes.
 
-        In the second leg, what leaves the grid goes on as at its edge.
+        In the second one, what leaves the grid goes on as at its edge.
         """
         nodes = self.grid.nodes.reshape(-1, 2)
         mirrored, crossed = self._followed(Flow.STATE_REVERSED, nodes * _MIRROR, -end, end - start, _MIRROR)
@@ -164,7 +161,7 @@ class DensityFlow:
     def _followed(self, flow: Flow, states: Array, start: float, duration: float, sign: Array) -> tuple[Array, Array]:
         """States at the end, NaN if they diverge, and the share of cells that has been at the exit.
 
-        Where position decides, motion that ended on its way forwards, as at a pole, is out. `sign` undoes a reflection.
+        Motion that ended on its way forwards, as at a pole, is out. `sign` undoes a reflection.
         """
         checks = 1 if self.beyond is None else 16  # hertz-0.570: a mass that turns back between two went 1e-5 further
         farthest = np.full(len(states), -np.inf) if self.beyond is None else self.beyond(states * sign)

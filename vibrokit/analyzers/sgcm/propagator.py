@@ -118,10 +118,7 @@ class Propagator:
     def _stepped(
         self, phi: Array, marks: Marks, leg: Leg, at_exit: float, weight: Array, floor: float
     ) -> tuple[Array, Marks, float]:
-        """φ after a leg, its marks, and ln of what the exit takes up.
-
-        The flow comes first, then the exit, then diffusion in parts that are narrow enough.
-        """
+        """φ after the flow, the exit and diffusion in narrow parts, its marks, and ln of what the exit takes up."""
         spread = math.sqrt(leg.noise)
         parts = parts_of(float(self.deviation.max()) * spread)
         spreads = self.deviation * (spread / math.sqrt(max(parts, 1)))

@@ -54,10 +54,9 @@ class Convergence:
     def remaining(self, rates: list[float]) -> float:
         """Return the change of the last of some ln rates that further iteration would make.
 
-        It is the sum of a geometric series of the means of three windows, as wide as half of the relaxation, since a
-        rate may change little for shorter times by chance, or cycle between limits of interpolation. Its ratio is not
-        below the square of that of the slowest mode around the attractor, because the covariance of a density relaxes
-        twice as fast as its mean; it is above where a density takes longer to arrive than to relax.
+        It is the sum of a geometric series of the means of three windows. In windows shorter than half of the
+        relaxation, a rate may change little by chance. The ratio is at least the square of that of the slowest mode,
+        because a covariance relaxes twice as fast as a mean.
         """
         window = max(self.window, math.ceil(0.5 * self.relaxation))
         last = rates[-3 * window :]

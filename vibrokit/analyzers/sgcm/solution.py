@@ -105,10 +105,10 @@ class DensitySolver:
             yield before
 
     def guide(self, intensity: float) -> AtIntensity:
-        """A solution to guide a simulation by, whose error does not matter: few nodes, and iterated roughly.
+        """Return a rough solution to guide a simulation by, at more noise if this noise needs too many nodes.
 
-        It is one at more noise, on the grid of exploration, if this noise needs too many nodes. All steps are taken:
-        with half of them the variance of splitting is 1.8 times as large (double well, ζ = 0.05, depth 26).
+        All steps are taken: with half of them the variance of splitting is 1.8 times as large (double well, ζ = 0.05,
+        depth 26).
         """
         explored, closer = self.explored(intensity)
         grid = self._grid(closer.region, self._nodes(closer, intensity, _ENOUGH, _FEWEST, _LARGEST))
@@ -163,9 +163,8 @@ class DensitySolver:
         return wanted
 
     def _widened(self, found: QuasiStationary, weaker: float) -> Region | None:
-        """A region wider on the sides where motion between attractors leaves the grid; None if there is no such side.
+        """A region wider on the sides where motion that would come back leaves the grid; None if there is none.
 
-        What leaves there is lost, although it would come back. Where motion escapes or position decides it is not.
         `weaker` is the noise that is wanted over that of the density: depths grow as it falls.
         """
         matters, grid = found.highest > found.top + weaker * math.log(EDGE), found.grid

@@ -102,7 +102,7 @@ def _branches(shots: Shots) -> Iterator[Branch]:
     for index in shots.minima()[: TOLERANCES.paths**2]:
         target, action = int(shots.outcomes.targets[index]), float(shots.outcomes.actions[index])
         known = [branch for branch in found if branch.candidate.target == target]
-        dear = known and action > TOLERANCES.dearest * known[0].candidate.action
+        dear = bool(known) and action > TOLERANCES.dearest * known[0].candidate.action
         if dear or len(known) == TOLERANCES.paths:
             continue
         branch = _branch(shots, int(index))
